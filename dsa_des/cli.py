@@ -76,11 +76,6 @@ def main() -> None:
     metavar="FACTOR",
     help="Pace the run: FACTOR simulated seconds per second; results do not change.",
 )
-@click.option(
-    "--check-rewinding",
-    is_flag=True,
-    help="Run every window twice from its saved state; name the block that differs. Slow.",
-)
 @plain_errors
 def run(**options: Any) -> None:
     """Run SCENE and say which sensor saw which intruder, when, and how far away."""

@@ -14,7 +14,8 @@ from components.geometry.enu import enu_to_geodetic
 from components.geometry.line_of_sight import LineOfSight
 from components.line_of_sight.true_reach import true_reach_m
 from components.messages.reach import FarthestLook
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
 from components.geometry.wrapping import past
-from dsa_des.block.limits import refuse_extremes
+from dsa_des.block.parameters import refuse_extremes
 from dsa_des.files.input_files import InputFileError, read_input_text
 
 # Beyond this the pole was meant and pi/2 was rounded.

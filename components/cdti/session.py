@@ -21,7 +21,7 @@ from dsa_des.library.scenes import load_scene
 from dsa_des.running.pacing import parse_factor
 from dsa_des.running.recorded_run import record_run
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.interruption import Terminated
 from dsa_des.terminal.terminal import say

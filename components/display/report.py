@@ -13,7 +13,7 @@ from components.display.summary import (
     senders,
 )
 from components.messages.detections import Detections
-from dsa_des.record.recording import Observer
+from dsa_des.record.sinks import Observer
 from dsa_des.running.reports import Change, Difference
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from components.metrics.true_states import TargetsInFrame
 from components.sensor.cut_off import END, START, in_scan
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.record.recording import Observer
+from dsa_des.record.sinks import Observer
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation

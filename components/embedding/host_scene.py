@@ -10,8 +10,8 @@ from components.messages.targets import TrafficStates
 from dsa_des.block.component import Component
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.errors import Problem, SceneError, UsageError
-from dsa_des.scene.block import Block
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.block_table import Block
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene, load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 

@@ -13,7 +13,7 @@ from components.embedding.host_traffic import Plane
 from components.embedding.states import numbers_in
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 

@@ -28,7 +28,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, read_input_text, resolve_home
-from dsa_des.files.toml_input import parse_toml
+from dsa_des.files.toml_files import parse_toml
 
 _KT = 1852.0 / 3600.0
 _LENGTH, _SPEED = {"m": 1.0, "ft": FOOT_M}, {"mps": 1.0, "kt": _KT}

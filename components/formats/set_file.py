@@ -26,7 +26,7 @@ from components.formats.encounter_set import (
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, status_of
-from dsa_des.files.unfinished import temporary_beside
+from dsa_des.files.output_file import temporary_beside
 
 if TYPE_CHECKING:
     import pyarrow as pa

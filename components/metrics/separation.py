@@ -18,7 +18,7 @@ from components.geometry.ellipsoid import line_of_sight, north_east_up
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
-from dsa_des.scene.block import Block
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.time.randomness import Streams
 

@@ -19,10 +19,10 @@ from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.message import offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.source_file import absolute
-from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
 
@@ -146,9 +146,9 @@ class StoneSoupTracker(Component):
         if not callable(build):
             raise ValueError(f"builder = {name}: is no function that builds a tracker")
         try:
-            with strangers_code(), self._repeatable.working():
+            with foreign_code(), self._repeatable.working():
                 tracker = build()
-        except Left as error:
+        except ForeignFailure as error:
             raise ValueError(f"builder = {name}: failed with {error}") from error.__cause__
         if not callable(getattr(tracker, "update_tracker", None)):
             raise ValueError(

@@ -1,13 +1,10 @@
-"""Importing what a file names: ``module:Class``, and entry points that other packages registered.
-
-The working directory and the folder of the scene are where a user's own modules lie, and where
-foreign files may lie. No file there can stand in for one of ours or of an installed package:
-see `dsa_des.block.module_search`.
-"""
+"""Another package of the name of one of ours, found before it on the module path."""
 
 import contextlib
 import importlib
+import importlib.util
 import io
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -17,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block import source_file
-from dsa_des.block.hidden import refuse_hidden
-from dsa_des.block.module_search import (
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.source_file import (
     file_of,
     last_on_path,
     needed,
@@ -26,8 +23,52 @@ from dsa_des.block.module_search import (
     remember,
     searched,
 )
-from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import UsageError, did_you_mean
+
+#: Where our packages lie side by side.
+_HOME = Path(__file__).parents[2]
+
+
+def refuse_hidden(module_name: str) -> None:
+    """Make sure that a module of ours is imported from our package.
+
+    Parameters
+    ----------
+    module_name : str
+        Such as ``components.gate``.
+
+    Raises
+    ------
+    UsageError
+        If another package of the name comes first, with its file.
+    """
+    top = module_name.partition(".")[0]
+    ours = _HOME / top
+    found = _place_of(top)
+    if found is None or not (ours / "__init__.py").is_file():
+        return
+    folder = found.parent if found.name == "__init__.py" else found
+    if folder == ours or folder.resolve() == ours.resolve():
+        return
+    raise UsageError(
+        f"the module {top!r} is {found}, which hides the package {ours} that dsa-des needs: "
+        "give it another name, or take it off the Python path"
+    )
+
+
+def _place_of(top: str) -> Path | None:
+    """Return the file of a module, imported or not; the folder of one without ``__init__.py``."""
+    try:
+        loaded = sys.modules.get(top)
+        spec = importlib.util.find_spec(top) if loaded is None else None
+    except (ImportError, ValueError, OSError):
+        return None
+    file = getattr(loaded, "__file__", None) or (spec and spec.has_location and spec.origin)
+    if file:
+        return Path(file)
+    places = getattr(loaded, "__path__", None) or (spec and spec.submodule_search_locations)
+    return next(map(Path, places or ()), None)
+
 
 _OURS = "dsa-des"
 
@@ -135,9 +176,9 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
         policy.about_to(Foreign(key, name, short, file))
     module = _imported(module_name, beside) if path is None else _imported_file(path)
     try:
-        with strangers_code():
+        with foreign_code():
             return getattr(module, class_name)
-    except Left as error:
+    except ForeignFailure as error:
         if not isinstance(error.__cause__, AttributeError):
             raise NotImportable(f"{_where(module)} cannot give {class_name!r}: {error}") from error
         known = [n for n in vars(module) if not n.startswith("_")]
@@ -168,9 +209,9 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
         if policy.announce is not None or not policy.allowed:
             policy.about_to(Foreign(key, point.name, point.module, file_of(point.module)))
     try:
-        with strangers_code(), _no_output(point.module):
+        with foreign_code(), _no_output(point.module):
             return point.load()
-    except Left as error:
+    except ForeignFailure as error:
         what = f"cannot be imported from {point.value} ({file_of(point.module)}): {error}"
         raise NotImportable(what) from error.__cause__
 
@@ -212,9 +253,9 @@ def _imported(module_name: str, beside: Sequence[Path]) -> Any:
         )
     extra = needed(top, folders)
     try:
-        with last_on_path(extra), strangers_code(), _no_output(module_name):
+        with last_on_path(extra), foreign_code(), _no_output(module_name):
             module = importlib.import_module(module_name)
-    except Left as error:
+    except ForeignFailure as error:
         raise NotImportable(_why(module_name, beside, error)) from error.__cause__
     remember(top, extra)
     return module
@@ -224,14 +265,14 @@ def _imported_file(path: Path) -> Any:
     if what := source_file.missing(path):
         raise NotImportable(what)
     try:
-        with strangers_code(), _no_output(path.name):
+        with foreign_code(), _no_output(path.name):
             return source_file.imported(path)
-    except Left as error:
+    except ForeignFailure as error:
         left = "it left with " if isinstance(error.__cause__, SystemExit) else ""
         raise NotImportable(f"{path} cannot be imported: {left}{error}") from error.__cause__
 
 
-def _why(module_name: str, beside: Sequence[Path], error: Left) -> str:
+def _why(module_name: str, beside: Sequence[Path], error: ForeignFailure) -> str:
     cause, file = error.__cause__, file_of(module_name, beside)
     missing = (cause.name or "") if isinstance(cause, ModuleNotFoundError) else ""
     if missing and (module_name == missing or module_name.startswith(f"{missing}.")):

@@ -1,22 +1,33 @@
-"""Finding blocks by name: entry points of group ``dsa_des.components``, or a class by its place.
-
-That is ``module:Class`` or ``./file.py:Class``.
-
-Our own blocks are registered in the same way as a stranger's.
-"""
+"""Entry points of this and other packages, by group and name."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import NotAllowed, NotImportable, is_ours, load_named, load_point
+from dsa_des.block.foreign import (
+    NotAllowed,
+    NotImportable,
+    installed,
+    is_ours,
+    load_named,
+    load_point,
+)
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
-from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import did_you_mean
+
+SECTIONS = "dsa_des.sections"
+
+
+@lru_cache(maxsize=1)
+def section_models() -> dict[str, type[Parameters]]:
+    """Return the registered section models by table name, sorted."""
+    return {name: installed(point) for name, point in registered(SECTIONS).items()}
 
 
 class UnknownType(Exception):
@@ -68,9 +79,9 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
 def _looked_at(type_name: str, found: Any) -> type[Component]:
     """Return a stranger's class if it is a component."""
     try:
-        with strangers_code(UnknownType):
+        with foreign_code(UnknownType):
             return _component(found)
-    except Left as error:
+    except ForeignFailure as error:
         raise UnknownType(f"{type_name} cannot be looked at: {error}") from error.__cause__
 
 

@@ -23,7 +23,7 @@ from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_wh
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter

@@ -17,7 +17,7 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.running.reports import load_reports
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import unfinished
 from dsa_des.files.output_names import check_place, location_of, named, reason_of
-from dsa_des.files.unfinished import unfinished
 from dsa_des.scene.examples import Example, examples
 from dsa_des.scene.shipped_files import folders
 from dsa_des.terminal.terminal import say

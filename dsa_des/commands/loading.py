@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal.terminal import say
 

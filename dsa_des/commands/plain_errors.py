@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from dsa_des.block.strangers import raised_in, told
+from dsa_des.block.foreign_calls import error_text, raised_in
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.terminal import say, say_lines
 
@@ -32,7 +32,7 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             module = raised_in(error.__traceback__)
             if module.partition(".")[0] in _OURS:
                 raise
-            say(f"error: the module {module!r} left with {told(error)}", err=True)
+            say(f"error: the module {module!r} left with {error_text(error)}", err=True)
             sys.exit(2)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()

@@ -22,7 +22,6 @@ def run_scene(
     as_json: bool,
     simulate_everything: bool,
     realtime: str | None,
-    check_rewinding: bool,
     no_figures: bool,
 ) -> None:
     """Run a scene into a folder, then print its summary."""
@@ -33,7 +32,6 @@ def run_scene(
         loaded,
         target,
         simulate_everything=simulate_everything,
-        check_rewinding=check_rewinding,
         silent=quiet or as_json,
         warn=not quiet,
         pacer=pacer,
@@ -47,5 +45,3 @@ def run_scene(
             report.show(console, summary)
         if pacer is not None:
             console.print(pacer.sentence(), soft_wrap=True)
-        if check_rewinding:
-            console.print("Every window ran twice from its saved state and came out the same.")

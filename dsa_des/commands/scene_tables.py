@@ -5,10 +5,9 @@ from functools import partial
 
 from pydantic import BaseModel
 
-from dsa_des.block.sections import section_models
+from dsa_des.block.registry import section_models
 from dsa_des.commands.parameter_rows import parameter_rows
-from dsa_des.scene.options import BlockOptions
-from dsa_des.scene.processor import ProcessorParameters
+from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 
 #: Name, type with bounds, unit, default, meaning.
 Row = tuple[str, str, str, str, str]

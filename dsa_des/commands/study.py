@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import claim_folder, named
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import latest_folder

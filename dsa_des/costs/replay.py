@@ -14,7 +14,8 @@ from typing import Any
 
 from dsa_des.block.component import Component
 from dsa_des.block.wake import Wake
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 

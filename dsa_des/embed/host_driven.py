@@ -19,10 +19,10 @@ from networkx import ancestors
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
+from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input
 from dsa_des.block.run_end import ends_its_run
-from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.running.inputs import Inputs
 from dsa_des.running.node import Node
@@ -289,7 +289,7 @@ class HostDriven:
             try:
                 result = runner.component.run(wake)
             except BaseException as error:
-                if is_ours_to_obey(error):
+                if must_pass(error):
                     raise
                 raise self._failure(runner, step, error) from error
             if result is None:
@@ -304,7 +304,7 @@ class HostDriven:
         return step
 
     def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
-        reason = told(error)
+        reason = error_text(error)
         path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
         return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
 

@@ -9,12 +9,13 @@ from typing import Any
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import scene_of_any
+from dsa_des.record.drawing import pictures_in
 from dsa_des.record.notes import notes_of
-from dsa_des.record.picture import pictures_in
-from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
+from dsa_des.record.sinks import MemorySink, ObserverSink
 from dsa_des.running.recorded_run import info_of, record_run, summary_of
 from dsa_des.running.reports import Report, draw_all, load_reports
 from dsa_des.running.simulation import Simulation

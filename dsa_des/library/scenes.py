@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.changeable import Origin
+from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import examples, find_example
 from dsa_des.scene.overrides import parse_assignment, parse_value
-from dsa_des.scene.python_values import scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file, read_scene_tables
 

@@ -12,10 +12,9 @@ from weakref import finalize
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.picture import PictureFile, pictures_in
-from dsa_des.scene.changeable import Origin
-from dsa_des.scene.chosen_file import chosen_file
-from dsa_des.scene.python_values import scene_value
+from dsa_des.record.drawing import PictureFile, pictures_in
+from dsa_des.scene.changeable import Origin, scene_value
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.executors import default_workers, make_executor

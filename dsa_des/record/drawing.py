@@ -1,23 +1,54 @@
-"""Figures without a window system, the same bytes on every drawing.
-
-Text in them is text: nothing is read as mathematics, control characters are escapes, lines that
-would push the figure aside are cut, and letters that the font lacks are boxes without a warning.
-"""
+"""A figure as a value: its PNG bytes, shown inline in notebooks."""
 
 import io
 import math
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from dsa_des.files.output_file import write_file
 from dsa_des.text.safe_text import printable, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-from dsa_des.files.output_file import write_file
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A drawn figure.
+
+    Parameters
+    ----------
+    name : str
+        For example ``plan``.
+    png : bytes
+    """
+
+    name: str
+    png: bytes = field(repr=False)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the figure as a PNG file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        write_file(Path(path), self.png)
+
+
+def pictures_in(folder: Path) -> dict[str, bytes]:
+    """Return the figures of a folder as name → PNG bytes, in order of their names."""
+    return {file.stem: file.read_bytes() for file in sorted(folder.glob("*.png"))}
+
 
 DPI = 110
 #: Longest name and longest line in a figure.

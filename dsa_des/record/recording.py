@@ -1,12 +1,7 @@
-"""Recording: a passive tap on every output, in an order that no scheduling choice can change.
-
-A recorder never schedules an event and never draws a number. Rows are sorted by (tick, block)
-before they reach a sink, so a run in look-ahead windows and one that goes scan by scan hand over
-the same rows in the same order.
-"""
+"""Columns that messages declare: what was not declared is an error, not a column less."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -21,27 +16,84 @@ from dsa_des.block.recorded_columns import (
     is_empty,
     nothing_in,
 )
-from dsa_des.record.attempts import attempt
-from dsa_des.record.declared_columns import DeclaredColumns
+from dsa_des.errors import nearest
+from dsa_des.record.sinks import Sink
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import own_scans
+
+# Declared names that an error lists.
+_MOST_NAMES = 30
+
+
+class DeclaredColumns:
+    """The tables of a run's messages with their columns, also those that are not wanted.
+
+    Parameters
+    ----------
+    schemas : mapping
+        Table → column → kind.
+    leading : collection of str
+        Columns that the engine adds.
+    """
+
+    def __init__(self, schemas: Mapping[str, Schema], leading: Iterable[str]) -> None:
+        self._columns = {table: frozenset(schema) for table, schema in schemas.items()}
+        self._leading = frozenset(leading)
+        #: By block and table, the columns that were found to be declared.
+        self._sound: dict[tuple[str, str], tuple[str, ...]] = {}
+
+    def check(self, block: str, table: str, columns: Iterable[str], message: str) -> None:
+        """Refuse what would be lost without a word; the same columns again cost nothing.
+
+        Parameters
+        ----------
+        block : str
+            Who sends.
+        table : str
+        columns : iterable of str
+        message : str
+            Name of the message's class.
+
+        Raises
+        ------
+        ValueError
+            If no message of the run declares the table or the column, or the table has no
+            instants.
+        """
+        names = tuple(columns)
+        if self._sound.get((block, table)) == names:
+            return
+        where = f"block {block!r}: its {message} records"
+        how = "; a message class declares what it records, table by table, in `recorded`"
+        known = self._columns.get(table)
+        if known is None:
+            raise ValueError(
+                f"{where} a table {table!r} that no message of the run declares"
+                f"{_nearest_and_all(table, self._columns)}{how}"
+            )
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            raise ValueError(
+                f"{where} a column {unknown[0]!r} in table {table!r} that no message of the run "
+                f"declares{_nearest_and_all(unknown[0], known - self._leading)}{how}"
+            )
+        if "tick" not in names:
+            raise ValueError(f"{where} a table {table!r} without a column 'tick'")
+        self._sound[block, table] = names
+
+
+def _nearest_and_all(name: str, declared: Iterable[str]) -> str:
+    """Return the declared name nearest to one that is not, and what is declared."""
+    names = sorted(declared)
+    close = nearest(name, names)
+    shown = ", ".join(names[:_MOST_NAMES]) + (", ..." if len(names) > _MOST_NAMES else "")
+    asked = "" if close is None else f"; did you mean {close!r}?"
+    return f"{asked} (declared: {shown or 'nothing'})"
+
 
 # So many rows, or pieces of them, are handed on at a time: a few would cost as much.
 _ROWS_AT_ONCE, _PIECES_AT_ONCE = 16_384, 2048
 _LEADING: Schema = {name: column.kind for name, column in LEADING.items()}
-
-
-class Sink(Protocol):
-    """Something that takes recorded rows: a file, memory, or a running summary."""
-
-    def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Learn the tables and columns of the run."""
-
-    def write(self, table: str, columns: Columns) -> None:
-        """Take rows of one table, in their final order."""
-
-    def close(self) -> None:
-        """Take note that no more rows come."""
 
 
 class Recorder:
@@ -287,121 +339,3 @@ def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
         return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
     return np.asarray(values, dtype=np.dtype(kind))
-
-
-class _Keeping:
-    """Keeps all rows in memory, as they come."""
-
-    def __init__(self) -> None:
-        self._schemas: Mapping[str, Schema] = {}
-        self._parts: dict[str, list[Columns]] = {}
-
-    def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Learn the tables and columns of the run."""
-        self._schemas = schemas
-        self._parts = {table: [] for table in schemas}
-
-    def write(self, table: str, columns: Columns) -> None:
-        """Keep rows of one table."""
-        self._parts[table].append(columns)
-
-    def close(self) -> None:
-        """Nothing to do."""
-
-
-class ColumnSink(_Keeping):
-    """Keeps all rows in memory; `tables` gives them as columns."""
-
-    def tables(self) -> dict[str, Columns]:
-        """Return table name → column name → values."""
-        return {table: self._joined(table, parts) for table, parts in self._parts.items()}
-
-    def _joined(self, table: str, parts: list[Columns]) -> Columns:
-        if len(parts) == 1:
-            return parts[0]
-        joined: Columns = {}
-        for name, kind in self._schemas[table].items():
-            pieces: list[Any] = [part[name] for part in parts]
-            if kind == "text":  # later pieces know at least the names of earlier ones
-                codes = [piece.codes for piece in pieces]
-                names = pieces[-1].names if pieces else ()
-                empty = np.empty(0, dtype=np.int32)
-                joined[name] = Text(np.concatenate(codes) if codes else empty, names)
-            else:
-                empty = np.empty(0, dtype=np.dtype(kind))
-                joined[name] = np.concatenate(pieces) if pieces else empty
-        return joined
-
-
-class MemorySink(_Keeping):
-    """Keeps all rows in memory; `tables` gives them as Arrow tables."""
-
-    def tables(self) -> dict[str, Any]:
-        """Return table name → ``pyarrow.Table``."""
-        import pyarrow as pa
-
-        from dsa_des.record.arrow import arrow_schema, to_arrow
-
-        return {
-            table: pa.Table.from_batches(
-                [to_arrow(columns, schema) for columns in self._parts[table]],
-                schema=arrow_schema(schema),
-            ).combine_chunks()
-            for table, schema in self._schemas.items()
-        }
-
-
-class Observer(Protocol):
-    """A running summary over recorded rows, for reports and metrics."""
-
-    tables: ClassVar[frozenset[str]]
-
-    def update(self, table: str, columns: Columns) -> None:
-        """Take rows of one of its `tables`."""
-
-    def result(self) -> dict[str, Any]:
-        """Return sections of the run's summary."""
-
-
-class ObserverSink:
-    """Passes rows on to observers.
-
-    Parameters
-    ----------
-    observers : iterable of Observer
-    notes : list of str, optional
-        An observer that raises is left out from then on, and a note of it added here, so that the
-        run goes on. Without a list the run ends.
-    """
-
-    def __init__(self, observers: Iterable[Observer], notes: list[str] | None = None) -> None:
-        self.observers = list(observers)
-        self._notes = notes
-
-    def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Nothing to do."""
-
-    def write(self, table: str, columns: Columns) -> None:
-        """Pass rows to every observer of this table."""
-        for observer in list(self.observers):
-            if table in observer.tables:
-                self._ask(observer, observer.update, table, columns)
-
-    def close(self) -> None:
-        """Nothing to do."""
-
-    def result(self) -> dict[str, Any]:
-        """Return the sections of all observers."""
-        sections: dict[str, Any] = {}
-        for observer in list(self.observers):
-            sections.update(self._ask(observer, observer.result) or {})
-        return sections
-
-    def _ask(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
-        if self._notes is None:
-            return call(*arguments)
-        count = len(self._notes)
-        answer = attempt(f"the summary {type(observer).__name__}", self._notes, call, *arguments)
-        if len(self._notes) > count:
-            self.observers.remove(observer)
-        return answer

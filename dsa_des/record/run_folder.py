@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.files.manifest import RUN_JSON, with_files
 from dsa_des.files.output_file import write_file
+from dsa_des.files.output_folder import RUN_JSON, with_files
 from dsa_des.files.output_names import new_folder_name
+from dsa_des.record.drawing import PictureFile, pictures_in
 from dsa_des.record.notes import OF_ROWS
-from dsa_des.record.picture import PictureFile, pictures_in
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shortened
 
@@ -79,7 +79,10 @@ class Run:
     def __getitem__(self, table: str) -> "pa.Table":
         if table not in self.tables:
             raise KeyError(f"the run has no table {table!r}; it has {', '.join(self.tables)}")
-        return with_columns_of_rows(self.tables, table)
+        joined: dict[str, Any] = self.__dict__.setdefault("_joined", {})
+        if table not in joined:
+            joined[table] = with_columns_of_rows(self.tables, table)
+        return joined[table]
 
     def __getattr__(self, table: str) -> "pa.Table":
         if table.startswith("__") or table not in self.__dict__.get("tables", {}):

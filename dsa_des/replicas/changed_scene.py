@@ -13,13 +13,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.block import Block
+from dsa_des.scene.block_table import Block, BlockOptions
 from dsa_des.scene.checks import check_times
-from dsa_des.scene.options import BlockOptions, with_latencies
+from dsa_des.scene.keys import no_item, place_of, unquoted
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.steps import no_item, place_of, unquoted
+from dsa_des.scene.wiring import with_latencies
 from dsa_des.time.clock import parse_rational
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.strangers import is_ours_to_obey, told
+from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effect_plan import Planned, plan, unspent
@@ -155,10 +155,10 @@ class Assembly:
         except _REFUSALS as error:
             problems.append(self._scene.problem(f"blocks.{name}", reason_of(error)))
         except BaseException as error:
-            if is_ours_to_obey(error):
+            if must_pass(error):
                 raise
             path = self._scene.blocks[name].cls.path()
-            raise SetupFailure(name, path, 0.0, None, told(error)) from error
+            raise SetupFailure(name, path, 0.0, None, error_text(error)) from error
 
     def _asked(self, name: str, what: str, *arguments: Any) -> Any:
         """Return what a method of a block returns before the run."""

@@ -13,11 +13,11 @@ from typing import Any
 from dsa_des.errors import OutputError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.toml_text import to_toml
-from dsa_des.record.attempts import attempt
+from dsa_des.files.toml_files import to_toml
 from dsa_des.record.notes import notes_of
-from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
+from dsa_des.record.sinks import ObserverSink, attempt
 from dsa_des.record.version import __version__
 from dsa_des.running.long_run import say_if_long
 from dsa_des.running.pacing import PacedWindows, Pacer
@@ -37,7 +37,6 @@ def record_run(
     target: Path | OutputFolder,
     *,
     simulate_everything: bool = False,
-    check_rewinding: bool = False,
     silent: bool = True,
     warn: bool = False,
     pacer: Pacer | None = None,
@@ -54,8 +53,6 @@ def record_run(
     loaded : Scene
     target : Path or OutputFolder
     simulate_everything : bool
-    check_rewinding : bool
-        Whether every window runs twice, see `Simulation`.
     silent : bool
         Whether there is no progress bar.
     warn : bool
@@ -85,12 +82,7 @@ def record_run(
         target = OutputFolder(target)
     target.check()
     recorder = Recorder([])
-    simulation = Simulation(
-        loaded,
-        recorder=recorder,
-        simulate_everything=simulate_everything,
-        check_rewinding=check_rewinding,
-    )
+    simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     if prepare is not None:
         prepare(simulation)
     if told:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
-from dsa_des.record.attempts import attempt
-from dsa_des.record.recording import Observer
+from dsa_des.record.sinks import Observer, attempt
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation

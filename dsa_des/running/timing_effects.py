@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.running.effect_plan import Planned
-from dsa_des.scene.block import Block
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ClockSpec

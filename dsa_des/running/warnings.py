@@ -1,6 +1,6 @@
 """Warnings of blocks about their own values before a run: defaults that decide, slips."""
 
-from dsa_des.record.attempts import attempt
+from dsa_des.record.sinks import attempt
 from dsa_des.running.simulation import Simulation
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shortened

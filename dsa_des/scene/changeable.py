@@ -1,16 +1,61 @@
-"""Scenes changed in Python: every change gives a new scene, checked as a whole."""
+"""Values that a Python program gives, as a scene file would hold them."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
 from typing import Any, Self
 
-from dsa_des.block.component import Component
+from dsa_des.block.class_text import sourced, type_text
+from dsa_des.block.component import Component, as_written
+from dsa_des.block.entry_points import COMPONENTS
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.scene.overrides import set_value, swap_type
-from dsa_des.scene.python_values import scene_value
 from dsa_des.scene.scene_file import SceneFile
+
+
+def scene_value(value: Any, group: str = COMPONENTS) -> Any:
+    """Return a value as a scene file written in the working directory would hold it.
+
+    Parameters
+    ----------
+    value : object
+        Texts, paths, numbers (NumPy's as well), fractions, classes, and tables, lists, tuples and
+        arrays of these.
+    group : str
+        Entry points among which classes may be registered.
+
+    Raises
+    ------
+    TypeError
+        For anything else; the message says what.
+    """
+    if isinstance(value, bool | int | float):
+        return value
+    if isinstance(value, type):
+        return type_text(value, group)
+    if isinstance(value, Path):
+        return sourced(str(value), Path.cwd())
+    if isinstance(value, str):
+        return value if hasattr(value, "folder") else sourced(value, Path.cwd())
+    if isinstance(value, Fraction):
+        return as_written(value)
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"has the key {key!r}: keys are texts")
+        return {str(key): scene_value(item, group) for key, item in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [scene_value(item, group) for item in value]
+    if hasattr(value, "tolist") and not isinstance(plain := value.tolist(), type(value)):
+        return scene_value(plain, group)  # NumPy's numbers and arrays
+    raise TypeError(
+        f"is of the type {type(value).__name__}: a scene holds texts, numbers, truth values, "
+        "lists and tables"
+    )
+
 
 _SET, _SWAP = "scene.set", "scene.swap"
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsa_des.errors import Problem, did_you_mean
-from dsa_des.scene.steps import Key, dotted, names_of, no_item, place_of, step, unquoted
+from dsa_des.scene.keys import Key, dotted, names_of, no_item, place_of, step, unquoted
 
 REMOVE = "remove"
 

@@ -12,10 +12,10 @@ from dsa_des.block.class_text import sourced
 from dsa_des.block.component import Component, SourcedText
 from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.errors import Problem, did_you_mean
-from dsa_des.files.toml_input import DEEPEST, NotToml, TomlError, parse_toml
-from dsa_des.scene.options import BlockOptions
-from dsa_des.scene.scene_file import COMMAND_LINE, Key, SceneFile, dotted
-from dsa_des.scene.steps import no_item, step, unquoted
+from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
+from dsa_des.scene.block_table import BlockOptions
+from dsa_des.scene.keys import Key, dotted, no_item, step, unquoted
+from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:

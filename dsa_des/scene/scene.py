@@ -10,21 +10,14 @@ from typing import Any
 import networkx as nx
 
 from dsa_des.block.component import Component, Parameters, as_written
-from dsa_des.block.sections import section_models
+from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.block import Block
+from dsa_des.scene.block_table import Block, ProcessorParameters
 from dsa_des.scene.changeable import Changeable
-from dsa_des.scene.checks import check_activity, check_effects, check_times
-from dsa_des.scene.graph import (
-    build_graph,
-    can_be_rehearsed,
-    check_graph,
-    windowed_blocks,
-    windowed_queues,
-)
-from dsa_des.scene.options import with_latencies
-from dsa_des.scene.overrides import apply_set, apply_swap
-from dsa_des.scene.parts import (
+from dsa_des.scene.checks import (
+    check_activity,
+    check_effects,
+    check_times,
     read_blocks,
     read_duration,
     read_processors,
@@ -32,9 +25,15 @@ from dsa_des.scene.parts import (
     read_seed,
     read_text,
 )
-from dsa_des.scene.processor import ProcessorParameters
+from dsa_des.scene.graph import (
+    build_graph,
+    check_graph,
+    windowed_blocks,
+    windowed_queues,
+)
+from dsa_des.scene.overrides import apply_set, apply_swap
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
-from dsa_des.scene.wiring import Wire, read_wires
+from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
 
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
@@ -110,8 +109,6 @@ class Scene(Changeable):
 
     def look_ahead_blocks(self) -> set[str]:
         """Return the blocks that may run in look-ahead windows."""
-        if self.rehearsed:
-            return set(self.blocks)
         apart = set(self.queues) - self.windowed_queues()
         queued = [block for name in apart for block in self.queues[name]]
         return windowed_blocks(self.graph, self.classes, queued)
@@ -129,15 +126,6 @@ class Scene(Changeable):
         """Return the shared processors that serve a look-ahead window at once."""
         able = [name for name, p in self.processors.items() if p.when_busy != "skip"]
         return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
-
-    @property
-    def rehearsed(self) -> bool:
-        """Whether windows are rehearsed because a shared processor could not serve one at once."""
-        used = {name for name, blocks in self.queues.items() if blocks}
-        if not used or used <= self.windowed_queues():
-            return False
-        skipping = [name for name, p in self.processors.items() if p.when_busy == "skip"]
-        return can_be_rehearsed(self.graph, self.classes, self.queues, skipping)
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

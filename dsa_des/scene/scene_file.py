@@ -4,8 +4,7 @@ A table may say ``extends = "other.toml"`` (or a list of files): the keys of tho
 first and its own keys override them, table by table; a list whose items have a ``name`` is also
 changed item by item, by a table of these names. ``remove = ["calibrate"]`` takes inherited keys
 away. Paths are taken from the folder of the file that holds them; where no file lies there, what
-is extended may be a shipped one by its name (``extends = "first_light"``).
-"""
+is extended may be a shipped one by its name (``extends = "first_light"``)."""
 
 import os
 from collections.abc import Mapping
@@ -24,10 +23,10 @@ from dsa_des.files.input_files import (
     is_regular_file,
     read_input_text,
 )
-from dsa_des.files.toml_input import DEEPEST, TomlError, parse_toml
+from dsa_des.files.toml_files import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
+from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.shipped_files import files_named
-from dsa_des.scene.steps import Key, dotted
 from dsa_des.text.safe_text import shortened
 
 COMMAND_LINE = "command line"

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
-from dsa_des.block.strangers import Left, strangers_code
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.errors import UsageError
 
 #: The entry points of functions that return a folder of scenes and studies.
@@ -27,9 +27,9 @@ def folders() -> list[Path]:
     found = []
     for point in registered(GROUP).values():
         try:
-            with strangers_code(UsageError):
+            with foreign_code(UsageError):
                 found.append(Path(installed(point)()))
-        except Left as error:
+        except ForeignFailure as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__
     return [folder for folder in found if folder.is_dir()]

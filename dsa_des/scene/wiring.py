@@ -19,7 +19,9 @@ from typing import Any
 
 from dsa_des.block.component import Component, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
-from dsa_des.scene.scene_file import Key, SceneFile
+from dsa_des.scene.block_table import BlockOptions
+from dsa_des.scene.keys import Key
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.time.clock import parse_rational
 
 _END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
@@ -270,3 +272,17 @@ def _two_writers(
         elif len(found) > 1 and not classes[target].inputs[input_name].many:
             message = f"{target}.{input_name} has {len(found)} writers: {', '.join(sorted(ends))}"
             problems.append(scene.problem(("wires",), message))
+
+
+def with_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
+    """Return the wires with what their sending blocks add to the delay."""
+    return [
+        replace(
+            wire,
+            latency_s=options[wire.source].latency_s,
+            queued=options[wire.source].processor is not None,
+        )
+        if wire.source in options
+        else wire
+        for wire in wires
+    ]

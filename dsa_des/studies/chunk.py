@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dsa_des.arrays.types import AnyArray
+from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.recorded_columns import Text
-from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
@@ -272,10 +272,10 @@ def _measured(
         try:
             found.update(metric.measure(group))
         except BaseException as error:
-            if is_ours_to_obey(error):
+            if must_pass(error):
                 raise
             if len(runs) == 1:
-                return {}, {0: f"metric {type(metric).__name__}: {told(error)}"}
+                return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
             return _one_by_one(scene, metrics, runs)
     return found, {}
 

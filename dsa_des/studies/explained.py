@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.record.version import __version__
 from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.running.simulation import Simulation

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dsa_des.errors import did_you_mean
-from dsa_des.scene.scene_file import Key
+from dsa_des.scene.keys import Key
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.requirements import number_of
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import write_file
-from dsa_des.files.unfinished import PREFIX
+from dsa_des.files.output_file import PREFIX, write_file
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.record import StudyHead, StudyRecord
 from dsa_des.studies.safe_files import open_lock, read_regular

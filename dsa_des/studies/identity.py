@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.module_search import file_of
-from dsa_des.block.source_file import is_file, path_of, split_name
+from dsa_des.block.source_file import file_of, is_file, path_of, split_name
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.files.input_files import resolve_home
-from dsa_des.files.manifest import RUN_JSON
+from dsa_des.files.output_folder import RUN_JSON
 from dsa_des.record.version import __version__
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.record import StudyRecord, record_text

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsa_des.errors import did_you_mean
-from dsa_des.scene.scene_file import Key
+from dsa_des.scene.keys import Key
 from dsa_des.studies.axes import Axis
 
 _KEYS = ("metric", "axis", "most", "least", "cheaper")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from dsa_des.block.class_text import sourced
-from dsa_des.block.strangers import Left, strangers_code
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.errors import Problem
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.scene.overrides import set_value, swap_type
@@ -49,10 +49,10 @@ class MetricSpec:
 
         cls = find_metric(self.name, (scene.path.parent,))
         try:
-            with strangers_code(ValueError):
+            with foreign_code(ValueError):
                 check_tables(cls, scene)
                 return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
-        except Left as error:
+        except ForeignFailure as error:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
 
 
@@ -273,7 +273,7 @@ def set_text(value: Any) -> str:
     if folder is not None and (path := existing_file(value, folder)) is not None:
         return str(path)
     if isinstance(value, list | dict):
-        from dsa_des.files.toml_text import inline
+        from dsa_des.files.toml_files import inline
 
         return inline(value)
     return as_text(value)

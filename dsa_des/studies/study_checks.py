@@ -10,9 +10,9 @@ from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.running.simulation import Simulation
+from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.scene_file import Key, SceneFile
-from dsa_des.scene.steps import key_in
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import (
     CLASS,

@@ -15,10 +15,11 @@ from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.scene.examples import find_example
+from dsa_des.scene.keys import Key
 from dsa_des.scene.overrides import apply_set
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.scene_file import Key, SceneFile, read_scene_file
+from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
 from dsa_des.studies.figure_tables import read_figures

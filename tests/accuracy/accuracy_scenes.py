@@ -11,7 +11,8 @@ from components.geometry.ellipsoid import line_of_sight
 from components.geometry.sensor_angles import sensor_angles
 from components.messages.reach import EVALUATE
 from components.messages.targets import GatedTargets, TrafficStates
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 from components.line_of_sight.rung_planning import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

@@ -58,6 +58,18 @@ def test_the_level_that_is_on_takes_its_early_time():
     assert memory.step(3.0, here, none, early).tolist() == [0, 0]
 
 
+def test_early_times_count_for_the_level_that_came_on_before_and_for_no_other():
+    memory = AlertMemory(MemoryRule(5.0, 0.0, 0, 0), 3)
+    due = np.array([[True, True, False], [False, False, False], [False, False, True]])
+    here, none = np.array([True, True, False]), np.zeros((3, 3), dtype=bool)
+    memory.step(0.0, here, due, due)
+    assert memory.early_levels(0.0, here).tolist() == [0, 0, 0]
+    assert memory.step(1.0, here, due, due)[:2].tolist() == [2, 0]
+    assert memory.early_levels(1.0, here).tolist() == [2, 0, 0]
+    memory.step(2.0, here, none, none)
+    assert memory.early_levels(2.0, here).tolist() == [0, 0, 0]
+
+
 def told(rule, raw, times):
     """Follow the rules for one target, in words; None where it is absent."""
     last_s = rise_s = own_s = None

@@ -16,7 +16,8 @@ from components.messages.tracks import Tracks
 from components.optical.convex_hull import union_area
 from components.well_clear.violation import violates
 from components.well_clear.volume import Volume
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from tests.view.test_page import HOSTILE, SCENE
 

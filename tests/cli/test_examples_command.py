@@ -36,8 +36,9 @@ def test_every_shipped_scene_and_study_has_a_line(call: Call) -> None:
 
 
 def test_a_copy_has_every_file_as_it_was_and_runs(call: Call, tmp_path: Path) -> None:
-    assert call("examples", "--copy", "mine").exit_code == 0
+    copied = call("examples", "--copy", "mine")
     files = {p.relative_to(CONFIGS) for p in CONFIGS.rglob("*") if p.is_file()}
+    assert (copied.exit_code, copied.stdout) == (0, f"mine: {len(files)} files\n")
     copies = tmp_path / "mine"
     assert {p.relative_to(copies) for p in copies.rglob("*") if p.is_file()} == files
     assert all((copies / p).read_bytes() == (CONFIGS / p).read_bytes() for p in files)

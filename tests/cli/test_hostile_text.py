@@ -15,11 +15,10 @@ import pytest
 from click.testing import CliRunner, Result
 from pydantic import BaseModel
 
-from dsa_des.block.registry import find
-from dsa_des.block.sections import section_models
+from dsa_des.block.registry import find, section_models
 from dsa_des.cli import main
-from dsa_des.files.toml_text import to_toml
-from dsa_des.scene.options import BlockOptions
+from dsa_des.files.toml_files import to_toml
+from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"

@@ -1,5 +1,6 @@
 """`dsa-des check`, `graph` and `components`, and every scene of the project."""
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,14 @@ def test_graph_as_png_is_a_picture(tmp_path: Path) -> None:
     path = tmp_path / "graph.png"
     assert call("graph", CONFIGS / "first_light.toml", "--png", "--out", path).exit_code == 0
     assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_graph_s_picture_is_as_high_as_most_blocks_stand_in_one_column(tmp_path: Path) -> None:
+    """Six columns of 2.1 inches and three rows, the sensors, of 1.1, with a margin of 1.2."""
+    path = tmp_path / "graph.png"
+    call("graph", CONFIGS / "first_light.toml", "--png", "--out", path)
+    width, height = struct.unpack(">II", path.read_bytes()[16:24])
+    assert width / height == pytest.approx((1.2 + 2.1 * 6) / (1.2 + 1.1 * 3), rel=0.01)
 
 
 def test_graph_refuses_two_forms() -> None:

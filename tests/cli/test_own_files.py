@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.foreign import NotImportable, load_named
-from dsa_des.block.hidden import refuse_hidden
+from dsa_des.block.foreign import NotImportable, load_named, refuse_hidden
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from tests import warm_process

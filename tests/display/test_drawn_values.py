@@ -21,7 +21,8 @@ from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
 from components.sensor.mounting import BodyAxes
 from dsa_des.record.arrow import ParquetSink
-from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ObserverSink
 from dsa_des.running.simulation import Simulation
 
 START = -41.3, 179.98, 2200.0

@@ -12,7 +12,8 @@ from components.display.recorded_rows import Detected, SensorScans, read_scans
 from components.display.report import DetectAndSenseReport, sensor_names
 from components.display.timeline import find_close_up
 from dsa_des.record.arrow import ParquetSink
-from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ObserverSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

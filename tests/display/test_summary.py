@@ -301,3 +301,21 @@ def test_a_sensor_that_is_off_is_said_to_be(configs):
     sensors = dsa_des.run(scene).summary["sensors"]
     assert "ir saw nothing: it is switched off (enabled = false)" in unseen_lines(sensors)
     assert [name for name, told in sensors.items() if "enabled" in told] == ["ir"]
+
+
+def test_each_sensor_that_saw_nothing_says_why_and_no_other_does():
+    seen = {"at": "", "time_s": 1.0}
+    sensors = {
+        "first": {"first_detection": seen, "scans": 9, "evaluated": 9},
+        "idle": {"first_detection": None, "scans": 0},
+        "second": {"first_detection": seen, "scans": 9, "evaluated": 9},
+        "blind": {"first_detection": None, "scans": 20, "evaluated": 5,
+                  "skipped": {"one": 4, "none": 0, "other": 1011}},
+        "alone": {"first_detection": None, "scans": 7, "evaluated": 7, "skipped": {}},
+    }  # fmt: skip
+    assert unseen_lines(sensors) == [
+        "idle saw nothing: it never scanned",
+        "blind saw nothing: target other in 1,011, one in 4, in reach but not detected in 5 of "
+        "1,020 looks (one per scan and target)",
+        "alone saw nothing: target in reach but not detected in 7 of 7 scans",
+    ]

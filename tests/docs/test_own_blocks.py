@@ -8,7 +8,8 @@ import pytest
 from snippets import file_of, read_snippets
 
 from dsa_des.block.message import Text
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Recorded
 from dsa_des.running.simulation import Simulation

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsa_des.embed import Simulator
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

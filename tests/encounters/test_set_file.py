@@ -75,6 +75,28 @@ def test_generated_sets_fly_as_the_pairs_did(model: Path, tmp_path: Path) -> Non
     assert other.name == "intruder"
 
 
+def test_what_a_set_says_of_each_encounter_its_paths_show(model: Path, tmp_path: Path) -> None:
+    """Bearing and misses by the paths alone, and the numbers that are printed by the weights."""
+    out = tmp_path / "set.parquet"
+    done = call("generate", "--model", model, "--count", 25, "--seed", 8, "--out", out)
+    found = read_set(out)
+    squares = (found.weights**2).sum()
+    first, second = done.stdout.splitlines()[-2:]
+    assert first == f"{out}: 25 encounters of 180 s"
+    assert second.startswith(f"effective sample size {found.weights.sum() ** 2 / squares:.1f}; ")
+    for k in range(25):
+        (_, *own), (_, *other) = found.path(2 * k), found.path(2 * k + 1)
+        extra = {name: values[k] for name, values in found.extra.items()}
+        closest = int(extra["closest_s"])
+        away = np.array(other) - np.array(own)
+        miss_m = np.hypot(away[0, closest], away[1, closest])
+        assert abs(extra["horizontal_miss_m"]) == pytest.approx(miss_m, abs=0.01)
+        assert extra["vertical_miss_m"] == pytest.approx(away[2, closest], abs=0.01)
+        heading = found.state["heading_rad"][2 * k]
+        bearing = np.degrees(np.arctan2(away[1, 0], away[0, 0]) - heading)
+        assert (extra["bearing_deg"] - bearing + 180.0) % 360.0 == pytest.approx(180.0, abs=1e-6)
+
+
 def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
     found = read_set(written(tmp_path))
     assert (found.kind, len(found), found.weights.tolist()) == ("tracks", 2, [1.5, 0.0])

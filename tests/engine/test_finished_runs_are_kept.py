@@ -12,7 +12,7 @@ from components.display.report import DetectAndSenseReport
 from components.display.summary import FusedSummary, SensorSummary
 from components.traffic.source import TrafficSource
 from dsa_des.cli import main
-from dsa_des.record.recording import ObserverSink
+from dsa_des.record.sinks import ObserverSink
 
 TABLES = {"detections", "fused", "scans", "tracks", "truth"}
 

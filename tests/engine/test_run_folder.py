@@ -9,8 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from dsa_des.files.manifest import RUN_JSON, foreign_in
-from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_in
 from dsa_des.record.run_folder import read_run, write_json, write_run_json
 
 

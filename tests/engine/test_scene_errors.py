@@ -429,7 +429,7 @@ def test_the_nearer_file_wins(lab):
 def test_the_resolved_scene_is_the_same_scene(lab):
     import tomllib
 
-    from dsa_des.files.toml_text import to_toml
+    from dsa_des.files.toml_files import to_toml
 
     blocks = {
         "a": "Pulse; scan_rate_hz = '30000/1001'; offset_s = 0.013; gain = 0.1",

@@ -13,7 +13,8 @@ from components.sensor.look import Look
 from dsa_des.block.message import Column, columns
 from dsa_des.block.ports import Output
 from dsa_des.errors import BlockFailure
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des.files import unfinished as module
+from dsa_des.files import output_file as module
+from dsa_des.files.output_file import EARLIER, PREFIX, remove_left_over, unfinished
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.unfinished import EARLIER, PREFIX, remove_left_over, unfinished
 
 DYING = """
 import os, signal
 from pathlib import Path
-from dsa_des.files.unfinished import unfinished
+from dsa_des.files.output_file import unfinished
 with unfinished(Path("{name}")) as folder:
     (folder / "half").write_text("x")
     {more}
@@ -45,7 +45,7 @@ def test_the_next_run_into_the_same_place_removes_what_a_killed_one_left(tmp_pat
 
 def test_what_a_living_process_is_at_stays(tmp_path):
     with unfinished(tmp_path / "run") as folder:
-        code = f"from dsa_des.files.unfinished import *; remove_left_over(Path({str(tmp_path)!r}))"
+        code = f"from dsa_des.files.output_file import *; remove_left_over(Path({str(tmp_path)!r}))"
         subprocess.run([sys.executable, "-c", code], check=True)
         remove_left_over(tmp_path)  # not even this process takes it for left over
         assert left_in(folder) == ["lock"]

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import crooked
 import mpmath
 import numpy as np
 import pymap3d
@@ -26,7 +27,6 @@ from components.estimation.motion import (
     predict,
 )
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
-from tests.wiring import crooked
 
 FLIP = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])  # their up is our down
 VECTORS = json.loads(Path(__file__).with_name("stone_soup_vectors.json").read_text())

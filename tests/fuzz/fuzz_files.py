@@ -7,7 +7,7 @@ import fuzz_values
 from fuzz_cases import Case
 from fuzz_scenes import base_scene, command, damaged
 
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 
 DAA = """NAME lat lon alt trk gs vs time
 [none] [deg] [deg] [ft] [deg] [knot] [fpm] [s]

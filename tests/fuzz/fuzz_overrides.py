@@ -8,7 +8,7 @@ from fuzz_cases import Case
 from fuzz_scenes import base_scene, command, set_parameter
 
 from dsa_des.block.entry_points import registered
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 
 KEYS = (
     "", ".", "..", "a.b", "blocks", "blocks.", "blocks.radar", "blocks..radar", "blocks.radar.",

@@ -14,9 +14,9 @@ from fuzz_cases import Case
 
 from dsa_des.block.component import Parameters
 from dsa_des.block.entry_points import registered
-from dsa_des.block.sections import section_models
+from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.scene.scene import check_scene
 from dsa_des.scene.scene_file import SceneFile
 

@@ -10,7 +10,7 @@ from fuzz_cases import Case
 from fuzz_overrides import KEYS
 from fuzz_scenes import any_place, base_scene, damaged, extending, set_parameter
 
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 
 STUDY: dict[str, Any] = {
     "title": "fuzzed",

@@ -9,10 +9,9 @@ from fuzz_cases import Case
 from fuzz_scenes import ADDITIONS, BASE, RANDOM_TRAFFIC, _merge, known_keys, place_of
 from pydantic import ValidationError
 
-from dsa_des.block.registry import find
-from dsa_des.block.sections import section_models
-from dsa_des.files.toml_text import to_toml
-from dsa_des.scene.options import split_options
+from dsa_des.block.registry import find, section_models
+from dsa_des.files.toml_files import to_toml
+from dsa_des.scene.block_table import split_options
 
 VALUES = (
     1e-30, 1e-20, 1e-12, 1e-6, 1e-3, 0, 1, 1000, 1_000_000, 1e9, 1e12, 1e15, 1e18, 1e30, -1e-30,

@@ -10,7 +10,7 @@ import pytest
 
 import dsa_des
 from components.radar.threshold_radar import ThresholdRadar
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 
 
 def test_a_name_a_path_and_a_table_give_the_same_scene(configs, monkeypatch):

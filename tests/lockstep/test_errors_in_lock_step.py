@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dsa_des.library.scenes import load_scene
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 FIRST_LIGHT = "configs/first_light.toml"

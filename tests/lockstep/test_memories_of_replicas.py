@@ -10,7 +10,7 @@ from components.alerting.followed_tracks import FollowedTracks
 from components.alerting.memory import MemoryRule
 from components.alerting.track_memory import TrackMemory
 from components.tracking.stub import TrackerStub
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.scene.scene import load_scene

@@ -103,8 +103,8 @@ class DrawnFault:
 
     @staticmethod
     def digest_of(name: str, change: str) -> str:
-        """Return the digest of a fault of this name and change."""
-        return sha256(f"{name}\0{change}".encode()).hexdigest()[:16]
+        """Return the digest of a fault of this name and change, in whatever file it stands."""
+        return sha256(f"{name.partition('::')[2]}\0{change}".encode()).hexdigest()[:16]
 
     def applied(self) -> str:
         """Return the text of the file with the mistake in it.

@@ -16,7 +16,8 @@ from components.optical.plume import Plume
 from components.optical.silhouette import visible_area
 from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams

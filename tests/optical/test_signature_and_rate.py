@@ -1,5 +1,7 @@
 """Pixels covered, line-of-sight rate, confidence and detection range."""
 
+from types import SimpleNamespace
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.geometry.directions import angle_between
+from components.optical.dynamic_signature import MovingTargets
 from components.optical.signature import (
     confidence,
     detection_range,
@@ -95,6 +98,35 @@ def test_first_look_has_no_rate_and_missed_frames_divide_by_their_time():
     )
     np.testing.assert_allclose(rate, [2.0, 0.0, 0.1 / 0.15], rtol=1e-14)
     assert line_of_sight_rate(0.1, 0.0, 9.0, 9.0, 0.0, seen_before=False) == 0.0
+
+
+def test_each_replica_s_targets_are_compared_with_their_own_look_before():
+    """Windows of three replicas at once, against a dictionary of the last look of each target."""
+    rng = np.random.default_rng(4)
+    together, last, ticks_per_s = MovingTargets(1.0, "exact", 1000), {}, 1000
+    scan = 1
+    for scans_of_each in ([2, 1, 3], [1, 2, 2], [1, 1, 1]):
+        replica = np.repeat(np.arange(3), scans_of_each)
+        number = scan + np.concatenate([np.arange(n) for n in scans_of_each])
+        scan += max(scans_of_each)
+        tick = 50 * number + 7 * replica
+        row, target = np.nonzero(rng.uniform(size=(len(replica), 4)) < 0.7)
+        azimuth, elevation = rng.uniform(-3, 3, len(row)), rng.uniform(-1, 1, len(row))
+        cells = SimpleNamespace(
+            replica_of_scan=replica, roster=range(4), row=row, target=target, scan_ticks=tick,
+            azimuth_rad=azimuth, elevation_rad=elevation,
+        )  # fmt: skip
+        wanted = []
+        for k, scanned in enumerate(replica):
+            here = np.flatnonzero(row == k)
+            now = {target[i]: (azimuth[i], elevation[i]) for i in here}
+            before, before_tick = last.get(scanned, ({}, 0))
+            for i in here:
+                old = before.get(target[i])
+                apart = 0.0 if old is None else angle_between(azimuth[i], elevation[i], *old)
+                wanted.append(apart / (tick[k] - before_tick) * ticks_per_s)
+            last[scanned] = (now, tick[k])
+        np.testing.assert_allclose(together(cells), wanted, rtol=1e-12)
 
 
 def test_closed_form_range_is_where_confidence_changes_sign():

@@ -10,7 +10,8 @@ import pytest
 from components.radar.beam_sweep import first_illumination
 from components.traffic.source import TrafficSource
 from dsa_des.errors import BlockFailure
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -10,7 +10,8 @@ from components.radar.clutter import clutter_detection_probability
 from components.radar.detection import detection_probability
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

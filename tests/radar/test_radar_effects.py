@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -211,7 +212,7 @@ def test_false_alarms_pass_fusion_in_any_window(scene, gate):
 
 def test_the_summary_counts_false_alarms_apart(scene):
     from components.display.summary import SensorSummary
-    from dsa_des.record.recording import ObserverSink
+    from dsa_des.record.sinks import ObserverSink
 
     observer = SensorSummary(["radar"])
     sink = ObserverSink([observer])

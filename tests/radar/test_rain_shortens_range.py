@@ -3,7 +3,8 @@
 import pytest
 
 from components.atmosphere.attenuated_range import attenuated_range_m
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

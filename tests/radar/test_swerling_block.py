@@ -15,7 +15,8 @@ from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
 from components.sensor.look import Cells
 from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams

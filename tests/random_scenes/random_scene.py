@@ -15,7 +15,7 @@ import random_flights
 from dice import Dice
 
 from dsa_des.errors import SceneError
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 

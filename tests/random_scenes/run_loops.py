@@ -20,8 +20,9 @@ from dice import Dice
 from random_loops import loop_of, loop_replicas
 
 from dsa_des.errors import SceneError
-from dsa_des.files.toml_text import to_toml
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.files.toml_files import to_toml
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Recorded, run_replicas

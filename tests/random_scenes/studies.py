@@ -9,7 +9,7 @@ import random_changes
 from dice import Dice
 from random_scene import Case
 
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from tests import warm_process
 
 _MAIN = "from dsa_des.cli import main; main()"

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.record.notes import notes_of
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import with_columns_of_rows
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

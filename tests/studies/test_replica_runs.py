@@ -8,7 +8,8 @@ import pytest
 
 from dsa_des.block.message import Text
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, why_apart
 from dsa_des.running.simulation import Simulation

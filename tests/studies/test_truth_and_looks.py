@@ -1,17 +1,14 @@
 """A metric of a study may read the tables that a scene records on request: truth and looks."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from wired import chain, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
 from dsa_des.studies.metric import NUMBER, Metric, Result
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "wiring"))
-from wired import chain, sensor
 
 HERE = "test_truth_and_looks"
 

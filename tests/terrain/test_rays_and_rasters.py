@@ -8,12 +8,12 @@ import pymap3d
 import pytest
 from scipy.ndimage import map_coordinates
 
-from components.evidence.terrain.synthetic_raster import NAME, main, synthetic_heights_m
 from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
 from components.terrain.mosaic import mosaic
 from components.terrain.raster import ElevationRaster
 from components.terrain.raster_files import read_raster
 from components.terrain.rays import bent_elevation_rad, dip_rad, geodetic_of, rays_between
+from docs.make.synthetic_raster import NAME, main, synthetic_heights_m
 
 R = 6371008.8
 
@@ -205,6 +205,8 @@ def test_tiles_side_by_side_are_one_raster():
     [
         ("S42W180.hgt", [[1, 2], [3, -32768]], r"1 hole .* latitude -42, longitude -179"),
         ("S42W180.hgt", [[1, 2, 3]], "6 bytes: an .hgt file holds as many rows as columns"),
+        ("S42W180.hgt", [[1, 2, 3, 4, 5]], "10 bytes: an .hgt file holds as many rows as"),
+        ("S42W180.hgt", [[7]], "2 bytes: an .hgt file holds as many rows as columns"),
         ("island.hgt", [[1, 2], [3, 4]], "must say its south-west corner"),
         ("S42W180.png", [[1, 2], [3, 4]], "must be .hgt .SRTM., .tif or .tiff"),
         ("N90W180.hgt", [[1, 2], [3, 4]], "must lie within -90 to 90"),

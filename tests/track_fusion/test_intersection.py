@@ -5,9 +5,13 @@ import numpy as np
 import pymap3d
 import pytest
 from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
 
 from components.estimation.covariance_intersection import combined, inverse
 from components.estimation.frame_change import frame_change
+from components.estimation.motion import ConstantVelocity
+from components.track_fusion.local_tracks import LocalTracks
+from components.track_fusion.matching import MatchRules, without_strays
 
 
 def covariances(seed, count):
@@ -90,3 +94,43 @@ def test_a_frame_s_change_is_that_of_the_ellipsoid():
     np.testing.assert_allclose(
         change.covariances((root @ root.T)[..., None])[..., 0], wanted, atol=1e-12
     )
+
+
+def tracks_of(**changes):
+    """Three tracks of three trackers, of one fused track; the second and third less certain."""
+    none, some = np.zeros(3), np.ones(3, dtype=int)
+    columns = {
+        "replica": 0 * some, "tracker": np.arange(3), "number": some, "system": 7 * some,
+        "status": some, "existence": np.ones(3), "ranged": np.ones(3, dtype=bool),
+        "state": np.zeros((6, 3)),
+        "covariance": np.eye(6)[..., None] * np.array([4.0, 9.0, 9.0]), "azimuth_rad": none,
+        "elevation_rad": none, "azimuth_variance_rad2": none, "elevation_variance_rad2": none,
+        "own_m": np.zeros((3, 3)), "turn": np.eye(3)[..., None] * np.ones(3), "time_s": none,
+        "updated_s": none, "contributors": some, "updated_by": some,
+    }  # fmt: skip
+    return LocalTracks(**columns | changes)
+
+
+RULES = MatchRules(0.9, ConstantVelocity(1.0), 0.01, 3.0)
+
+
+def test_a_member_leaves_beyond_three_times_its_gate():
+    """The second track stands a hair within three times the gate, the third a hair beyond."""
+    gate_m = np.sqrt(chi2.ppf(0.9, 6) * (4.0 + 9.0))
+    state = np.zeros((6, 3))
+    state[1] = [0.0, 2.99 * gate_m, 3.01 * gate_m]
+    found = without_strays(RULES, tracks_of(state=state), np.zeros(3))
+    assert found.system.tolist() == [7, 7, 0]
+
+
+def test_a_direction_leaves_beyond_three_times_its_own_gate():
+    """It has two quantities, and the leader's place adds to its variance."""
+    variance = np.full(3, 1e-4)
+    gate_rad = np.sqrt(chi2.ppf(0.9, 2) * (1e-4 + 4.0 / 100.0**2))
+    state = np.zeros((6, 3))
+    state[0, 0] = 100.0
+    tracks = tracks_of(
+        state=state, ranged=np.array([True, False, False]), azimuth_variance_rad2=variance,
+        azimuth_rad=np.array([0.0, 2.99, -3.01]) * gate_rad, elevation_variance_rad2=variance,
+    )  # fmt: skip
+    assert without_strays(RULES, tracks, np.zeros(3)).system.tolist() == [7, 7, 0]

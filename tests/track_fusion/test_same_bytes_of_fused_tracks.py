@@ -2,7 +2,8 @@
 
 import pyarrow.compute as pc
 
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation

@@ -5,7 +5,7 @@ import pyarrow.compute as pc
 import pytest
 
 import dsa_des
-from components.evidence.track_consistency import (
+from docs.make.track_consistency import (
     NEARLY,
     NOISY,
     OWNSHIP,
@@ -13,7 +13,8 @@ from components.evidence.track_consistency import (
     Case,
     scene_of_case,
 )
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation

@@ -12,7 +12,8 @@ from components.flights.steered_flight import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -211,6 +211,12 @@ def test_where_the_truth_is_not_told_the_ownship_believes(tmp_path):
     assert found.targets == ["a", "b"] and "truth" not in found.tables
 
 
+def test_where_the_truth_is_told_what_the_ownship_believes_is_not_drawn(tmp_path):
+    believed = TABLES["detections"] | {"own_alt_m": [alt + 30.0 for alt in OWN["alt_m"]]}
+    found = picture_of(tmp_path, TABLES | {"detections": believed})
+    assert found.tables["own"]["alt_m"].tolist() == OWN["alt_m"]
+
+
 def test_states_of_tracks_are_brought_into_the_plane(tmp_path):
     origin = {"origin_lat_deg": -41.28, "origin_lon_deg": 179.99, "origin_alt_m": 2000.0}
     state = {

@@ -1,0 +1,94 @@
+"""Code that a scene or study names and this package did not write: what it raises is an error.
+
+A module or class of another author may do anything, also call ``sys.exit``. Nothing of that may end
+a command without a word. ``os._exit`` and crashes of the interpreter cannot be caught.
+"""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType, TracebackType
+from typing import Any
+
+from dsa_des.terminal.interruption import Terminated
+
+
+def must_pass(error: BaseException) -> bool:
+    """Return whether an exception is no stranger's error but means that we have to stop.
+
+    Ctrl-C, and whatever this package raises itself to leave (in a handler of a signal, say).
+    """
+    if isinstance(error, Exception):
+        return False
+    if isinstance(error, KeyboardInterrupt | GeneratorExit):
+        return True
+    return raised_in(error.__traceback__).startswith("dsa_des.")
+
+
+def raised_in(trace: TracebackType | None) -> str:
+    """Return the name of the module in which an exception was raised."""
+    name = ""
+    while trace is not None:
+        name = str(trace.tb_frame.f_globals.get("__name__", ""))
+        trace = trace.tb_next
+    return name
+
+
+def error_text(error: BaseException) -> str:
+    """Return what an exception says, with its kind: ``SystemExit: 0``."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class ForeignFailure(Exception):
+    """A stranger's code raised something; the message says what, `__cause__` is that."""
+
+
+@contextmanager
+def foreign_code(*expected: type[Exception]) -> Iterator[None]:
+    """Turn whatever is raised inside, ctrl-C by the user excepted, into `ForeignFailure`.
+
+    The exception itself is its ``__cause__``. Those `expected` pass.
+    """
+    with _interrupts() as interrupted:
+        try:
+            yield
+        except BaseException as error:
+            if isinstance(error, (ForeignFailure, Terminated, *expected)):
+                raise
+            pressed = isinstance(error, KeyboardInterrupt) and interrupted()
+            if pressed or isinstance(error, GeneratorExit):
+                raise
+            if not isinstance(error, KeyboardInterrupt) and must_pass(error):
+                raise
+            raise ForeignFailure(error_text(error)) from error
+
+
+@contextmanager
+def _interrupts() -> Iterator[Any]:
+    """Give a function that says whether ctrl-C was pressed meanwhile.
+
+    A stranger may raise KeyboardInterrupt; only the signal tells it from the user's.
+    """
+    pressed: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if not (in_main and callable(handler)):
+        yield lambda: False
+        return
+
+    def noted(number: int, frame: FrameType | None) -> Any:
+        pressed.append(number)
+        return handler(number, frame)
+
+    signal.signal(signal.SIGINT, noted)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        # A module may have put a handler of its own there.
+        if signal.getsignal(signal.SIGINT) is noted:
+            signal.signal(signal.SIGINT, handler)

@@ -1,0 +1,176 @@
+"""Attempts that may fail without spoiling what is done: a summary, a figure of a run."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from dsa_des.block.recorded_columns import Columns, Schema, Text
+
+
+def attempt(
+    what: str,
+    notes: list[str],
+    call: Callable[..., Any],
+    *arguments: Any,
+    unless: type[Exception] = BrokenPipeError,
+) -> Any:
+    """Return what a call gives; if it raises, add a note that says so and return None.
+
+    Parameters
+    ----------
+    what : str
+        What the call makes, for the note.
+    notes : list of str
+        Takes the note.
+    call : callable
+    *arguments
+        Of the call.
+    unless : type of exception
+        What is raised all the same; by default, that the reader of our output went away.
+    """
+    try:
+        return call(*arguments)
+    except unless:
+        raise
+    except Exception as error:  # MemoryError is one of them
+        notes.append(f"{what} failed: {_reason(error)}")
+        return None
+
+
+def _reason(error: Exception) -> str:
+    text = str(error).strip().split("\n")[0]
+    if isinstance(error, MemoryError):
+        return f"out of memory{': ' if text else ''}{text}"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class Sink(Protocol):
+    """Something that takes recorded rows: a file, memory, or a running summary."""
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Take rows of one table, in their final order."""
+
+    def close(self) -> None:
+        """Take note that no more rows come."""
+
+
+class _Keeping:
+    """Keeps all rows in memory, as they come."""
+
+    def __init__(self) -> None:
+        self._schemas: Mapping[str, Schema] = {}
+        self._parts: dict[str, list[Columns]] = {}
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+        self._schemas = schemas
+        self._parts = {table: [] for table in schemas}
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Keep rows of one table."""
+        self._parts[table].append(columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class ColumnSink(_Keeping):
+    """Keeps all rows in memory; `tables` gives them as columns."""
+
+    def tables(self) -> dict[str, Columns]:
+        """Return table name → column name → values."""
+        return {table: self._joined(table, parts) for table, parts in self._parts.items()}
+
+    def _joined(self, table: str, parts: list[Columns]) -> Columns:
+        if len(parts) == 1:
+            return parts[0]
+        joined: Columns = {}
+        for name, kind in self._schemas[table].items():
+            pieces: list[Any] = [part[name] for part in parts]
+            if kind == "text":  # later pieces know at least the names of earlier ones
+                codes = [piece.codes for piece in pieces]
+                names = pieces[-1].names if pieces else ()
+                empty = np.empty(0, dtype=np.int32)
+                joined[name] = Text(np.concatenate(codes) if codes else empty, names)
+            else:
+                empty = np.empty(0, dtype=np.dtype(kind))
+                joined[name] = np.concatenate(pieces) if pieces else empty
+        return joined
+
+
+class MemorySink(_Keeping):
+    """Keeps all rows in memory; `tables` gives them as Arrow tables."""
+
+    def tables(self) -> dict[str, Any]:
+        """Return table name → ``pyarrow.Table``."""
+        import pyarrow as pa
+
+        from dsa_des.record.arrow import arrow_schema, to_arrow
+
+        return {
+            table: pa.Table.from_batches(
+                [to_arrow(columns, schema) for columns in self._parts[table]],
+                schema=arrow_schema(schema),
+            ).combine_chunks()
+            for table, schema in self._schemas.items()
+        }
+
+
+class Observer(Protocol):
+    """A running summary over recorded rows, for reports and metrics."""
+
+    tables: ClassVar[frozenset[str]]
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of one of its `tables`."""
+
+    def result(self) -> dict[str, Any]:
+        """Return sections of the run's summary."""
+
+
+class ObserverSink:
+    """Passes rows on to observers.
+
+    Parameters
+    ----------
+    observers : iterable of Observer
+    notes : list of str, optional
+        An observer that raises is left out from then on, and a note of it added here, so that the
+        run goes on. Without a list the run ends.
+    """
+
+    def __init__(self, observers: Iterable[Observer], notes: list[str] | None = None) -> None:
+        self.observers = list(observers)
+        self._notes = notes
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Nothing to do."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Pass rows to every observer of this table."""
+        for observer in list(self.observers):
+            if table in observer.tables:
+                self._ask(observer, observer.update, table, columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def result(self) -> dict[str, Any]:
+        """Return the sections of all observers."""
+        sections: dict[str, Any] = {}
+        for observer in list(self.observers):
+            sections.update(self._ask(observer, observer.result) or {})
+        return sections
+
+    def _ask(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
+        if self._notes is None:
+            return call(*arguments)
+        count = len(self._notes)
+        answer = attempt(f"the summary {type(observer).__name__}", self._notes, call, *arguments)
+        if len(self._notes) > count:
+            self.observers.remove(observer)
+        return answer

@@ -1,0 +1,62 @@
+"""A block as a scene declares it, and the keys of its table that the engine itself understands.
+
+``latency_s`` is the time a block takes to work on what it saw; ``processor`` names a table of
+``[processors]`` for which it queues with others.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from pydantic import Field
+
+from dsa_des.block.component import Component, NonNegativeRational, Parameters, PositiveRational
+
+
+class BlockOptions(Parameters):
+    """Keys of a block's table that belong to the engine."""
+
+    latency_s: NonNegativeRational = Field(
+        default=Fraction(0), description="Time from an instant to the messages about it, s."
+    )
+    processor: str | None = Field(
+        default=None, description="Shared processor that its messages go through."
+    )
+
+
+def split_options(
+    table: Mapping[str, Any], parameters: type[Parameters]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Split a block's table into (the engine's keys, the block's own parameters)."""
+    engine = set(BlockOptions.model_fields) - set(parameters.model_fields)
+    options = {key: value for key, value in table.items() if key in engine}
+    own = {key: value for key, value in table.items() if key not in engine and key != "type"}
+    return options, own
+
+
+class ProcessorParameters(Parameters):
+    """A table ``[processors.NAME]``."""
+
+    service_s: PositiveRational = Field(description="Time to work on one message, s.")
+    service_spread_s: NonNegativeRational = Field(
+        default=Fraction(0),
+        description="Largest extra time, s; each message takes a uniformly drawn part of it.",
+    )
+    when_busy: Literal["wait", "drop_oldest", "skip"] = Field(
+        default="wait",
+        description="Messages wait in line; or only the newest waits; or a block whose scan finds "
+        "the processor busy leaves that scan out.",
+    )
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a scene: its name, its type as written, its class, its own parameters, and
+    what its table says to the engine."""
+
+    name: str
+    type_name: str
+    cls: type[Component]
+    parameters: Parameters
+    options: BlockOptions = BlockOptions()
