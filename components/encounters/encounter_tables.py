@@ -1,7 +1,5 @@
 """Tables with one row per encounter, and ``dsa-des encounters risk``: the risk ratio of one."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -12,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.formats.encounter_set import LARGEST_WEIGHT
+from components.formats.text_rows import csv_table
 from components.metrics.risk import RiskRatio, risk_ratio, risk_ratios_by_class
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
@@ -74,27 +73,17 @@ def read_table(text: str) -> EncounterTable:
         content = read_input_text(path)
     except InputFileError as error:
         raise UsageError(f"{text}: {error}") from None
-    reader = csv.reader(io.StringIO(content))
-    try:
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise UsageError(f"{path}: line {reader.line_num}: {error}") from None
-    if len(rows) < 2:
-        raise UsageError(f"{path}: a row of column names and one row per encounter are needed")
-    names = [name.strip() for name in rows[0][1]]
+    names, some = csv_table(content, lambda said, line: UsageError(f"{path}: line {line}: {said}"))
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise UsageError(f"{path}: line {rows[0][0]}: the column {twice!r} stands there twice")
-    for line, row in rows[1:]:
-        if len(row) != len(names):
-            raise UsageError(
-                f"{path}: line {line}: has {len(row)} values, but there are {len(names)} columns"
-            )
+        raise UsageError(f"{path}: line 1: the column {twice!r} stands there twice")
+    rows = list(some)
+    if not rows:
+        raise UsageError(f"{path}: a row of column names and one row per encounter are needed")
     columns: dict[str, list[object]] = {
-        name: [row[place].strip() or None for _, row in rows[1:]]
-        for place, name in enumerate(names)
+        name: [row[place] or None for _, row in rows] for place, name in enumerate(names)
     }
-    return EncounterTable(path, columns, [line for line, _ in rows[1:]])
+    return EncounterTable(path, columns, [line for line, _ in rows])
 
 
 def _study(path: Path) -> EncounterTable:

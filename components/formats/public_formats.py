@@ -1,9 +1,4 @@
-"""Public formats of encounters: paired tracks in text, and waypoint files in binary.
-
-Paired tracks (em-pairing-uncor-importancesampling): columns NAME, east, north, alt (ft), trk (rad),
-gs, vs (ft/s), time (s) under a line of units, all rows of the ownship before those of the
-intruder. Its own reader divides vs by 60; the unit line, and the altitudes, say ft/s. Positions
-are all that is taken.
+"""Whatever holds encounters: one set, a file of waypoints in binary, or files of tracks.
 
 Waypoints (em-core), little-endian: uint32 encounters, uint32 aircraft; for each encounter the start
 of each aircraft (three doubles: north, east, altitude in ft), then for each aircraft a uint16 k and

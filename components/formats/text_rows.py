@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -267,3 +269,32 @@ def cells(line: str, count: int, name_column: int) -> list[str] | None:
 def cell_count(line: str) -> int:
     """Count the values of a row that does not fit, for the message."""
     return len([part for part in re.split(r"[,;\s]+", line) if part])
+
+
+def csv_table(
+    text: str, fail: Callable[[str, int], Exception]
+) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    """Return the column names of a CSV table, and its rows with their lines; blank ones left out.
+
+    `fail` makes the error of what cannot be read, and of a row that has another number of cells.
+    """
+    reader = csv.reader(io.StringIO(text))
+
+    def each() -> Iterator[tuple[int, list[str]]]:
+        try:
+            for row in reader:
+                if any(cell.strip() for cell in row):
+                    yield reader.line_num, [cell.strip() for cell in row]
+        except csv.Error as error:
+            raise fail(str(error), reader.line_num) from None
+
+    rows = each()
+    names = next(rows, (0, []))[1]
+
+    def checked() -> Iterator[tuple[int, list[str]]]:
+        for line, row in rows:
+            if len(row) != len(names):
+                raise fail(f"has {len(row)} values, but there are {len(names)} columns", line)
+            yield line, row
+
+    return names, checked()

@@ -1,6 +1,8 @@
-"""Public formats of tracks: CSV tables and MATLAB matrices, one or more aircraft in a file.
+"""Public formats of tracks, one or more aircraft in a file.
 
-- em-pairing-uncor-importancesampling: ID, Time (s), lat, lon (deg), alt_MSL_ft and more columns.
+- em-pairing-uncor-importancesampling, tables: ID, Time (s), lat, lon (deg), alt_MSL_ft and more.
+- The same, paired tracks in text: NAME, east, north, alt (ft), trk (rad), gs, vs (ft/s), time (s)
+  under a line of units, all rows of the ownship before those of the intruder.
 - em-model-manned-bayes: time_s, x_ft, y_ft, z_ft; x is along the heading of time 0, which is north.
 - DEGAS traj.mat: matrices of 7 rows: time (s), north, east, altitude (ft) and velocities, one for
   each aircraft.
@@ -9,77 +11,84 @@ Positions and times are all that is taken. MATLAB's own objects (``ScriptedEncou
 matrices and cannot be read outside of it.
 """
 
-import csv
 import io
 import re
 import struct
 import zlib
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from components.formats.encounter_set import NAMES
 from components.formats.set_file import EncounterSetError
+from components.formats.text_rows import csv_table
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text
 
-_PAIRED = ("NAME", "east", "north", "alt", "time")
+_PAIRED = ("NAME", "time", "east", "north", "alt")
 _GEODETIC = ("ID", "Time", "lat", "lon", "alt_MSL_ft")
 _PLANE = ("time_s", "x_ft", "y_ft", "z_ft")
 _ROWS = 7
 #: Of MATLAB's elements, the one that is packed.
 _COMPRESSED = 15
-#: Tracks of one file, and where their origin is if that is known.
 #: Time (s), north, east and altitude (m) of one aircraft.
 Track = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+#: Tracks of one file, and where their origin is if that is known.
 Tracks = tuple[list[Track], tuple[float, float] | None]
+
+
+def _wrong(path: Path, message: str, line: int | None = None) -> EncounterSetError:
+    where = f"{path}: " if line is None else f"{path}: line {line}: "
+    return EncounterSetError(where + message)
+
+
+def _table(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    try:
+        return csv_table(read_input_text(path), partial(_wrong, path))
+    except InputFileError as error:
+        raise _wrong(path, str(error)) from None
+
+
+def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
+    """Return time and position of a row, the time first."""
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        values = [np.nan]
+    if not np.isfinite(values).all():
+        raise _wrong(path, "holds something else than numbers", line)
+    if values[0] < 0.0:
+        raise _wrong(path, f"time = {values[0]:g} is negative", line)
+    return values
+
+
+def _places(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    for name in wanted:
+        if name not in names:
+            raise _wrong(path, f"there is no column {name!r}{did_you_mean(name, names)}", 1)
+    return [names.index(name) for name in wanted]
 
 
 def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
     """Read the tracks of a CSV table; one for each ``ID``, in order of their first rows."""
-    try:
-        text = read_input_text(path)
-    except InputFileError as error:
-        raise EncounterSetError(f"{path}: {error}") from None
-    reader = csv.reader(io.StringIO(text))
-    try:
-        rows = [row for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise EncounterSetError(f"{path}: line {reader.line_num}: {error}") from None
-    names = [name.strip() for name in rows[0]] if rows else []
+    names, rows = _table(path)
     wanted = _PLANE if "time_s" in names else _GEODETIC
-    for name in wanted:
-        if name not in names:
-            raise EncounterSetError(
-                f"{path}: line 1: there is no column {name!r}{did_you_mean(name, names)}"
-            )
-    place = [names.index(name) for name in wanted]
+    places = _places(path, names, wanted)
     found: dict[str, list[list[float]]] = {}
-    for line, row in enumerate(rows[1:], start=2):
-        if len(row) != len(names):
-            raise EncounterSetError(
-                f"{path}: line {line}: has {len(row)} values, but there are {len(names)} columns"
-            )
-        who = row[place[0]].strip() if wanted is _GEODETIC else ""
-        try:
-            values = [float(row[k]) for k in place[wanted is _GEODETIC :]]
-        except ValueError:
-            values = [np.nan]
-        if not np.isfinite(values).all():
-            raise EncounterSetError(f"{path}: line {line}: holds something else than numbers")
-        if values[0] < 0.0:
-            raise EncounterSetError(f"{path}: line {line}: time = {values[0]:g} is negative")
+    for line, row in rows:
+        who = row[places[0]] if wanted is _GEODETIC else ""
+        values = _numbers(path, line, [row[k] for k in places[wanted is _GEODETIC :]])
         if wanted is _GEODETIC and not (abs(values[1]) <= 90.0 and abs(values[2]) <= 360.0):
-            raise EncounterSetError(
-                f"{path}: line {line}: lat, lon = {values[1]:g}, {values[2]:g}: must lie within "
-                "±90 and ±360 degrees"
-            )
+            said = f"lat, lon = {values[1]:g}, {values[2]:g}: must lie within ±90 and ±360 degrees"
+            raise _wrong(path, said, line)
         found.setdefault(who, []).append(values)
     if not found:
-        raise EncounterSetError(f"{path}: a row of column names and rows of samples are needed")
+        raise _wrong(path, "a row of column names and rows of samples are needed")
     tracks = [np.array(samples).T for samples in found.values()]
     for who, samples in zip(found, tracks, strict=True):
         _rising(path, who, samples[0])
@@ -199,53 +208,27 @@ def encounter_of(tracks: list[Track]) -> list[tuple[str, Track]]:
 
 
 def read_paired_text(path: Path) -> list[tuple[str, Track]]:
-    """Read one encounter of paired tracks."""
-
-    def fail(message: str, line: int | None = None) -> EncounterSetError:
-        where = f"{path}: " if line is None else f"{path}: line {line}: "
-        return EncounterSetError(where + message)
-
-    try:
-        lines = read_input_text(path).split("\n")
-    except InputFileError as error:
-        raise fail(str(error)) from None
-    rows = [
-        (number, [cell.strip() for cell in line.split(",")])
-        for number, line in enumerate(lines, start=1)
-        if line.strip()
-    ]
-    if len(rows) < 3:
-        raise fail("a row of names, one of units and rows of samples are needed")
-    names, units = rows[0][1], rows[1][1]
-    place = {}
-    for name in _PAIRED:
-        if name not in names:
-            raise fail(f"there is no column {name!r}{did_you_mean(name, names)}", rows[0][0])
-        place[name] = names.index(name)
+    """Read one encounter of paired tracks: a row of names, one of units, and samples."""
+    names, rows = _table(path)
+    places = _places(path, names, _PAIRED)
+    line, units = next(rows, (0, [""] * len(names)))
     factors = []
-    for name in _PAIRED[1:]:
-        unit = units[place[name]].strip("[]").lower() if place[name] < len(units) else ""
+    for name, place in zip(_PAIRED[1:], places[1:], strict=True):
+        unit = units[place].strip("[]").lower()
         known = {"s": 1.0} if name == "time" else {"ft": FOOT_M, "m": 1.0}
         if unit not in known:
-            raise fail(f"{name} is in {unit!r}: must be {' or '.join(known)}", rows[1][0])
+            raise _wrong(path, f"{name} is in {unit!r}: must be {' or '.join(known)}", line)
         factors.append(known[unit])
     found: dict[str, list[list[float]]] = {}
-    for number, row in rows[2:]:
-        if len(row) != len(names):
-            raise fail(f"has {len(row)} values, but there are {len(names)} columns", number)
-        try:
-            values = [float(row[place[name]]) for name in _PAIRED[1:]]
-        except ValueError:
-            raise fail("holds something else than numbers", number) from None
-        if values[-1] < 0.0:
-            raise fail(f"time = {values[-1]:g} is negative", number)
-        found.setdefault(row[place["NAME"]], []).append(values)
+    for line, row in rows:
+        found.setdefault(row[places[0]], []).append(
+            _numbers(path, line, [row[place] for place in places[1:]])
+        )
     if len(found) < 2:
-        raise fail("has one aircraft: an ownship and an intruder are needed")
+        raise _wrong(path, "has one aircraft: an ownship and an intruder are needed")
     encounter = []
     for name, samples in found.items():
-        east, north, up, time_s = np.array(samples).T * np.array(factors)[:, np.newaxis]
-        if not np.isfinite([east, north, up, time_s]).all() or (np.diff(time_s) <= 0.0).any():
-            raise fail(f"{name}: samples must be numbers, and their times must rise")
+        time_s, east, north, up = np.array(samples).T * np.array(factors)[:, np.newaxis]
+        _rising(path, name, time_s)
         encounter.append((name.lower(), (time_s, north, east, up)))
     return encounter
