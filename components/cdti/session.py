@@ -11,8 +11,7 @@ from types import FrameType
 from components.cdti.control import LivePacer, SessionControl
 from components.cdti.page import Admission
 from components.cdti.scope import Scope
-from components.operator.desk import Desk
-from components.operator.human import Human
+from components.operator.human import Desk, Human
 from components.operator.recorded import RecordedOperator
 from dsa_des.commands.scene import say_notes
 from dsa_des.errors import UsageError

@@ -15,8 +15,7 @@ from components.metrics.encounter import STEP, SizeParameters, size
 from components.metrics.flown_flights import RecordedManoeuvres, each_alone, read_flights
 from components.metrics.rows import TargetMetric, TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
-from components.well_clear.collision_probability import collision_probability
-from components.well_clear.severity import loss_severity
+from components.well_clear.severity import collision_probability, loss_severity
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class

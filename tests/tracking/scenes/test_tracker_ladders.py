@@ -7,7 +7,7 @@ import pytest
 from wired import chain
 
 import dsa_des
-from components.track_fusion.ladder import RULE
+from components.track_fusion.covariance_intersection import RULE
 from components.tracking.ladder import FILTER, LADDERS, LATENESS
 from dsa_des.costs.replay import errors_against, own_errors, run_rung, values_of
 
