@@ -3,9 +3,8 @@
 from dsa_des.block.foreign import Foreign, Imports, imports
 from dsa_des.commands.collection import no_collection
 from dsa_des.commands.loading import load
-from dsa_des.running.long_run import say_if_long
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import say_warnings, warnings_of
+from dsa_des.running.warnings import say_if_long, say_warnings, warnings_of
 from dsa_des.scene.graph import in_cycles
 from dsa_des.terminal.terminal import say
 

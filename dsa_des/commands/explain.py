@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from dsa_des.commands.loading import load
-from dsa_des.running.effect_plan import Planned
+from dsa_des.running.effects import Planned
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal

@@ -19,18 +19,15 @@ from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.drawn_columns import ReplicaScenes
-from dsa_des.replicas.lookahead import Edge, lookahead_ticks, opened_loops
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.replicas.windows import ReplicaWindows, SideBySideWindows
+from dsa_des.replicas.windows import Edge, ReplicaWindows, lookahead_ticks, opened_loops
 from dsa_des.running.channel import Channel
-from dsa_des.running.effect_plan import plan, unspent
+from dsa_des.running.effects import may_be_late, plan, unspent
 from dsa_des.running.grain import Grain
-from dsa_des.running.rewind import Rewinder
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.timing_effects import may_be_late
-from dsa_des.running.windows import Window, Windows
+from dsa_des.running.windows import EqualWindows, Rewinder, Window, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
@@ -274,7 +271,7 @@ class Replicas(Timeline):
         if self.time.run_ticks > lookahead * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
             said = f"{lookahead / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
-        return SideBySideWindows(self.time, longest_ticks, lookahead)
+        return EqualWindows(self.time.run_ticks, min(longest_ticks, lookahead))
 
     def grain(self, window: int | None) -> Grain:
         """Return the grain: in loops, all blocks run in windows that nothing comes back in."""

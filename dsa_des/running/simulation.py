@@ -23,17 +23,13 @@ from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.running.assembly import Assembly, WrapEffect
-from dsa_des.running.connections import check_reach, connect
-from dsa_des.running.effect_plan import Planned
+from dsa_des.running.effects import Planned, timing_plan
+from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.node import Abort
-from dsa_des.running.nodes import build_nodes, start_processors
+from dsa_des.running.nodes import build_nodes, check_reach, connect, start_processors
 from dsa_des.running.processors import Processing
-from dsa_des.running.rewind import Rewinder
-from dsa_des.running.run_state import RunningBlock
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.timing_effects import timing_plan
-from dsa_des.running.window_size import longest_window, refuse_endless_work, scans_of
-from dsa_des.running.windows import Failure, Window, Windows
+from dsa_des.running.windows import Failure, Rewinder, RunningBlock, Window, Windows
 from dsa_des.scene.scene import Scene
 
 #: Up to so many scans a run that failed in a window is run again, to say at which of them.

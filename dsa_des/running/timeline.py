@@ -10,12 +10,10 @@ from typing import Any
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
-from dsa_des.running.channel import Channel
+from dsa_des.running.channel import Channel, WireFaults
+from dsa_des.running.effects import may_be_late
 from dsa_des.running.grain import Grain, grain_of
-from dsa_des.running.rewind import Rewinder, RewindingWindows
-from dsa_des.running.timing_effects import may_be_late
-from dsa_des.running.windows import EqualWindows, Window, Windows
-from dsa_des.running.wire_faults import WireFaults
+from dsa_des.running.windows import EqualWindows, Rewinder, RewindingWindows, Window, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
