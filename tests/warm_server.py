@@ -21,7 +21,7 @@ _LIBRARIES = (
     "rich.console", "rich.table", "click", "geographiclib.geodesic", "matplotlib.pyplot",
 )  # fmt: skip
 _OURS = ("dsa_des", "components")
-_NOT_LOADED = ("__main__", ".evidence", ".dask")
+_NOT_LOADED = ("__main__", ".thesis.", ".benchmark.", ".dask")
 
 
 def load() -> None:

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from components.evidence.benchmark.other_trackers import (
+from components.benchmark.track_updates import (
+    LOOKS,
     _looks,
     _started,
     by_stone_soup,
+    heard,
     plain_looks,
     plainly,
+    track_plainly,
 )
-from components.evidence.benchmark.plain_tracker import track_plainly
-from components.evidence.benchmark.track_updates import LOOKS, heard
 from components.messages.state_tracks import COVARIANCE
 
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from components.evidence.benchmark.pairs import PAIRS, measured
-from components.evidence.benchmark.rates import RATES
-from components.evidence.benchmark.rates import measured as measured_rate
+from components.benchmark.pairs import PAIRS, measured
+from components.benchmark.rates import RATES
+from components.benchmark.rates import measured as measured_rate
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -42,7 +42,7 @@ def test_the_three_sensors_share_one_processor_that_keeps_up():
 
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: pair.name)
 def test_a_pair_is_measured(pair):
-    row = measured(pair, quick=True, repeats=1)
+    row = measured(pair.name, quick=True, repeats=1)
     low, high = row["times_quartiles"]
     assert 0.0 < low <= row["times"] <= high
     assert row["wanted"] == pair.wanted
@@ -58,7 +58,7 @@ def test_the_alerting_of_a_pair_sees_the_tracks_of_the_same_chain():
 
 @pytest.mark.parametrize("rate", RATES, ids=lambda rate: rate.name)
 def test_a_rate_is_measured(rate):
-    assert measured_rate(rate, quick=True, repeats=1)["per_s"] > 0.0
+    assert measured_rate(rate.name, quick=True, repeats=1)["per_s"] > 0.0
 
 
 def test_the_states_of_a_rate_have_alerts_and_bands():

@@ -2,8 +2,8 @@
 
 import pytest
 
-from components.evidence.benchmark import yardstick
-from components.evidence.benchmark.cases import CASES, replicas_of, scene_of
+from components.benchmark import yardstick
+from components.benchmark.scenes import CASES, replicas_of, scene_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -42,7 +42,7 @@ def test_yardstick_finds_the_same(case):
 
 def test_the_replicas_of_the_benchmark_run_together_and_share_their_blocks():
     """With other phases of three clocks; no truth is recorded of so many."""
-    from components.evidence.benchmark.cases import chosen, replicas_of, scene_of
+    from components.benchmark.scenes import chosen, replicas_of, scene_of
     from dsa_des.replicas.lockstep import lock_step
 
     (case,) = chosen(["monte_carlo"])

@@ -16,7 +16,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 {start}
 """
 MAIN = "from dsa_des.cli import main; main()"
-COMPARISON = "from components.evidence.silhouettes.comparison_command import main; sys.exit(main())"
+COMPARISON = "from components.thesis.silhouette_comparison import main; sys.exit(main())"
 
 
 def limited(limit: int, *words: object, start: str = MAIN) -> subprocess.CompletedProcess[str]:

@@ -226,7 +226,7 @@ def test_progress_bars_show_titles_as_they_are() -> None:
     from rich.progress import Progress
 
     from dsa_des.terminal import terminal
-    from dsa_des.terminal.terminal import SafeConsole
+    from dsa_des.terminal.safe_console import SafeConsole
 
     bar: Progress = terminal.progress("text")
     stream = io.StringIO()

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
+from dsa_des.terminal.safe_console import SafeConsole
 from dsa_des.terminal.tables import fold, print_table
-from dsa_des.terminal.terminal import SafeConsole
 
 HEADINGS = ["radar.scan_rate_hz", "wires[4].drop_probability", "result", "mean or share",
             "95 % interval", "replicas", "without"]  # fmt: skip

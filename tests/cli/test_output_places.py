@@ -98,7 +98,7 @@ def test_bad_places_are_refused_before_anything_runs(
         "dsa_des.running.simulation.Simulation.run",
         "dsa_des.commands.cost.climb",
         "components.line_of_sight.error_map.draw_error_map",
-        "components.evidence.thesis.reproduce.make",
+        "components.thesis.reproduce.make",
     ):
         monkeypatch.setattr(place, lambda *args, **kwargs: pytest.fail("it ran"))
     before = everything_in(places)
@@ -215,11 +215,9 @@ def test_graph_replaces_links_and_no_devices(places: Path, first_light: Path) ->
 def test_pages_and_rows_are_checked_beforehand(
     places: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("components.thesis.reproduce.make", lambda *a: pytest.fail("it ran"))
     monkeypatch.setattr(
-        "components.evidence.thesis.reproduce.make", lambda *a: pytest.fail("it ran")
-    )
-    monkeypatch.setattr(
-        "components.evidence.benchmark.command.fresh", lambda *a: pytest.fail("it ran")
+        "components.benchmark.run_benchmark.fresh", lambda *a: pytest.fail("it ran")
     )
     before = everything_in(places)
     for name in ("run", "pipe", "loop", "no/x", "a" * 300, ""):

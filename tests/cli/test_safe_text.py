@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from dsa_des.errors import Problem, SceneError, UsageError
-from dsa_des.terminal.terminal import SafeConsole
+from dsa_des.terminal.safe_console import SafeConsole
 from dsa_des.text.safe_text import printable, shortened
 
 HOSTILE = "\x1b[31m\x07\x08\r\n\t\x7f\x85\x9b\u200b\u2028\u202e\u2066\ud800\U000e0001"

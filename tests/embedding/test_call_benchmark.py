@@ -2,7 +2,7 @@
 
 from click.testing import CliRunner
 
-from components.evidence.benchmark.embedded import measured
+from components.benchmark.calls import measured
 from dsa_des.cli import main
 
 

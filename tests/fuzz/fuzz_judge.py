@@ -137,7 +137,7 @@ def _call(argv: list[str]) -> int:
     if argv[0] == "simulate":
         _simulate(argv[1:])
     elif argv[0] == "compare-silhouettes":
-        from components.evidence.silhouettes.comparison_command import main as compare
+        from components.thesis.silhouette_comparison import main as compare
 
         return compare(argv[1:])
     else:
@@ -192,7 +192,7 @@ def import_everything() -> None:
         "dsa_des.record.arrow", "dsa_des.studies.output", "dsa_des.studies.figures", "rich.console",
         "rich.table", "rich.progress", "matplotlib.figure", "matplotlib.backends.backend_agg",
         "scipy.special", "scipy.stats", "components.display.plan", "trimesh",
-        "components.evidence.silhouettes.comparison_command", "components.optical.mesh",
+        "components.thesis.silhouette_comparison", "components.optical.mesh",
         "components.encounters.convert_command", "components.encounters.show_command",
         "components.encounters.risk_table", "components.encounters.generate_command",
         "components.encounters.split_command", "components.export.exported", "scipy.io",

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from components.aircraft.silhouette_table import read_aspect_table, table_from_nodes
-from components.evidence.silhouettes.comparison_command import main
-from components.evidence.silhouettes.fitted_areas import fitted_areas
-from components.evidence.silhouettes.fitted_areas import main as fit
-from components.evidence.thesis.project_files import aircraft
 from components.optical.silhouette import visible_area
+from components.thesis.scenes import aircraft
+from components.thesis.silhouette_comparison import main
+from docs.make.fitted_areas import fitted_areas
+from docs.make.fitted_areas import main as fit
 
 # type → totals from the nose, abeam and above, as the headers of the files say; m²
 TOTALS = {

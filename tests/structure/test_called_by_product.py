@@ -1,4 +1,4 @@
-"""Public functions and classes that no product code names: the docs say they are for users."""
+"""Public functions and classes that no code of ours names: the docs say they are for users."""
 
 import ast
 import re
@@ -6,10 +6,12 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+#: With what makes the pages, which calls the product as a user does.
+ROOMS = ("dsa_des", "components", "docs/make")
 
 
 def trees() -> dict[Path, ast.Module]:
-    paths = [p for room in ("dsa_des", "components") for p in sorted((ROOT / room).rglob("*.py"))]
+    paths = [p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))]
     return {path: ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 

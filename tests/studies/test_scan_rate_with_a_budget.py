@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.evidence.scan_rate import page
-from components.evidence.scan_rate.expected import certain_range_m, mean_range_m
 from components.radar.cumulative_detection import first_declared
+from docs.make import scan_rate as page
+from docs.make.declaration_ranges import certain_range_m, mean_range_m
 
 
 @pytest.mark.parametrize(("m", "n"), [(1, 1), (1, 3), (2, 2), (3, 5), (2, 4)])

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from components.evidence.thesis import flight_tests, project_files, scene_run
-from components.evidence.thesis.project_files import configs
+from components.thesis import flight_tests, scenes
+from components.thesis.scenes import configs
 from dsa_des.scene.scene import load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 
@@ -47,7 +47,7 @@ def change(monkeypatch: Any, inputs: tuple[str, ...]) -> None:
         if "." in file:
             keys.setdefault(file, []).append(key)
         else:
-            module = __import__(f"components.evidence.thesis.{file}", fromlist=["_"])
+            module = __import__(f"components.thesis.{file}", fromlist=["_"])
             monkeypatch.setattr(module, key, changed(getattr(module, key)))
 
     def apply(path: Path, scene_file: SceneFile) -> None:
@@ -58,7 +58,7 @@ def change(monkeypatch: Any, inputs: tuple[str, ...]) -> None:
     rewrite(monkeypatch, apply)
     if "thesis/table_4_2.csv" in keys:
         (column,) = keys["thesis/table_4_2.csv"]
-        rows = [{**row, column: FACTOR * float(row[column])} for row in project_files.read_csv(
+        rows = [{**row, column: FACTOR * float(row[column])} for row in scenes.read_csv(
             "table_4_2.csv")]  # fmt: skip
         monkeypatch.setattr(flight_tests, "read_csv", lambda name: rows)
 
@@ -74,5 +74,5 @@ def rewrite(monkeypatch: Any, apply: Callable[[Path, SceneFile], None]) -> None:
     def load(path: Path, sets: Any = ()) -> Any:
         return load_tables(read(path), sets=sets, swaps=(), seed=None, duration_s=None)
 
-    monkeypatch.setattr(project_files, "read_scene_file", read)
-    monkeypatch.setattr(scene_run, "load_scene", load)
+    monkeypatch.setattr(scenes, "read_scene_file", read)
+    monkeypatch.setattr(scenes, "load_scene", load)

@@ -2,8 +2,11 @@
 
 import pytest
 
-from components.evidence.thesis.made import Made
-from components.evidence.thesis.registry import ITEMS
+from components.thesis.rows import Made
+from components.thesis.table import ITEMS
+from tests.optical.conftest import synthetic_aircraft
+
+__all__ = ["results", "synthetic_aircraft"]
 
 
 @pytest.fixture(scope="session")

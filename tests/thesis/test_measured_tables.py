@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from components.aircraft.silhouette_table import read_aspect_table
-from components.evidence.silhouettes.comparison import AXES, compare_silhouettes
-from components.evidence.thesis.measured_tables import ERRORS, MEASURED_ON, TABLES
-from components.evidence.thesis.project_files import aircraft
 from components.optical.silhouette import visible_area
+from components.thesis.scenes import areas as areas_of
+from components.thesis.silhouette_comparison import AXES, compare_silhouettes
+from components.thesis.silhouettes import ERRORS, MEASURED_ON, TABLES
 
 SHARED = Path(os.environ.get("DSA_DES_SHARED", Path(__file__).parents[3] / "shared"))
 FOLDER = SHARED / "data" / "projected_area"
@@ -21,7 +21,7 @@ def test_the_errors_are_those_of_the_tables(file) -> None:
     if not path.is_file():
         pytest.skip(f"{TABLES[file]} of degas-surveillance-jwandrews is not at {FOLDER}")
     table = read_aspect_table(path)
-    areas = aircraft(file).eo.model_dump(exclude={"silhouette_table", "made_for"})
+    areas = areas_of(file)
     found = compare_silhouettes(
         {"thesis": lambda *view: visible_area(*view, **areas, model="thesis")},
         {"table": lambda *view: visible_area(*view, table=table, model="aspect_table")},

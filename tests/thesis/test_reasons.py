@@ -2,8 +2,7 @@
 
 import pytest
 
-from components.evidence.thesis import eo_ranges
-from components.evidence.thesis.row import Row
+from components.thesis.rows import Row
 
 
 def half_a_digit(row: Row) -> float:
@@ -17,8 +16,8 @@ def test_more_than_the_last_digit_is_said(results, item) -> None:
             assert "allow" in row.source, row.quantity
 
 
-def test_a_climb_that_follows_from_a_cell_says_so() -> None:
-    rows = {row.quantity: row for row in eo_ranges.make().rows}
+def test_a_climb_that_follows_from_a_cell_says_so(results) -> None:
+    rows = {row.quantity: row for row in results["table-4.4"].rows}
     for name in ("King Air", "Convair"):
         why = rows[f"Ascending head-on, {name}, thesis's eq. 9-13"].why
         assert "follows from the Convair's cell" in why and "cuts" not in why

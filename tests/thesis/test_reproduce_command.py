@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.evidence.thesis.basis import predicted
-from components.evidence.thesis.document import line, short
-from components.evidence.thesis.made import Made
-from components.evidence.thesis.registry import ITEMS, Item, chosen
-from components.evidence.thesis.row import Row
+from components.thesis.reproduce import line, short
+from components.thesis.rows import Made, Row, predicted
+from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from dsa_des.scene.scene import load_scene
@@ -45,7 +43,7 @@ def test_json_rows_figures_and_data(tmp_path):
     assert {row["item"] for row in rows} == {"fig-3.11", "fig-4.22"}
     first = rows[0]
     assert (first["printed"], first["ours"], first["difference"]) == (1.0, 1.0, 0.0)
-    assert (first["verdict"], first["inputs"]) == ("configured", "front_and_back:BACK_M2")
+    assert (first["verdict"], first["inputs"]) == ("configured", "silhouettes:BACK_M2")
     silent = next(row for row in rows if row["verdict"] == "no value printed")
     assert silent["printed"] is None and silent["difference"] is None
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))["rows"] == rows
@@ -151,7 +149,7 @@ def test_page_holds_every_row_with_its_verdict(results):
 
 def test_help_does_not_import_the_simulator():
     code = (
-        "import sys; from components.evidence.thesis.command import reproduce; "
+        "import sys; from components.thesis.command import reproduce; "
         "print([m for m in ('numpy', 'scipy', 'matplotlib', 'simpy') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

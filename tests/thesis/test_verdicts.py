@@ -3,45 +3,53 @@
 import importlib
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from components.evidence.thesis import printed as printed_numbers
-from components.evidence.thesis import registry
-from components.evidence.thesis.basis import calibrated, configured, predicted
-from components.evidence.thesis.project_files import configs, read_csv
-from components.evidence.thesis.row import VERDICTS, Row
-from components.evidence.thesis.tally import tally
+from components.thesis import cameras, table
+from components.thesis.rows import (
+    VERDICTS,
+    Printed,
+    Row,
+    calibrated,
+    configured,
+    predicted,
+    tally,
+)
+from components.thesis.scenes import configs, read_csv
 from dsa_des.scene.scene_file import read_scene_file
 from tests.thesis.changed_inputs import FACTOR, change, changed, found, rewrite
 
 PAGE = Path(__file__).parents[2] / "docs" / "thesis.md"
-ITEMS = {item.name: item for item in registry.ITEMS}
+ITEMS = {item.name: item for item in table.ITEMS}
+#: Item → name → number; empty where the item prints none.
+PRINTED = {name: item.printed for name, item in ITEMS.items()}
 #: Inputs that calibrated and configured rows of an item name; table-2.4 takes seconds and is made
 #: once with all of them.
 MOVING = [
-    ("fig-3.11", ("front_and_back:BACK_M2",)),
-    ("fig-3.11", ("front_and_back:FRONT_M2",)),
+    ("fig-3.11", ("silhouettes:BACK_M2",)),
+    ("fig-3.11", ("silhouettes:FRONT_M2",)),
     ("sec-4.1.1", ("thesis/sec_4_1_1.toml:blocks.radar.calibrate.range_km",)),
-    ("sec-4.1.1", ("specified_range:NAUTICAL_KM",)),
+    ("sec-4.1.1", ("radar:NAUTICAL_KM",)),
     ("sec-4.1.1", ("sensors/oasys_specification.toml:calibrate.pd",)),
     ("sec-4.1.1", ("sensors/oasys_specification.toml:calibrate.range_km",)),
     ("sec-4.1.3", ("sensors/oasys.toml:calibrate.pd",)),
     *(("table-4.1", (f"aircraft/{file}.toml:rcs_dbsm",))
-      for file in printed_numbers.PRINTED["table-4.1"]),
+      for file in PRINTED["table-4.1"]),
     ("table-4.2", ("thesis/table_4_2.csv:range_km",)),
     ("table-4.2", ("flight_tests:SCANS_IN_A_ROW",)),
     *(("fig-4.13", (f"aircraft/{name}_refined.toml:ir.{key}_m2",))
-      for name, key in map(str.split, printed_numbers.PRINTED["fig-4.13"])),
-    ("table-4.4", ("eo_ranges:CLIMB_DEG", "aircraft/boeing_787.toml:contrast")),
+      for name, key in map(str.split, PRINTED["fig-4.13"])),
+    ("table-4.4", ("cameras:CLIMB_DEG", "aircraft/boeing_787.toml:contrast")),
     ("table-4.4", ("aircraft/king_air.toml:contrast", "aircraft/king_air.toml:eo.front_m2")),
     ("table-4.4", ("aircraft/boeing_787.toml:contrast",)),
     ("fig-4.14", ("thesis/fig_4_14.toml:blocks.traffic.intruders.overtaking.east_m",
                   "thesis/fig_4_14.toml:blocks.traffic.intruders.overtaking.up_m")),
     *(("fig-4.17", (f"thesis/fig_4_17.toml:blocks.{name}.azimuth_deg",))
       for name in ("radar", "eo", "ir")),
-    ("fig-4.19", ("angular_resolution:RESOLUTIONS_DEG",)),
+    ("fig-4.19", ("maps:RESOLUTIONS_DEG",)),
     ("fig-4.21", ("thesis/fig_4_21.toml:duration_s",
                   "thesis/fig_4_21.toml:blocks.radar.scan_rate_hz")),
     ("fig-4.21", ("thesis/fig_4_21.toml:blocks.traffic.intruders",)),
@@ -75,6 +83,17 @@ def test_verdict_follows_from_the_numbers_and_the_basis() -> None:
     assert Row("q", 9.14, "", "", derived="9.14").verdict == "no value printed"
     with pytest.raises(ValueError, match="no basis"):
         _ = Row("q", 9.14, "", "", "9.14").verdict
+
+
+def test_a_row_beside_a_printed_number_takes_what_is_said_of_it_but_for_what_it_says() -> None:
+    basis = configured("a test")
+    number = Printed("9.14", 0.1, "of a test")
+    assert number.beside("q", 9.2, "", "", basis).verdict == "configured"
+    assert number.beside("q", 9.2, "", "", basis, tolerance=0.0).said.endswith("of a test")
+    far = number.beside("q", 9.3, "km", "So.", basis, because="of the row", again="p")
+    assert far == Row("q", 9.3, "km", "So.", "9.14", 0.1, "of the row", basis, again="p")
+    assert Printed("9.14").beside("q", 9.144, "", "", basis).near
+    assert not Printed("9.14").beside("q", 9.146, "", "", basis).near
 
 
 def test_only_a_prediction_counts_and_only_once() -> None:
@@ -119,16 +138,17 @@ def test_every_row_has_one_of_the_five_and_says_from_what(results) -> None:
         assert row.verdict in VERDICTS, (item, row.quantity)
         if row.printed is not None:
             assert row.basis is not None and row.basis.words, (item, row.quantity)
-            text = row.printed
-            assert text in printed_numbers.PRINTED[item].values(), (item, text)
+            texts = {number.text for number in PRINTED[item].values()}
+            assert row.printed in texts, (item, row.printed)
         else:
             assert row.basis is None and row.why, (item, row.quantity)
 
 
 def test_every_printed_number_is_compared(results) -> None:
-    for item, numbers in printed_numbers.PRINTED.items():
-        used = [row.printed for row in results[item].rows]
-        assert set(numbers.values()) <= set(used), item
+    for item, numbers in PRINTED.items():
+        used = {row.printed for row in results[item].rows}
+        assert {number.text for number in numbers.values()} <= used, item
+    assert sum(map(len, PRINTED.values())) > 80
 
 
 def test_every_input_exists(results) -> None:
@@ -140,7 +160,7 @@ def test_every_input_exists(results) -> None:
             elif file.endswith(".toml"):
                 found(read_scene_file(configs() / file).data, key)
             else:
-                module = importlib.import_module(f"components.evidence.thesis.{file}")
+                module = importlib.import_module(f"components.thesis.{file}")
                 assert hasattr(module, key), (item, name)
 
 
@@ -166,15 +186,11 @@ def test_the_page_says_which_predictions_agree(results) -> None:
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_prediction_stays_when_the_printed_number_is_changed(results, monkeypatch, asked) -> None:
     """All printed numbers, but Pd of the large class, which two rows ask where it is; then that."""
-    numbers = printed_numbers.PRINTED
-    for item, names in list(numbers.items()):
-        other = {
-            name: text
-            if ((item, name) == ("sec-4.1.3", "pd_large")) != asked
-            else f"{FACTOR * float(text):.6g}"
-            for name, text in names.items()
-        }
-        monkeypatch.setitem(numbers, item, other)
+    for item, names in PRINTED.items():
+        for name, number in list(names.items()):
+            if ((item, name) == ("sec-4.1.3", "pd_large")) == asked:
+                other = replace(number, text=f"{FACTOR * number.value:.6g}")
+                monkeypatch.setitem(names, name, other)
     known = kinds(results, "predicted")
     compared = 0
     for item in dict.fromkeys(item for item, _ in known) if not asked else ["sec-4.1.3"]:
@@ -184,7 +200,7 @@ def test_a_prediction_stays_when_the_printed_number_is_changed(results, monkeypa
                 continue
             assert again[row.quantity].ours == row.ours, row.quantity
             compared += 1
-            if not asked and row.printed != numbers[item].get("pd_large"):
+            if not asked and row.printed != PRINTED["sec-4.1.3"]["pd_large"].text:
                 assert again[row.quantity].printed != row.printed
     assert compared >= (2 if asked else 40)
 
@@ -244,11 +260,9 @@ def test_calibrated_and_configured_numbers_move_with_their_inputs(
     assert moved
 
 
-def test_what_is_set_from_several_numbers_at_once_says_so() -> None:
+def test_what_is_set_from_several_numbers_at_once_says_so(results) -> None:
     """No parameter file holds the four cells of Table 4.4; three constants were set from them."""
-    from components.evidence.thesis import eo_ranges
-
     beech = tomllib.loads((configs() / "aircraft/beech_99.toml").read_text(encoding="utf-8"))
-    assert (beech["contrast"], beech["eo"]["front_m2"], eo_ranges.CLIMB_DEG) == (1.0, 12.0, 1.4)
-    cells = [row for row in eo_ranges.make().rows if row.verdict == "calibrated"]
+    assert (beech["contrast"], beech["eo"]["front_m2"], cameras.CLIMB_DEG) == (1.0, 12.0, 1.4)
+    cells = [row for row in results["table-4.4"].rows if row.verdict == "calibrated"]
     assert len(cells) == 4

@@ -3,7 +3,7 @@
 import pytest
 from scipy.stats import chi2
 
-from components.evidence.track_consistency import CASES, nees_of, summary
+from docs.make.track_consistency import CASES, nees_of, summary
 
 
 @pytest.mark.parametrize("name", ["velocity", "missed"])

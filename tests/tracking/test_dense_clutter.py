@@ -7,7 +7,7 @@ import tracemalloc
 import pytest
 
 import dsa_des
-from components.evidence.track_consistency import NOISY, OWNSHIP, Case, scene_of_case
+from docs.make.track_consistency import NOISY, OWNSHIP, Case, scene_of_case
 from dsa_des.running.simulation import Simulation
 
 TARGETS, SECONDS, PER_SCAN = 100, 30, 20.0

@@ -5,7 +5,7 @@ import pyarrow.compute as pc
 import pytest
 
 import dsa_des
-from components.evidence.track_consistency import (
+from docs.make.track_consistency import (
     NEARLY,
     NOISY,
     OWNSHIP,

@@ -1,0 +1,148 @@
+"""What costs little or ought to: two forms of a scene in turn, and ways to share a processor."""
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from components.benchmark.scenes import CLOCKED, chosen, engine_run, scene_of
+from components.examples import folder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
+
+#: A processor that the three sensors of a scene share, and that is busy a third of the time.
+_SHARED = (
+    "processors.shared.service_s=0.01",
+    *(f"blocks.{name}.processor=shared" for name in CLOCKED),
+)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two forms of one benchmark scene."""
+
+    name: str
+    what: str
+    #: At most so many times the CPU time of the plain form.
+    wanted: float
+    #: The benchmark scene.
+    case: str
+    #: From the case's overrides to the form in question and the plain one.
+    forms: Callable[[str, bool], tuple[Scene, Scene]]
+
+
+def without_unused_effects(scene: Scene) -> Scene:
+    """Return a scene whose blocks declare no effects but those that it calls for."""
+    used: dict[str, set[str]] = {}
+    for item in Simulation(scene).plan:
+        if item.built:
+            used.setdefault(item.block, set()).add(item.effect.name)
+    blocks = dict(scene.blocks)
+    for name, block in blocks.items():
+        kept = tuple(e for e in block.cls.effects if e.name in used.get(name, ()))
+        cls: Any = type(block.cls.__name__, (block.cls,), {})
+        cls.effects = kept  # afterwards: what makes a class of sensors adds its own
+        blocks[name] = replace(block, cls=cls)
+    return replace(scene, blocks=blocks)
+
+
+def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
+    scene = scene_of(chosen([case])[0], quick=quick)
+    return scene, without_unused_effects(scene)
+
+
+def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
+    (found,) = chosen([case])
+    return scene_of(found, quick=quick, sets=_SHARED), scene_of(found, quick=quick)
+
+
+def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
+    duration_s = "40" if quick else None
+    with_it, plain = folder() / "alerting" / f"{case}.toml", folder() / f"{case}.toml"
+    return load_scene(with_it, duration_s=duration_s), load_scene(plain, duration_s=duration_s)
+
+
+PAIRS = (
+    Pair("unused_effects",
+         "effects that the scene does not call for: declared, or not there at all",
+         1.03, "hundred", _effects),
+    Pair("shared_processor", "three sensors queue for one processor, or do not",
+         5.0, "clocks", _processor),
+    Pair("alerting", "first light with alert levels of its tracks at 1 Hz, or without",
+         2.0, "first_light", _alerting),
+)  # fmt: skip
+
+
+def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return by how much the CPU time of building and running grows; medians of pairs in turn."""
+    (pair,) = (pair for pair in PAIRS if pair.name == name)
+    forms = pair.forms(pair.case, quick)
+    for scene in forms:
+        engine_run(scene, [], MemorySink())
+    ratios, times = [], []
+    for number in range(4 * repeats):
+        order = forms if number % 2 else forms[::-1]
+        spent = {id(scene): sum(engine_run(scene, [], MemorySink())[:2]) for scene in order}
+        ratios.append(spent[id(forms[0])] / spent[id(forms[1])])
+        times.append(spent[id(forms[0])])
+    simulated_s = float(Simulation(forms[0]).duration_s)
+    return {
+        "scene": pair.name,
+        "times": median(ratios),
+        "times_quartiles": [sorted(ratios)[repeats], sorted(ratios)[3 * repeats]],
+        "wanted": pair.wanted,
+        "simulated_s_per_s": simulated_s / median(times),
+    }
+
+
+@dataclass(frozen=True)
+class Variant:
+    """First light with some of its blocks on one processor."""
+
+    name: str
+    what: str
+    #: Which share it.
+    blocks: tuple[str, ...] = ()
+    #: Further overrides.
+    more: tuple[str, ...] = ()
+
+
+_SPREAD = ("processors.cpu.service_spread_s=0.002",)
+_SKIP = ("processors.cpu.when_busy=skip",)
+VARIANTS = (
+    Variant("none", "none"),
+    Variant("wait", "three sensors wait", CLOCKED),
+    Variant("skip", "three sensors, `skip`", CLOCKED, _SKIP),
+    Variant("skip_spread", "the same with `service_spread_s`", CLOCKED, (*_SKIP, *_SPREAD)),
+    Variant("chain", "radar and fusion, a chain", ("radar", "fusion")),
+    Variant("chain_spread", "the same with `service_spread_s`", ("radar", "fusion"), _SPREAD),
+    Variant(
+        "whole_chain",
+        "sensors, fusion and tracker, all in one chain",
+        (*CLOCKED, "fusion", "tracker"),
+    ),
+)
+
+
+def measured_queue(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return how many seconds are simulated and recorded in one of CPU, without building."""
+    from dsa_des.record.arrow import ParquetSink
+
+    (variant,) = (variant for variant in VARIANTS if variant.name == name)
+    sets = [f"blocks.{name}.processor=cpu" for name in variant.blocks]
+    if sets:
+        sets += ["processors.cpu.service_s=0.005", *variant.more]
+    scene = load_scene(folder() / "first_light.toml", sets=sets, duration_s="120")
+    rates = []
+    for _ in range(2 if quick else 2 + 2 * repeats):
+        with tempfile.TemporaryDirectory() as place:
+            simulation = Simulation(scene, recorder=Recorder([ParquetSink(Path(place))]))
+            started = time.process_time()
+            simulation.run()
+            rates.append(120.0 / (time.process_time() - started))
+    return {"scene": variant.name, "simulated_s_per_s": median(rates[2:] or rates)}

@@ -1,1 +1,0 @@
-"""Makers of the pages of the docs; they may import everything, nothing imports them."""

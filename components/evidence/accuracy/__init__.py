@@ -1,1 +1,0 @@
-"""The page on accuracy and cost, and the maps of errors on it."""

@@ -1,1 +1,0 @@
-"""What clutter, thresholds and moving-target filters do to detection range: docs/clutter.md."""

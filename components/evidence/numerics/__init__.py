@@ -1,1 +1,0 @@
-"""Hard cases of the numerics: the naive way, ours and a reference."""

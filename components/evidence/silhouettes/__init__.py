@@ -1,1 +1,0 @@
-"""Silhouette models compared over rotation with a reference."""

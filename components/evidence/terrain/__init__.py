@@ -1,1 +1,0 @@
-"""The elevation raster that is shipped."""

@@ -1,0 +1,112 @@
+"""What figures share: panels, colours, and scenes from above as the thesis draws them."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.display.map_view import outline_of
+from components.display.symbols import styles_of
+from components.sensor import marks
+from components.thesis.scenes import SceneRun
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.record.drawing import drawing
+
+#: Half a page.
+WIDTH_IN, HEIGHT_IN = 6.6, 3.9
+
+#: By kind, as in every other figure.
+RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
+#: For whatever is no kind of sensor.
+BLUE, ORANGE, RED, GREEN, PINK, SKY = (
+    "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#56B4E9",
+)  # fmt: skip
+GREY = "#777777"
+
+
+def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
+    """Put the legend of one of a figure's axes below all of them; `without` names an entry."""
+    entries = zip(*axes.get_legend_handles_labels(), strict=True)
+    shown = [entry for entry in entries if entry[1] != without]
+    axes.figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=columns)
+
+
+@contextmanager
+def panels(
+    path: Path,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    width_in: float = WIDTH_IN,
+    height_in: float = HEIGHT_IN,
+    **shared: Any,
+) -> Iterator[list[Any]]:
+    """Give the axes of a figure, row by row, and write it as PNG when the block is done."""
+    with drawing(width_in, height_in, path) as figure:
+        figure.set_layout_engine("constrained")
+        axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
+        for one in axes:
+            one.grid(color="#DDDDDD", linewidth=0.5)
+            one.set_axisbelow(True)
+        yield axes
+
+
+def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) -> None:
+    """Draw the flights, the ownship's place and sensors' fields of view."""
+    from matplotlib.patches import Polygon
+
+    flights = run.flights
+    styles = styles_of(fields_of_view, run.simulation.components)
+    for name in fields_of_view:
+        sensor: Any = run.simulation.components[name]
+        colour = styles[name].colour
+        outline = outline_of(flights.start_yaw_rad, sensor.stated_reach, sensor.axes)
+        if outline.closed:
+            shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
+            axes.add_patch(
+                Polygon(
+                    outline.corners_km,
+                    **shape,
+                    zorder=0.5,
+                    label="field of view" + (f" of {name}" if len(fields_of_view) > 1 else ""),
+                )
+            )
+    for number, track in enumerate(flights.targets):
+        label = "intruder" if number == 0 else None
+        axes.plot(track.east_km, track.north_km, color=GREY, linewidth=1.0, label=label)
+    axes.plot([0.0], [0.0], "*", color="#000000", markersize=11, label="ownship", zorder=3)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlabel("east [km]")
+    axes.set_ylabel("north [km]")
+
+
+def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> None:
+    """Mark where targets were when they were detected: the rows of a recorded table."""
+    east, north = true_places(run, rows)
+    defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
+                "color": RADAR, "zorder": 2}  # fmt: skip
+    axes.plot(east, north, **{**defaults, **style})
+
+
+def true_places(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+    """Return east and north in km of each row's target at its time."""
+    east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
+    for name in np.unique(rows["target"].astype(str)):
+        here = np.flatnonzero(rows["target"] == name)
+        east[here], north[here] = run.flights.at(str(name), rows["time_s"][here])
+    return east, north
+
+
+def reported_places(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+    """Return east and north in km of what a sensor reports, from a level ownship heading north."""
+    ground_km = rows["range_m"] / 1000.0 * np.cos(rows["elevation_rad"])
+    return ground_km * np.sin(rows["azimuth_rad"]), ground_km * np.cos(rows["azimuth_rad"])
+
+
+def ray(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
+    """Return the ends of a line from the ownship's place, east and north."""
+    angle = math.radians(azimuth_deg)
+    return [0.0, length_km * math.sin(angle)], [0.0, length_km * math.cos(angle)]

@@ -1,0 +1,156 @@
+"""Scenes, sensors and aircraft of ``configs``: reading them, and running scenes in memory.
+
+Nothing here changes a value: every item takes one sensor's parameters from the same file.
+"""
+
+import csv
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.aircraft.aircraft import Aircraft
+from components.display.flights import Flights
+from components.examples import folder
+from components.optical.camera import Camera
+from components.optical.eo import ElectroOptical
+from components.optical.ir import Infrared
+from components.radar.swerling import SwerlingParameters
+from dsa_des.arrays.types import AnyArray
+from dsa_des.block.component import Context
+from dsa_des.block.message import Columns, Text
+from dsa_des.errors import UsageError
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Failed, run_replicas
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.scene.scene_file import read_scene_file
+from dsa_des.time.randomness import Streams
+
+
+def configs() -> Path:
+    """Return the folder ``configs`` of the project: in the package, or beside it in its source."""
+    return folder()
+
+
+def table(name: str) -> dict[str, Any]:
+    """Return a TOML file of ``configs`` with all it extends, for example ``sensors/oasys``."""
+    return read_scene_file(configs() / f"{name}.toml").data
+
+
+def radar_parameters(name: str = "oasys", **changes: Any) -> SwerlingParameters:
+    """Return the parameters of a radar of ``configs/sensors``."""
+    return SwerlingParameters.model_validate({**_without_type(f"sensors/{name}"), **changes})
+
+
+def eo_camera(name: str = "afrl_eo") -> Camera:
+    """Return an electro-optical camera of ``configs/sensors``, for its pixels and its weights."""
+    return _camera(ElectroOptical, name)
+
+
+def ir_camera(name: str = "midas_ir") -> Camera:
+    """Return an infrared camera of ``configs/sensors``."""
+    return _camera(Infrared, name)
+
+
+def aircraft(name: str) -> Aircraft:
+    """Return an aircraft of ``configs/aircraft``."""
+    return Aircraft.model_validate(table(f"aircraft/{name}"))
+
+
+def areas(name: str, band: str = "eo") -> dict[str, Any]:
+    """Return an aircraft's areas in a band, eo or ir, as silhouettes take them."""
+    found: dict[str, Any] = getattr(aircraft(name), band).model_dump(
+        exclude={"silhouette_table", "made_for"}
+    )
+    return found
+
+
+def read_csv(name: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file of ``configs/thesis``; lines with ``#`` are comments."""
+    text = (configs() / "thesis" / name).read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in text if not line.startswith("#")))
+
+
+def _camera(kind: type[Camera], name: str) -> Camera:
+    parameters = kind.Parameters.model_validate(_without_type(f"sensors/{name}"))
+    return kind(name, parameters, Context(Streams(0)))
+
+
+def _without_type(name: str) -> dict[str, Any]:
+    return {key: value for key, value in table(name).items() if key != "type"}
+
+
+@dataclass
+class Recording:
+    """What a run of a scene recorded."""
+
+    #: Table name → column name → values.
+    tables: Mapping[str, Columns]
+
+    def rows(self, table: str, **where: str) -> dict[str, AnyArray]:
+        """Return the columns of a recorded table, of those rows whose columns have these texts."""
+        columns = {name: _values(column) for name, column in self.tables[table].items()}
+        keep = np.ones(len(columns["tick"]), dtype=bool)
+        for name, text in where.items():
+            keep &= columns[name] == text
+        return {name: values[keep] for name, values in columns.items()}
+
+
+@dataclass
+class SceneRun(Recording):
+    """A run of one scene, with what ran."""
+
+    simulation: Simulation
+    #: Time that building and running took.
+    wall_s: float
+
+    @cached_property
+    def flights(self) -> Flights:
+        """Where all aircraft were."""
+        return flights_of(self.simulation)
+
+
+def _values(column: AnyArray | Text) -> AnyArray:
+    if isinstance(column, Text):
+        return np.array([*column.names, None], dtype=object)[column.codes]
+    return column
+
+
+def flights_of(simulation: Simulation) -> Flights:
+    """Return where all aircraft are."""
+    found = Flights.of(simulation, {})
+    if found is None:
+        raise UsageError(f"{simulation.scene.path}: has no traffic")
+    return found
+
+
+def scene(name: str, *sets: str) -> Scene:
+    """Load a scene of ``configs``, for example ``thesis/fig_4_14``, with values set."""
+    return load_scene(configs() / f"{name}.toml", sets=sets)
+
+
+def run(loaded: Scene) -> SceneRun:
+    """Run a scene in memory."""
+    started = time.perf_counter()
+    sink = ColumnSink()
+    simulation = Simulation(loaded, recorder=Recorder([sink]))
+    simulation.run()
+    wall_s = time.perf_counter() - started
+    return SceneRun(sink.tables(), simulation, wall_s)
+
+
+def monte_carlo(loaded: Scene, replicas: int) -> list[Recording]:
+    """Run a scene with the seeds 0, 1, ...; the draws of each run are its own."""
+    done = []
+    for outcome in run_replicas(loaded, [Replica(seed) for seed in range(replicas)]):
+        if isinstance(outcome, Failed):
+            raise ValueError(f"{loaded.path}: {outcome.error}")
+        done.append(Recording(outcome.tables))
+    return done

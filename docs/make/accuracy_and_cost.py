@@ -1,0 +1,376 @@
+# ruff: noqa: E501 (the lines of a Markdown page)
+"""``python -m docs.make.accuracy_and_cost``: docs/accuracy-and-cost.md and its figures.
+
+Costs are those of the machine it runs on; errors and effects are the same everywhere. Takes a few
+minutes.
+"""
+
+import argparse
+import math
+import sys
+import tempfile
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.examples import folder
+from components.line_of_sight.error_map import (
+    CAMERA_DEG,
+    RADAR_DEG,
+    ErrorMap,
+    draw_error_map,
+    error_maps,
+)
+from dsa_des.arrays.types import AnyArray
+from dsa_des.files.output_file import write_file
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal.interruption import plain_ending
+
+#: A pixel of the camera, which errors of direction are compared with.
+PIXEL_DEG = 0.0358
+
+_HEAD = """1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad.
+2. **Radar**: take the exact Pd: for one pulse the table costs {table_times} and Gram-Charlier {gram_times}. A threshold or a range boundary saves up to {boundary_saves} µs and first sees the intruder {threshold_km} to {boundary_km} km nearer{cut_off}.
+3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) sees {exact_km}; a range boundary sees {boundary_eo_km}, a one-dimensional line {line_km}. A mesh costs {mesh_times} times the union and is no better.
+4. **Fusion**: a window of 0.1 s is worth its {window_extra} µs: it raises the fused share from {share} to {window_share} and adds {window_range} m to the range error (95th percentile)."""
+
+
+def head_lines(costs: Sequence[Any], cut_off: str) -> str:
+    """Return the four sentences."""
+    of = {(cost.block, cost.rung): cost for cost in costs}
+
+    def us(block: str, rung: str) -> float:
+        return float(of[block, rung].cpu_us_per_target_scan)
+
+    def km(block: str, rung: str) -> float:
+        return float(of[block, rung].effect["first_detection_range_change_m"]) / 1000.0
+
+    def saved(block: str, one: str, other: str) -> str:
+        return f"{us(block, other) - us(block, one):.2f}"
+
+    def times(block: str, one: str, other: str) -> str:
+        ratio = us(block, one) / us(block, other)
+        return "as much" if 1 / 1.1 < ratio < 1.1 else f"{ratio:.2g} times as much"
+
+    flat = of["transform", "flat_earth"].error.maximum
+    instant, window = of["fusion", "exact_instant"], of["fusion", "window"]
+    return _HEAD.format(
+        flat_saves=saved("transform", "flat_earth", "ellipsoid"),
+        flat_max=f"{flat:.1f}",
+        flat_pixels=f"{flat / math.radians(PIXEL_DEG) / 1e3:.1f}",
+        attitude_saves=saved("transform", "small_angle", "exact"),
+        small_angle=f"{of['transform', 'small_angle'].error.maximum:.0f}",
+        table_times=times("radar", "table", "exact"),
+        gram_times=times("radar", "gram_charlier", "exact"),
+        boundary_saves=saved("radar", "range_boundary", "exact"),
+        threshold_km=f"{-km('radar', 'threshold'):.1f}",
+        boundary_km=f"{-km('radar', 'range_boundary'):.1f}",
+        cut_off=cut_off,
+        union_us=f"{us('eo', 'union'):.2f}",
+        exact_us=f"{us('eo', 'exact'):.2f}",
+        exact_km=_early_or_late(km("eo", "exact")),
+        boundary_eo_km=_early_or_late(km("eo", "range_boundary")),
+        line_km=_early_or_late(km("eo", "projection")),
+        mesh_times=f"{us('eo', 'mesh') / us('eo', 'union'):.0f}",
+        window_extra=saved("fusion", "exact_instant", "window"),
+        share=f"{window.effect['fused_share'] - window.effect['fused_share_change']:.0%}",
+        window_share=f"{window.effect['fused_share']:.0%}",
+        window_range=f"{window.error.p95 - instant.error.p95:.1f}",
+    )
+
+
+def radar_sees_from(scene: Scene) -> str:
+    """Return what cuts off the first detection of a scene's radar, as the end of a sentence.
+
+    A radar with a false alarm in twenty looks sees somewhere in its reach almost at once: where
+    the scene begins, if that is inside the reach, else at the reach's edge. A coarser model's
+    first detection then comes later by what the scene lets it, not by what the models differ.
+    """
+    sink = ColumnSink()
+    simulation = Simulation(scene, recorder=Recorder([sink]))
+    simulation.run()
+    tables = sink.tables()
+
+    def ours(table: str, column: str) -> AnyArray:
+        block: Any = tables[table]["block"]
+        here = np.array([*block.names, None])[block.codes] == "radar"
+        return np.asarray(tables[table][column])[here]
+
+    times_s, ranges_m = ours("detections", "time_s"), ours("detections", "true_range_m")
+    scans_s = np.unique(ours("scans", "time_s"))
+    first = int(np.argmin(times_s))
+    reach_m = float(scene.blocks["radar"].parameters.model_dump()["range_km"]) * 1000.0
+    return cut_off(float(times_s[first]), float(ranges_m[first]), scans_s, reach_m)
+
+
+def cut_off(time_s: float, range_m: float, scans_s: Any, reach_m: float) -> str:
+    """Return the end of the sentence for a first detection at a time and a range."""
+    if time_s <= scans_s[1]:
+        return f", at least: the exact radar sees it where the scene begins, at {range_m / 1000:.1f} km"
+    if range_m > 0.97 * reach_m:
+        return (
+            f", at least: the exact radar sees it at the edge of its reach, {reach_m / 1000:g} km"
+        )
+    return ""
+
+
+def _early_or_late(km: float) -> str:
+    """Return by how much a change of the first detection's range is too early or too late."""
+    return f"{abs(km):.1f} km too {'early' if km > 0.0 else 'late'}"
+
+
+FIGURE = "error_map_angle.png"
+_LATITUDES_DEG = np.array([0.0, 30.0, 52.0, 75.0])
+_RANGES_M = np.geomspace(100.0, 200e3, 1200)
+
+
+def error_map_section(images: Path) -> str:
+    """Draw the map of errors in direction and return the Markdown around it."""
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = {path.name: path for path in draw_error_map(Path(folder))}
+        write_file(images / FIGURE, drawn[FIGURE].read_bytes())
+    maps = {found.model: found for found in error_maps(_LATITUDES_DEG, _RANGES_M)}
+    lines = [
+        "`dsa-des cost --map geometry`",
+        "",
+        f"![Error in direction over range and latitude, one panel per model](images/{FIGURE})",
+        "",
+        "Largest range, km, up to which the direction stays within a camera's pixel "
+        f"({CAMERA_DEG:g}°) and a radar's degree, whatever the bearing, at four latitudes:",
+        "",
+        "| model | limit | " + " | ".join(f"{lat:g}°" for lat in _LATITUDES_DEG) + " |",
+        "|---|---|" + "---|" * len(_LATITUDES_DEG),
+    ]
+    for model in ("flat_earth", "local_radii", "geodesic"):
+        for limit_deg in (CAMERA_DEG, RADAR_DEG):
+            cells = [_good_up_to(maps[model], row, limit_deg) for row in range(len(_LATITUDES_DEG))]
+            lines.append(f"| {model} | {limit_deg:g}° | {' | '.join(cells)} |")
+    scale_deg = math.degrees(maps["flat_earth"].direction_rad[:, 0].max())
+    exact = math.ceil(math.log10(maps["ellipsoid"].direction_rad.max()))
+    lines += [
+        "",
+        f"Flat Earth takes a sphere for the ellipsoid, which turns directions by up to "
+        f"{scale_deg:.2f}° at any range: a radar does not notice, a camera does wherever it looks "
+        "but within a kilometre near 75°. Local radii cure that. What they leave out, the "
+        "curvature, grows with range, and the convergence of the meridians with range and "
+        "tan(latitude): close to a pole neither holds at any range. Azimuths along the geodesic "
+        "with straight-line elevations miss the curvature only. The ellipsoid errs by less than "
+        f"1e{exact} rad, which is the rounding of the targets' positions.",
+    ]
+    return "\n".join(lines)
+
+
+def _good_up_to(found: ErrorMap, row: int, limit_deg: float) -> str:
+    beyond = np.flatnonzero(found.direction_rad[row] > math.radians(limit_deg))
+    if not len(beyond):
+        return f"over {found.range_m[-1] / 1000:.0f}"
+    if beyond[0] == 0:
+        return "none"
+    km = found.range_m[beyond[0] - 1] / 1000
+    return f"{km:.0f}" if km >= 10 else f"{km:.1f}"
+
+
+DOCS = Path(__file__).parents[1]
+#: Scene of the trackers' ladders, and what is changed in it.
+TRACKERS = ("tracking/architectures.toml", "blocks.eo.latency_s=0.3")
+
+_PAGE = """# What accuracy costs
+
+For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their time; cruder ones save fractions of a microsecond, dearer ones bring nothing:
+{head}
+
+All numbers above are of one scene, the [flown encounter](#a-flown-encounter).
+
+Costs are CPU times of the block per target-scan, on one core; errors are those of single
+target-scans against the ladder's reference, whose own error is measured too. Scenes are run with
+every rung in turn, everything else fixed, on common random numbers. Made by
+`python -m docs.make.accuracy_and_cost`, from `dsa-des cost`.
+
+## How to read the tables
+
+*First seen*: of all pairs of sensor and target, the largest change in the range of the first
+detection, and the change of its time. The radar's reference sees from the first scan on, in the
+thesis's scene (12 km) and in the flown encounter: what its rungs lose there is a lower bound.
+*Gained, lost*: detections (sensor, target, instant) that only
+the rung, only the reference has. *Fused*: share of fused rows with two sensors or more. **Bold**
+rungs are on the front: none is both cheaper and nearer to the reference. Costs that differ by less
+than 10 % come in another order in another run and are given one value.
+
+The *union* of sphere, cylinder and plate is the reference of cameras: one hides the other, where
+the thesis's model adds them up. The plate's shape is an assumption (`components/optical/convex_hull.py`),
+so is the one-dimensional projection (`components/optical/projection.py`), of which the thesis says
+no more than size, range and colour. A range boundary shows no area: the one that is just detected
+at the boundary stands for it. The Gram-Charlier series holds for steady targets: it is run on a
+sampled cross-section and compared with the exact Pd of the same sample. Fusion is compared with the
+truth at each instant, which includes the sensors' grids.
+
+## Where each model of the Earth is good enough
+
+{error_map}
+
+## The thesis's scene
+
+`dsa-des cost configs/first_light.toml --all`
+
+![Error against cost, one panel per ladder](images/cost_first_light.png)
+
+{first_light}
+
+### The whole chain
+
+{chain}
+
+![Share of detections that differ against the cost of the run](images/cost_chain.png)
+
+## A flown encounter
+
+`dsa-des cost configs/replay_daa.toml --set blocks.traffic.file={encounter_name}`: {encounter_says}.
+
+![Error against cost, one panel per ladder](images/cost_encounter.png)
+
+{encounter}
+
+## Trackers
+
+`dsa-des cost configs/tracking/architectures.toml --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
+a radar at 1 Hz and two cameras, one of them late; two straight flights. Times are those of a tracker
+alone in a single run, where a step's fixed cost counts most ([in lock step](performance.md#track-updates)
+an update is far cheaper). Errors are the distance of the nearest confirmed track; the last rung of
+each ladder is the reference, which is not the truth either. Two flights of 20 s tell what
+rungs cost; they are too short to tell which is better. [What they mean](tracking.md#what-filters-association-and-late-looks-cost).
+
+{trackers}
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the page and its figures and return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m docs.make.accuracy_and_cost", description=__doc__
+    )
+    parser.add_argument(
+        "--encounter",
+        type=Path,
+        default=folder() / "encounters" / "crossing.daa",
+        help="encounter for the second half; the published page was made with NRC_Intercept23.daa",
+    )
+    parser.add_argument("--encounter-says", default="a made-up crossing", help="what it is")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder to write to")
+    options = parser.parse_args(arguments)
+    images: Path = options.docs / "images"
+    images.mkdir(parents=True, exist_ok=True)
+
+    from dsa_des.commands.cost import comparison, ladders_to_climb
+    from dsa_des.costs.chain import draw_chain, run_chain
+    from dsa_des.costs.output import draw_costs
+    from dsa_des.costs.study import RungCost, climb
+    from dsa_des.costs.variants import Variants
+
+    compare = comparison()
+
+    def costs_of(
+        scene: str, *sets: str, block: str | None = None, duration_s: object = None
+    ) -> tuple[Variants, list[RungCost]]:
+        variants = Variants(str(folder() / scene), sets=sets, duration_s=duration_s)
+        climbs, _ = ladders_to_climb(variants, block, None)
+        return variants, [
+            cost
+            for name, ladder in climbs
+            for cost in climb(variants, name, ladder, compare=compare)
+        ]
+
+    variants, first = costs_of("first_light.toml")
+    draw_costs(images / "cost_first_light.png", variants.scene.title, first)
+    chain = run_chain(variants, first, compare)
+    label = compare.difference.label
+    draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows, label)
+    flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
+    draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
+    _, third = costs_of(*TRACKERS, block="tracker", duration_s="20")
+    page = _PAGE.format(
+        head=head_lines(second, radar_sees_from(flown.scene)),
+        error_map=error_map_section(images),
+        first_light=_tables(first),
+        chain=_chain(chain),
+        encounter=_tables(second),
+        encounter_name=options.encounter.name,
+        encounter_says=options.encounter_says,
+        trackers=_tables(third),
+    )
+    write_file(options.docs / "accuracy-and-cost.md", page.encode())
+    return 0
+
+
+def _tables(costs: Sequence[Any]) -> str:
+    lines: list[str] = []
+    for _, group in groupby(costs, key=lambda cost: (cost.block, cost.ladder.name)):
+        rungs = list(group)
+        quantity = rungs[0].ladder.quantities[0]
+        if all(cost.unavailable or cost.error.count == 0 for cost in rungs):
+            lines += [f"**{rungs[0].block}, {rungs[0].ladder.name}**: no target was in view.", ""]
+            continue
+        lines += [
+            f"**{rungs[0].block}, {rungs[0].ladder.name}**: {quantity.name}, {quantity.unit}, against "
+            f"`{rungs[0].reference}`",
+            "",
+            "| rung | µs/target-scan | mean | p95 | max | first seen, m | s | gained | lost | fused |",
+            "|---|---|---|---|---|---|---|---|---|---|",
+            *(_line(cost) for cost in rungs if not cost.unavailable),
+            "",
+        ]
+        lines += [
+            f"Not available here: `{cost.rung}` ({cost.unavailable}).  "
+            for cost in rungs
+            if cost.unavailable
+        ]
+        lines += [
+            f"Own error of `{cost.rung}`: {cost.error_note}."
+            for cost in rungs
+            if cost.rung == cost.reference
+        ] + [""]
+    return "\n".join(lines)
+
+
+def _line(cost: Any) -> str:
+    name = f"**{cost.rung}**" if cost.pareto else cost.rung
+    error = cost.error
+    cells = [
+        name + (" (scene)" if cost.in_scene else ""),
+        f"{cost.cpu_us_per_target_scan:.3g} ± {float(f'{cost.cpu_spread_us:.1g}'):g}",
+        *(f"{value:.2g}" for value in (error.mean, error.p95, error.maximum)),
+    ]
+    for key, form in (
+        ("first_detection_range_change_m", "+,.0f"),
+        ("first_detection_time_change_s", "+.2f"),
+        ("detections_gained", "d"),
+        ("detections_lost", "d"),
+        ("fused_share", ".1%"),
+    ):
+        value = cost.effect.get(key)
+        cells.append("" if value is None else format(value, form))
+    return f"| {' | '.join(cells)} |"
+
+
+def _chain(chain: Any) -> str:
+    lines = [
+        f"{chain.picked[0].upper()}{chain.picked[1:]}. The front:",
+        "",
+        "| µs/target-scan | detections that differ | rungs |",
+        "|---|---|---|",
+    ]
+    front = [row for row in chain.rows if row["pareto"]]
+    for row in sorted(front, key=lambda row: float(row["cpu_us_per_target_scan"])):
+        share = f"{row['error_p95']:.2%}"
+        lines.append(f"| {row['cpu_us_per_target_scan']:.2f} | {share} | {row['rung']} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    with plain_ending():
+        sys.exit(main())
