@@ -65,7 +65,6 @@ class TurnOut(Component):
     Parameters = TurnOutParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

@@ -40,7 +40,6 @@ class TurnAway(Component):
     Parameters = TurnAwayParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

@@ -48,7 +48,6 @@ class Gated(Fusion):
 
     Parameters = GatedParameters
     lockstep = True
-    side_by_side = True
     ladders = (FUSION,)
 
     def window_s(self) -> Any:

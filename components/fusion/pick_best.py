@@ -39,7 +39,6 @@ class PickBest(Fusion):
 
     Parameters = PickBestParameters
     lockstep = True
-    side_by_side = True
     ladders = (FUSION,)
 
     def left_out(self) -> list[str]:

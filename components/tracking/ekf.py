@@ -11,4 +11,3 @@ class ExtendedKalman(Tracker):
     """
 
     lockstep = True
-    side_by_side = True

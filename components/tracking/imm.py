@@ -83,7 +83,6 @@ class InteractingModels(Tracker):
 
     Parameters = InteractingParameters
     lockstep = True
-    side_by_side = True
 
     def bank(self) -> FilterBank:
         """Return a filter for each model."""

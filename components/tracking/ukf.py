@@ -24,7 +24,6 @@ class Unscented(Tracker):
 
     Parameters = UnscentedParameters
     lockstep = True
-    side_by_side = True
 
     def bank(self) -> FilterBank:
         """Return the one filter."""
