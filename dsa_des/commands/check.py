@@ -59,9 +59,9 @@ def _say_if_slowed(simulation: Simulation) -> None:
     """Say which blocks keep a feedback loop from looking ahead."""
     scene = simulation.scene
     looped = in_cycles(scene.graph)
-    if not looped or not simulation.unwound:
+    if not looped or not simulation.slow:
         return
-    # A window is rewound as a whole, so a block outside of the loop counts as well.
+    # A window holds all blocks, so one outside of the loop counts as well.
     say(f"note: the feedback loop of {', '.join(sorted(looped))} runs scan by scan, which is slow:")
-    for name, why in simulation.unwound.items():
+    for name, why in simulation.slow.items():
         say(f"  {name} ({scene.classes[name].path()}) {why}")

@@ -7,6 +7,7 @@ from fractions import Fraction
 import networkx as nx
 
 from dsa_des.block.component import Component
+from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
 from dsa_des.running.node import Node
@@ -14,6 +15,9 @@ from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.timeline import ReplicaTime
+
+#: From which block to which.
+Edge = tuple[str, str]
 
 
 def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
@@ -62,6 +66,48 @@ def _optional(
     return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
 
 
+def opened_loops(scene: Scene) -> set[Edge]:
+    """Return delayed edges without which the scene has no loop, those of the longest delays.
+
+    An edge is taken out only if it closes a loop of edges that are as short or shorter: so the
+    shortest of those taken out is as long as can be.
+    """
+    looped = in_cycles(scene.graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(scene.graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    lasts = {edge: shortest_s(scene, edge) for edge in inside}
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not scene.graph.edges[edge]["delayed"])
+    opened = set()
+    delayed = [edge for edge in inside if scene.graph.edges[edge]["delayed"]]
+    for edge in sorted(delayed, key=lambda edge: (lasts[edge], edge)):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            opened.add(edge)
+    return opened
+
+
+def shortest_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the shortest delay of the wires from one block to another, s."""
+    wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
+    return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
+
+
+def _period_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the time between scans that delays on an edge count in; 0 where there are none."""
+    for name in reversed(edge):
+        block = scene.blocks[name]
+        spec = block.cls.clock_of(block.parameters)
+        if spec is not None:
+            return spec.period_s
+    return Fraction(0)
+
+
 def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
     """Return the place of each block in the order in which blocks tell each other what they offer.
 
@@ -80,29 +126,28 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
     return window_order(opened, set(graph), cut_loops(opened, classes))
 
 
-def cannot_rewind(
-    classes: Mapping[str, type[Component]], queued: Collection[str] = ()
-) -> dict[str, str]:
-    """Return the blocks that the engine cannot take back to an earlier state, and why each.
-
-    Parameters
-    ----------
-    classes : mapping
-        The class of each block.
-    queued : collection of str
-        Blocks on a shared processor.
-    """
+def _without_windows(scene: Scene) -> dict[str, str]:
+    """Return the blocks of a scene that no window of a loop can hold, and why each."""
     found = {}
-    for name, cls in sorted(classes.items()):
-        if cls.process is not None:
+    for name, block in sorted(scene.blocks.items()):
+        if block.cls.process is not None:
             found[name] = "has a process of its own"
-        elif not cls.windowed:
+        elif not block.cls.windowed:
             found[name] = "runs scan by scan (windowed is False)"
-        elif not cls.rewindable:
-            found[name] = "does not let itself be rewound (rewindable is False)"
-        elif name in queued:
+        elif block.options.processor:
             found[name] = "shares a processor"
     return found
+
+
+def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
+    """Return the blocks that send over the wires that are shorter than scans are apart."""
+    clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
+    per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
+    return {
+        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound"
+        for edge in sorted(opened)
+        if shortest_s(scene, edge) * per_s < 1
+    }
 
 
 @dataclass(frozen=True)
@@ -117,8 +162,8 @@ class Grain:
         Whether windows are run as if nothing came back, and undone if something did.
     cut_edges : set of (source, target)
         Over which something may come back.
-    unwound : dict
-        Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
+    slow : dict
+        Where loops run scan by scan: which blocks are the reason, and why each.
     queues : dict
         Shared processors that serve a window at once, and the blocks that line up at each.
     ahead : set of str
@@ -129,7 +174,7 @@ class Grain:
     windowed: set[str]
     rewinds: bool
     cut_edges: set[tuple[str, str]]
-    unwound: dict[str, str]
+    slow: dict[str, str]
     queues: dict[str, list[str]] = field(default_factory=dict)
     ahead: set[str] = field(default_factory=set)
 
@@ -139,18 +184,26 @@ class Grain:
 
 
 def grain_of(scene: Scene, window: int | None) -> Grain:
-    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`."""
-    queued = {name for name, block in scene.blocks.items() if block.options.processor}
-    unwound = cannot_rewind(scene.classes, queued)
+    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`.
+
+    Loops run in windows: as long as an open loop's, which are undone if something came back, where
+    all blocks let themselves be rewound; else no longer than what is sent takes to come back.
+    """
     if window == 1:
-        return Grain(set(), False, set(), unwound)
-    if not unwound and in_cycles(scene.graph):
-        return Grain(
-            set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound,
-            ahead=before_loops(scene.graph),
-        )  # fmt: skip
+        return Grain(set(), False, set(), {})
+    slow: dict[str, str] = {}
+    if in_cycles(scene.graph):
+        slow, opened, every = _without_windows(scene), opened_loops(scene), set(scene.blocks)
+        # Who looks ahead of a run's end must not fail there.
+        ending = any(ends_its_run(cls) for cls in scene.classes.values())
+        ahead = before_loops(scene.graph)
+        if not slow and all(cls.rewindable for cls in scene.classes.values()):
+            return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
+        slow = slow or _hurried(scene, opened)
+        if not slow:
+            return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
-    return Grain(scene.look_ahead_blocks(), False, set(), unwound, queues)
+    return Grain(scene.look_ahead_blocks(), False, set(), slow, queues)
 
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.

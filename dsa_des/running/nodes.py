@@ -1,7 +1,7 @@
 """From the blocks and wires of a scene to running blocks with channels between them."""
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import simpy
 
@@ -10,7 +10,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.running.events import RunState
-from dsa_des.running.grain import Grain
+from dsa_des.running.grain import Edge, Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
@@ -163,6 +163,20 @@ def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> lis
                 seen.add(reached)
                 todo.append(reached)
     return [found[key] for key in sorted(found)]
+
+
+def lookahead_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
+    """Return how long what is sent takes at least over some edges, or None without any."""
+    return min(
+        (
+            channel.delay_ticks
+            for name, node in nodes.items()
+            for channels in node.channels.values()
+            for channel in channels
+            if (channel.source, name) in opened
+        ),
+        default=None,
+    )
 
 
 def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:

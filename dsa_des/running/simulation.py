@@ -26,7 +26,13 @@ from dsa_des.running.assembly import Assembly, WrapEffect
 from dsa_des.running.effects import Planned, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.node import Abort
-from dsa_des.running.nodes import build_nodes, check_reach, connect, start_processors
+from dsa_des.running.nodes import (
+    build_nodes,
+    check_reach,
+    connect,
+    lookahead_ticks,
+    start_processors,
+)
 from dsa_des.running.processors import Processing
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Failure, Rewinder, RunningBlock, Window, Windows
@@ -128,8 +134,8 @@ class Simulation:
         self.failure: Failure | None = None
         self._has_run = False
         grain = self.timeline.grain(window)
-        #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
-        self.unwound = grain.unwound
+        #: Where loops run scan by scan: which blocks are the reason, and why each.
+        self.slow = grain.slow
         assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
         self.components: Mapping[str, Component] = assembly.components
         self.duration_s: Fraction = assembly.duration_s
@@ -154,7 +160,9 @@ class Simulation:
             rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace, self.ends)
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
-        self.windows: Windows = self.timeline.windows(longest, rewinder)
+        self.windows: Windows = self.timeline.windows(
+            longest, lookahead_ticks(self.nodes, grain.cut_edges), rewinder
+        )
 
     @property
     def timing_plan(self) -> list[Planned]:

@@ -127,6 +127,38 @@ _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
+class SureWindows(EqualWindows):
+    """Windows of a loop in which nothing that is sent comes back.
+
+    Blocks before the loops run ahead of them, in windows of full length. The length is the
+    lookahead of conservative parallel simulation (Chandy and Misra, "Distributed simulation: a
+    case study in design and verification of distributed programs", IEEE Transactions on Software
+    Engineering SE-5, 1979).
+
+    Parameters
+    ----------
+    end_tick, longest_ticks
+        As for `EqualWindows`.
+    lookahead_ticks : int
+        The shortest delay over which something comes back.
+    """
+
+    def __init__(self, end_tick: int, longest_ticks: int, lookahead_ticks: int) -> None:
+        super().__init__(end_tick, longest_ticks)
+        self._lookahead = lookahead_ticks
+        self._ahead = 0  # up to when blocks before the loops have run
+
+    def next(self) -> Window | None:
+        """Return the next window, which does not reach beyond what is there of those before."""
+        if self.start >= self.end_tick:
+            return None
+        ahead = self.start
+        if self._ahead <= self.start:
+            ahead = self._ahead = self.end_after(self.longest_ticks)
+        end = self.end_after(min(self.longest_ticks, self._lookahead))
+        return Window(self.start, min(end, self._ahead), False, ahead)
+
+
 class Rewinder:
     """Takes all blocks, wires and the record of a run back to how they were.
 
