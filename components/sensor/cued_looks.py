@@ -10,8 +10,7 @@ from components.estimation.measurement import axis_in_body
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
-from components.sensor.believed_pose import believed_pose
-from components.sensor.sensor import Sensor
+from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.ports import Input
