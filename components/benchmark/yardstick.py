@@ -22,7 +22,7 @@ from components.geometry.ellipsoid import (
     FLATTENING,
     SEMI_MAJOR_AXIS_M,
 )
-from components.radar.threshold import detection_threshold
+from components.radar.detection.threshold import detection_threshold
 from dsa_des.running.simulation import Simulation
 
 Position = tuple[float, float, float, float]

@@ -23,7 +23,7 @@ from components.metrics.rows import (
     sensors_of,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
-from components.sensor.cut_off import END, START, in_scan, said
+from components.sensor.censored import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Parameters

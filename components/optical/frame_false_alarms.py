@@ -8,7 +8,7 @@ from components.geometry.field_of_view import sector_width_rad
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.optical.detection import false_alarm_direction, false_alarm_signature
-from components.radar.false_alarms import false_alarm_count
+from components.radar.detection.output import false_alarm_count
 from dsa_des.block.effect import Effect, Verdict
 
 MOST_PER_FRAME = 1e5

@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.cue_cone import axis_in_body
-from components.estimation.frame import place_in_frame
+from components.estimation.frame import pose_in_frame
+from components.estimation.measurement import axis_in_body
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
-from components.sensor.believed_pose import believed_pose
-from components.sensor.sensor import Sensor
+from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.ports import Input
@@ -86,7 +85,7 @@ class ConesAhead:
         if not pose:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
-        place = place_in_frame(
+        place = pose_in_frame(
             tuple(getattr(cones, name)[entry] for name in _ORIGIN), tuple(own[:3]), tuple(own[3:])
         )
         axis = axis_in_body(

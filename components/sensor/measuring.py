@@ -6,8 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from components.messages.reach import Reach
-from components.sensor.constant_columns import constant_column
-from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
+from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -25,7 +25,7 @@ from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_of
 from components.metrics.true_states import states_in_frame
 from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary
-from components.radar.range_boundary import RangeBoundary as RadarBoundary
+from components.radar.radar import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.recording import Recorder

@@ -8,10 +8,9 @@ import pytest
 from test_alerting_keys import CONF, TARGET, entry_s, truth
 from wired import HEARS_ALL, chain, rows, run
 
+from components.alerting.believed_tracks import EstimatedFlights
 from components.alerting.daidalus import DaidalusAlerting
-from components.alerting.estimated_flights import EstimatedFlights
-from components.alerting.memory import MemoryRule
-from components.alerting.track_memory import TrackMemory
+from components.alerting.memory import LevelMemory, MemoryRule
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, TENTATIVE, StateTracks
 
 SIGMA_M = 25.0
@@ -161,7 +160,7 @@ def two(one, other):
 
 def test_tracks_are_remembered_by_run_and_number():
     """Two levels, of which the second counts a while longer once it was on."""
-    memory = TrackMemory(MemoryRule(hysteresis_s=4.0, persistence_s=0.0, m=0, n=0))
+    memory = LevelMemory(MemoryRule(hysteresis_s=4.0, persistence_s=0.0, m=0, n=0))
 
     def levels(runs, numbers, now_s, due, early):
         due, early = (np.array(part, dtype=bool)[:, np.newaxis] for part in (due, early))

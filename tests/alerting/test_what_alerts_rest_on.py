@@ -11,10 +11,10 @@ from test_alerts_of_estimates import PLAIN, scene
 from wired import rows, run
 
 from components.alert_configuration.conf_file import read_conf
+from components.alerting.believed_tracks import EstimatedFlights
 from components.alerting.daidalus import DaidalusAlerting
-from components.alerting.estimated_flights import EstimatedFlights
 from components.messages.state_tracks import COVARIANCE
-from components.well_clear.uncertainty import Bounds, uncertain_violation_span
+from components.well_clear.detection import Bounds, uncertain_violation_span
 from components.well_clear.volume import Volume
 
 #: No two scores are alike, and a part of the velocity's counts at the distance of the targets.

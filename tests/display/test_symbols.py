@@ -12,7 +12,7 @@ from components.fusion.gated import Gated
 from components.optical.eo import ElectroOptical
 from components.optical.ir import Infrared
 from components.optical.projection import Projection
-from components.radar.range_boundary import RangeBoundary
+from components.radar.radar import RangeBoundary
 from components.radar.swerling import SwerlingRadar
 from components.sensor import marks
 from components.tracking.stub import TrackerStub

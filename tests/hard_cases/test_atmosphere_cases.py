@@ -14,9 +14,9 @@ from components.atmosphere.slant_path import one_way_attenuation_db
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
 from components.navigation.error_model import position_with_error
-from components.radar.beam_sweep import illumination_offset_s
-from components.radar.clutter import clutter_detection_probability
-from components.radar.false_alarms import false_alarm_count
+from components.radar.beam import illumination_offset_s
+from components.radar.detection.clutter import clutter_detection_probability
+from components.radar.detection.output import false_alarm_count
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 
 

@@ -13,7 +13,7 @@ from components.optical.signature import (
     total_signature,
 )
 from components.optical.silhouette import visible_area
-from components.sensor.resolution import round_to_grid
+from components.sensor.grid import round_to_grid
 
 PI = np.pi
 DEG = np.pi / 180.0

@@ -14,7 +14,7 @@ from test_mitigated_metric import scene as closed_loop
 from test_severity_metric import encounter as severity
 from wired import HEARS_ALL, chain, measured, rows, run
 
-from components.well_clear.collision_probability import collision_probability
+from components.well_clear.severity import collision_probability
 
 SIZES_OF_ALERTS = {
     "metric": "alert_times", "horizontal_m": 500, "vertical_m": 150, "nmac_horizontal_m": 300,

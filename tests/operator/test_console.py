@@ -11,8 +11,8 @@ from wired import rows, run
 
 import dsa_des
 from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, OperatorDecision
-from components.operator.decision_table import read_decisions
-from components.operator.desk import MOST_WAITING, Desk, Laid
+from components.operator.human import MOST_WAITING, Desk, Laid
+from components.operator.recorded import read_decisions
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step

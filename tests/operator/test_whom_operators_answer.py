@@ -9,7 +9,7 @@ from test_avoidance_by_bands import scene as by_bands
 from test_operator import scene as stochastic
 from wired import rows, run
 
-from components.guidance.way_out import changes_out
+from components.guidance.daidalus import changes_out
 
 
 def test_each_decision_answers_the_alert_of_its_own_target(tmp_path):
@@ -112,7 +112,7 @@ def test_an_avoidance_flies_at_the_rates_of_its_configuration(tmp_path):
 
 def test_ways_out_of_many_instants_are_those_of_each(tmp_path, monkeypatch):
     """A climbing ownship has other altitudes at every instant, a turning one other directions."""
-    from components.avoidance import daidalus
+    import components.avoidance as daidalus
 
     kept = []
     monkeypatch.setattr(daidalus, "changes_out", lambda *given: kept.append(given) or

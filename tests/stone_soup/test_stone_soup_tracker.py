@@ -15,7 +15,7 @@ from covering import covers
 from wired import chain, rows, run
 
 import dsa_des
-from components.tracking.stone_soup import StoneSoupTracker
+from components.stone_soup.tracker import StoneSoupTracker
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -232,7 +232,7 @@ def test_what_is_wrong_is_said(tmp_path, monkeypatch):
 
 
 def test_the_extra_is_imported_only_where_it_is_used():
-    program = "import sys, components.tracking.stone_soup, components.export as e; e.stone_soup; "
+    program = "import sys, components.stone_soup.tracker, components.export as e; e.stone_soup; "
     program += "assert not [m for m in sys.modules if m.startswith('stonesoup')]"
     subprocess.run([sys.executable, "-P", "-c", program], check=True, cwd=PAGE.parents[1])
 

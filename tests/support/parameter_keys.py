@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
-from dsa_des.commands.scene_tables import scene_tables
+from dsa_des.commands.parameters import scene_tables
 from dsa_des.studies.metric import METRICS, find_metric
 
 

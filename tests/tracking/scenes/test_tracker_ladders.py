@@ -7,10 +7,9 @@ import pytest
 from wired import chain
 
 import dsa_des
-from components.track_fusion.ladder import RULE
+from components.track_fusion.covariance_intersection import RULE
 from components.tracking.ladder import FILTER, LADDERS, LATENESS
-from dsa_des.costs.differences import errors_against, own_errors, values_of
-from dsa_des.costs.replay import run_rung
+from dsa_des.costs.replay import errors_against, own_errors, run_rung, values_of
 
 RADAR = {
     "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
