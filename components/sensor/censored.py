@@ -16,30 +16,15 @@ NEVER = "never"
 
 
 def in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
-    """Return whether something is in a scan at an end of the run, or where it must follow from it.
-
-    Parameters
-    ----------
-    time, scan : number or (n,)
-        When it is, and when the first (last) scan is that can tell; ticks or seconds. NaN where
-        there is none.
-    """
+    """Return whether a time (NaN for none) is that of the first (last) scan that can tell."""
     return np.equal(time, scan)
 
 
 def said(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
     """Return what a study's column says of values: ``at the start``, ``never`` or nothing.
 
-    Parameters
-    ----------
-    at : (n,) of str
-        Where each is cut off; empty where it is not.
-    values : (n,), optional
-        NaN where it did not happen, if that is worth saying.
-
-    Returns
-    -------
-    (n,) of str or None
+    `at` is where each is cut off, empty where it is not; values are NaN where it did not happen, if
+    that is worth saying.
     """
     found = np.array([f"at {where}" if where else None for where in at.tolist()], dtype=object)
     if values is not None:

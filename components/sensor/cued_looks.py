@@ -26,7 +26,6 @@ class CuedLooks(Effect):
     """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
 
     lockstep = True
-    side_by_side = True
     name = "cues"
     acts_on = "cue"
 
@@ -50,20 +49,7 @@ class ConesAhead:
         self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
-        """Return which targets lie in a cone at each scan, (scans, targets); None for none at all.
-
-        Parameters
-        ----------
-        targets : RelativeTargets
-        rows : (scans,)
-            Row of `targets` at each scan.
-        wake : Wake
-
-        Raises
-        ------
-        ValueError
-            If the targets came without the ownship's pose.
-        """
+        """Return which targets lie in a cone at each scan, (scans, targets), or None for none."""
         self._cones = None
         held = wake.held(PORT)
         if held is None:
@@ -125,14 +111,7 @@ class ConesAhead:
     def in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
-        """Return which directions in body axes lie in a cone of their scan.
-
-        Parameters
-        ----------
-        row : (n,) of int
-            Which of the scans of the last call.
-        azimuth_rad, elevation_rad : (n,)
-        """
+        """Return which directions in body axes lie in a cone of their row in the last call."""
         inside = np.zeros(len(row), dtype=bool)
         if self._cones is None:
             return inside

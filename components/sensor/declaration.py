@@ -22,13 +22,7 @@ if TYPE_CHECKING:
 
 
 def no_looks_yet(n: int, targets: int) -> BoolArray:
-    """Return the memory before the first look: shape (targets, n - 1), all misses.
-
-    Raises
-    ------
-    ValueError
-        If `n` is not a whole number from 1 on, or `targets` is negative.
-    """
+    """Return the memory before the first look: shape (targets, n - 1), all misses."""
     _checked_rule(1, n)
     if targets < 0:
         raise ValueError(f"targets is {targets}: it must be 0 or more")
@@ -38,26 +32,10 @@ def no_looks_yet(n: int, targets: int) -> BoolArray:
 def declare(detected: ArrayLike, m: int, n: int, memory: BoolArray) -> tuple[BoolArray, BoolArray]:
     """Say at which looks targets are declared, when every target is looked at in every scan.
 
-    Parameters
-    ----------
-    detected : (scans, targets) array_like of bool
-        Whether a target was detected in a scan; scans in order of time.
-    m, n : int
-        A target is declared at a look if m or more of the last n looks (this one included)
-        detected it, 1 <= m <= n.
-    memory : (targets, n - 1) array of bool
-        The looks before, oldest first; `no_looks_yet`, or what the last call returned.
-
-    Returns
-    -------
-    declared : (scans, targets) array of bool
-    memory : (targets, n - 1) array of bool
-        To hand in with the next scans: any division into calls gives the same declarations.
-
-    Raises
-    ------
-    ValueError
-        If m or n is out of range or the shapes do not fit.
+    `detected` is (scans, targets) in order of time. A target is declared at a look if m or more of
+    the last n looks, this one included, detected it. The memory (targets, n - 1), oldest look
+    first, is `no_looks_yet` or what the last call returned beside the declarations: any division
+    into calls gives the same ones.
     """
     looks = np.asarray(detected, dtype=bool)
     if looks.ndim != 2:
@@ -73,26 +51,8 @@ def declare_looks(
 ) -> tuple[BoolArray, BoolArray]:
     """Say at which looks targets are declared, when not every scan looks at every target.
 
-    Only looks count: a scan that did not look at a target neither helps nor ages its detections.
-
-    Parameters
-    ----------
-    target : (looks,) array_like of int
-        Number of the target of each look, 0 to targets - 1.
-    detected : (looks,) array_like of bool
-        Each target's looks in order of time.
-    m, n, memory
-        As for `declare`.
-
-    Returns
-    -------
-    declared : (looks,) array of bool
-    memory : (targets, n - 1) array of bool
-
-    Raises
-    ------
-    ValueError
-        If m or n is out of range, the shapes do not fit or a target is outside the memory.
+    Only looks count, each target's in order of time: a scan that did not look at a target neither
+    helps nor ages its detections. The memory is that of `declare`.
     """
     _checked_rule(m, n)
     past = np.asarray(memory, dtype=bool)
@@ -157,14 +117,10 @@ class DeclarationRule(Effect):
 
 
 class Declarations:
-    """Remembers each target's last looks and when it was first declared.
+    """Remembers each target's last n looks and when it was first declared.
 
     A look is a scan that had the target in reach: a scan that skipped it neither helps nor counts
     as a miss.
-
-    Parameters
-    ----------
-    m, n : int
     """
 
     def __init__(self, m: int, n: int) -> None:
@@ -222,17 +178,8 @@ _MOST_PAIRS = 2_000_000
 class SeenPlaces:
     """Detections as a rule of declaration by place sees them, ascending in scan.
 
-    Parameters
-    ----------
-    scan : (n,) of int
-    time_s : (n,)
-        When each was measured.
-    direction : (n, 3)
-        Unit vectors in one frame.
-    range_m : (n,)
-        NaN where none is measured.
-    angle_variance_rad2, range_variance_m2 : (n,)
-        NaN counts as 0.
+    `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
+    NaN where none is measured, and a variance of NaN counts as 0.
     """
 
     scan: IntArray
@@ -260,25 +207,10 @@ def scans_with_company(
 ) -> IntArray:
     """Return in how many of the last n scans, its own included, there was a detection at its place.
 
-    Parameters
-    ----------
-    places : SeenPlaces
-        All detections of those scans.
-    asked : (k,) of int
-        Entries that are asked about.
-    n : int
-    speed_m_s, rate_rad_s : float
-        How fast a target may come nearer or move away, and move across the line of sight.
-
-    Returns
-    -------
-    (k,) array of int
-        1 to n.
-
-    Notes
-    -----
-    Two detections have one place where direction and, if both have one, range differ by no more
-    than a target may have moved between them, and three standard deviations of their difference.
+    Of the entries that are `asked` about, 1 to n each. Two detections have one place where
+    direction and, if both have one, range differ by no more than a target may have moved between
+    them (`speed_m_s` along the line of sight, `rate_rad_s` across it), and three standard
+    deviations of their difference.
     """
     count = np.ones(len(asked), dtype=np.int64)
     if len(places) == 0:
@@ -349,12 +281,7 @@ class DeclarationByPlace(Effect):
 
 
 class DeclaredPlaces:
-    """Remembers the last scans' detections, and when each target was first declared.
-
-    Parameters
-    ----------
-    block : Sensor
-    """
+    """Remembers the last scans' detections, and when each target was first declared."""
 
     def __init__(self, block: Any) -> None:
         p = block.p

@@ -35,42 +35,20 @@ def round_to_grid(
     limit_low: ArrayLike | None = None,
     limit_high: ArrayLike | None = None,
 ) -> Any:
-    """Round to the nearest multiple of `step`, ties to the even multiple.
+    """Round to the nearest multiple of `step` (0: no rounding), ties to the even multiple.
 
-    The decision is exact for the doubles given: which of two grid points is nearer follows from
-    the exact remainder (fmod), not from value / step, whose own rounding can move a value across a
-    cell edge. Exactly half-way means that 2·value is an odd multiple of `step` as doubles; then
-    the even multiple is taken. The result is that multiple, rounded once. Rounding is symmetric
-    about 0: the grid of -value is minus the grid of value, and 0 is never negative. Values of more
-    than 2^50 steps or beyond 1e300 are returned as they are.
+    The decision is exact for the doubles given: which of two grid points is nearer follows from the
+    exact remainder (fmod), not from value / step, whose own rounding can move a value across a cell
+    edge. Exactly half-way means that 2·value is an odd multiple of `step` as doubles; then the even
+    multiple is taken. The result is that multiple, rounded once. Rounding is symmetric about 0: the
+    grid of -value is minus the grid of value, and 0 is never negative. Values of more than 2^50
+    steps or beyond 1e300 are returned as they are.
 
     With limits (the edges of the field of view) a grid point beyond a limit is replaced by the
     outermost one inside, so a report never leaves the field of view; a limit within 4 last places
     of a grid point counts as that grid point, and the report is then the limit itself if the grid
-    point would stick out. Angles that wrap are the caller's to wrap, before and after.
-
-    Parameters
-    ----------
-    value : array_like
-        Anything with a unit; `step` and the limits carry the same one.
-    step : array_like
-        Spacing of the grid; 0 means no rounding (the limits still hold).
-    limit_low, limit_high : array_like, optional
-        Smallest and largest value that may be reported.
-
-    Returns
-    -------
-    array of the broadcast shape, in the unit of `value`
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, the step is negative, the limits are in the wrong order, or
-        no grid point lies between them.
-
-    Notes
-    -----
-    Thesis §3.5.1: the vector is rounded to the nearest point in the resolution grid.
+    point would stick out. Angles that wrap are the caller's to wrap, before and after. Thesis
+    §3.5.1: the vector is rounded to the nearest point in the resolution grid.
     """
     values = _finite("value", value)
     steps = _finite("step", step)
@@ -100,20 +78,7 @@ def round_to_grid(
 
 
 class Grid:
-    """The grid of one quantity that a sensor reports, made once and used at every scan.
-
-    Parameters
-    ----------
-    step : float
-        Spacing; 0 means no rounding (the limits still hold).
-    limit_low, limit_high : float, optional
-        Smallest and largest value that may be reported.
-
-    Raises
-    ------
-    ValueError
-        As `round_to_grid`.
-    """
+    """The grid of one quantity that a sensor reports, made once and used at every scan."""
 
     def __init__(
         self, step: float, *, limit_low: float | None = None, limit_high: float | None = None
@@ -127,13 +92,7 @@ class Grid:
         self._highest = None if high is None else float(high)
 
     def round(self, values: FloatArray) -> FloatArray:
-        """Round finite values, bit for bit as `round_to_grid` does.
-
-        Parameters
-        ----------
-        values : ndarray
-            In the unit of the step; not checked.
-        """
+        """Round finite values, bit for bit as `round_to_grid` does; they are not checked."""
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
@@ -241,18 +200,7 @@ _SMALLEST = 64
 
 
 def constant_column(value: float, count: int) -> FloatArray:
-    """Return a read-only array of shape (count,) that holds one value.
-
-    Parameters
-    ----------
-    value : float
-    count : int
-
-    Returns
-    -------
-    (count,) array
-        It must not be written to: others hold it too.
-    """
+    """Return a read-only column that holds one value; others hold it too."""
     size = _SMALLEST if count <= _SMALLEST else 1 << (count - 1).bit_length()
     return _whole(value, size)[:count]
 
@@ -286,15 +234,9 @@ def variance_of_step(step: float) -> float:
 
 
 class SensorGrid:
-    """The grid of what a sensor measures, within its field of view.
+    """The grid of what a sensor measures, within its field of view in its own axes.
 
-    Parameters
-    ----------
-    azimuth_field_rad, elevation_field_rad : (first, last)
-        Field of view in the sensor's axes, azimuth clockwise from the first.
-    steps : mapping
-        Of ``azimuth`` and ``elevation`` (rad), and of ``range`` (m) and ``range_rate`` (m/s) where
-        they are measured.
+    Steps of azimuth and elevation are in rad, those of range in m and of range rate in m/s.
     """
 
     def __init__(
@@ -314,13 +256,7 @@ class SensorGrid:
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight to the grid and the field of view (thesis §3.5.1).
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : arrays
-            Range is NaN where none is measured.
-        """
+        """Round a line of sight to the grid and the field of view (§3.5.1); range may be NaN."""
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:

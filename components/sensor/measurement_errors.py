@@ -31,18 +31,9 @@ def mean_square(stated: StatedError, drawn_bias: bool) -> float:
 
 
 class QuantityError:
-    """Draws the errors of one quantity.
+    """Draws the errors of one quantity, in its own unit.
 
-    Parameters
-    ----------
-    stated : StatedError
-        In the quantity's own unit.
-    drawn_bias : bool
-        Whether the bias is drawn for each run, uniformly between minus and plus the stated one.
-    stream : callable
-        Gives the keyed draws of a purpose.
-    name : str
-        The quantity's.
+    A drawn bias is uniform between minus and plus the stated one, once for each run.
     """
 
     def __init__(
@@ -63,20 +54,7 @@ class QuantityError:
         replica: IntArray,
         variance: FloatArray | None = None,
     ) -> FloatArray:
-        """Return the errors of looks.
-
-        Parameters
-        ----------
-        keys : (n,) array of uint64
-            Of the targets.
-        scan, instant_ns, replica : (n,) of int
-        variance : (n,), optional
-            Of what the signal adds at each look.
-
-        Returns
-        -------
-        (n,) array
-        """
+        """Return the errors of looks; `variance` is of what the signal adds at each."""
         error = self._bias_of(replica) if self._bias else np.zeros(len(scan))
         if self._lasting is not None:
             error = error + self._deviation * self._lasting(keys, instant_ns, replica=replica)
@@ -121,12 +99,7 @@ class MeasurementErrors(Effect):
 
 
 class Erring:
-    """Measures with errors; called in place of the sensor's grid.
-
-    Parameters
-    ----------
-    block : Sensor
-    """
+    """Measures with errors; called in place of the sensor's grid."""
 
     def __init__(self, block: Any) -> None:
         p = block.p
@@ -149,16 +122,9 @@ class Erring:
     def __call__(
         self, cells: Cells, found: IntArray, look: Look, true: Mapping[str, FloatArray]
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-        """Return what is measured of some cells, and its variances by column.
+        """Return what is measured of some cells (`found`), and its variances by column.
 
-        Parameters
-        ----------
-        cells : Cells
-        found : (n,) of int
-            Those that are detected.
-        look : Look
-        true : mapping of (n,)
-            The truth by quantity, in the sensor's axes.
+        `true` is the truth by quantity, in the sensor's axes.
         """
         signal = {name: all_[found] for name, all_ in look.signal.items()}
         of_signal = self._of_signal(signal)
@@ -212,10 +178,7 @@ class Erring:
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Return how something that is not there is reported: as what is there would be.
 
-        Parameters
-        ----------
-        where, signal : mappings of (n,)
-        drawn : (keys, scan, instant_ns, replica) or None
+        `drawn` holds keys, scan, instant and replica by which errors are drawn, or is None.
         """
         of_signal = self._of_signal(signal)
         if drawn is not None:
@@ -276,28 +239,14 @@ class Erring:
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return the variances that all detections of a sensor share, by column; none by signal.
-
-    Parameters
-    ----------
-    p : ErrorParameters
-    steps : mapping
-        Grid step of each measured quantity.
-    """
+    """Return the variances that all detections of a sensor share, by column; none by signal."""
     if p.errors == "signal":
         return {}
     return {VARIANCE_OF[name]: v for name, v in _mean_squares(p, _steps(p, steps)).items()}
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
-    """Return what of a sensor's errors lasts from look to look, by quantity.
-
-    Parameters
-    ----------
-    p : ErrorParameters
-    steps : mapping
-        Grid step of each measured quantity.
-    """
+    """Return what of a sensor's errors lasts from look to look, by quantity."""
     found = {}
     for name, step in _steps(p, steps).items():
         stated = _stated(p, name)

@@ -22,14 +22,8 @@ CorrelationTime = Annotated[float, Field(gt=0, le=LONGEST_S)]
 class StatedError:
     """What a scene states of the error of one measured quantity; in the scene's unit.
 
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation of what changes from look to look.
-    bias : float
-        What stays the same throughout a run, or the largest it may be.
-    correlation_time_s : float or None
-        How long the changing part lasts; None for an error that is new at every look.
+    The deviation is of what changes from look to look, for a correlation time (None where it is new
+    at every look); the bias stays throughout a run, or is the largest that may.
     """
 
     deviation: float

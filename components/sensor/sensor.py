@@ -84,19 +84,7 @@ _BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 
 
 def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
-    """Return the ownship's believed pose at each scan, by field of `Detections`.
-
-    Parameters
-    ----------
-    targets : RelativeTargets
-    rows : (scans,) of int
-        Row of `targets` at each scan.
-
-    Returns
-    -------
-    dict of (scans,) arrays
-        Empty where the targets came without a belief.
-    """
+    """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
     believed = targets.believed
     if believed is None:
         return {}
