@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.alert_configuration.configuration import Configuration
-from components.alerting.bands_over_time import BandsOverTime, bands_over_time
+from components.alerting.alert_tables import BandsOverTime, bands_over_time
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.well_clear.volume import NAUTICAL_MILE_M, Volume

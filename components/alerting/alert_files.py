@@ -10,8 +10,7 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_figure import draw_alerts
-from components.alerting.alert_table import alert_table, without_memory
-from components.alerting.bands_over_time import bands_table
+from components.alerting.alert_tables import alert_table, bands_table, without_memory
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.traffic.traffic_file import TrafficFileError

@@ -1,4 +1,4 @@
-"""What an alerting logic remembers of its targets: hysteresis, m of n, persistence."""
+"""Memory of alert levels: hysteresis, M-of-N, persistence, of one run or of many."""
 
 from dataclasses import dataclass
 
@@ -116,14 +116,6 @@ class AlertMemory:
         self._last_s = np.where(present, now_s, self._last_s)
         return level
 
-    def levels(
-        self, times_s: FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
-    ) -> IntArray:
-        """Take in some instants in order and return all levels, (instants * targets,)."""
-        rows = enumerate(times_s.tolist())
-        found = [self.step(now_s, present[i], due[i], early[i]) for i, now_s in rows]
-        return np.concatenate(found)
-
     def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
         """Return whose early alerting time counts for guidance: levels that rose before now.
 
@@ -148,3 +140,81 @@ class AlertMemory:
         on = (self._output[:, np.newaxis] == levels) & before[:, np.newaxis]
         is_due = np.where(on, early, due)
         return np.asarray((is_due * levels).max(axis=1, initial=0))
+
+
+# Numbers of targets and tracks stay below this; a key holds the run above it.
+_MOST_TRACKS = 1 << 40
+
+
+class LevelMemory:
+    """Memories of targets or tracks by run and number; who was gone for too long is new."""
+
+    def __init__(self, rule: MemoryRule) -> None:
+        self._rule = rule
+        #: Run and number of each one that is remembered, ascending, and when it was last seen.
+        self._key: IntArray = np.empty(0, dtype=np.int64)
+        self._seen_s: FloatArray = np.empty(0)
+        self._memory = AlertMemory(rule, 0)
+
+    def __len__(self) -> int:
+        """Return how many targets are remembered."""
+        return len(self._key)
+
+    def levels(
+        self,
+        run: IntArray,
+        number: IntArray,
+        now_s: FloatArray,
+        due: BoolArray,
+        early: BoolArray,
+        present: BoolArray | None = None,
+    ) -> IntArray:
+        """Take in targets (n,) at some instants, in order within a run, and return their levels.
+
+        `due` and `early` (n, levels) are as for `AlertMemory.step`; all are present by default.
+        """
+        key = run * _MOST_TRACKS + number
+        level = np.zeros(len(key), dtype=np.int64)
+        if len(key) == 0:
+            return level
+        present = np.ones(len(key), dtype=bool) if present is None else present
+        order = np.argsort(key, kind="stable")
+        begins = np.append(True, key[order][1:] != key[order][:-1])
+        place = np.empty(len(key), dtype=np.int64)
+        place[order] = self._places(key[order][begins])[np.cumsum(begins) - 1]
+        turn = np.empty(len(key), dtype=np.int64)
+        turn[order] = np.arange(len(key)) - np.flatnonzero(begins)[np.cumsum(begins) - 1]
+        turns = np.argsort(turn, kind="stable")
+        for rows in np.split(turns, np.cumsum(np.bincount(turn))[:-1]):
+            part = self._memory.take(place[rows])
+            level[rows] = part.step(now_s[rows], present[rows], due[rows], early[rows])
+            self._memory.put(place[rows], part)
+        self._seen_s[place] = now_s  # the last of each counts
+        return level
+
+    def forget(self, runs: IntArray, times_s: FloatArray) -> None:
+        """Forget who was gone for too long, given the time in some runs (ascending)."""
+        of = self._key // _MOST_TRACKS
+        last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
+        away_s = np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)
+        self._remember(np.flatnonzero(away_s <= self._rule.hysteresis_s))
+
+    def forget_before(self, run: int) -> None:
+        """Forget the runs before one."""
+        self._remember(np.flatnonzero(self._key >= run * _MOST_TRACKS))
+
+    def _remember(self, which: IntArray) -> None:
+        if len(which) < len(self._key):
+            self._key, self._seen_s = self._key[which], self._seen_s[which]
+            self._memory = self._memory.take(which)
+
+    def _places(self, keys: IntArray) -> IntArray:
+        """Return the rows of targets (keys ascending), all of them remembered from now on."""
+        if not np.isin(keys, self._key).all():
+            every = np.union1d(self._key, keys)
+            old = np.searchsorted(every, self._key)
+            memory, seen_s = AlertMemory(self._rule, len(every)), np.full(len(every), -np.inf)
+            memory.put(old, self._memory)
+            seen_s[old] = self._seen_s
+            self._key, self._seen_s, self._memory = every, seen_s, memory
+        return np.searchsorted(self._key, keys)

@@ -157,3 +157,8 @@ class OwnPoses:
             if late_sights:
                 self._old.append([getattr(self, name)[old] for name in _COLUMNS])
             self._keep(np.flatnonzero(recent))
+
+
+def run_begins(ticks: IntArray, wake: Wake) -> IntArray:
+    """Return when the runs of some instants begin."""
+    return ticks - wake.own_ticks(ticks) if wake.span_ticks else np.zeros_like(ticks)

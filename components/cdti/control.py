@@ -18,7 +18,7 @@ from components.cdti.page import (
 )
 from components.cdti.scope import Scope
 from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
-from components.operator.desk import Desk, Laid
+from components.operator.human import Desk, Laid
 from dsa_des.running.pacing import Pacer
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say

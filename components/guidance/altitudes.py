@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.guidance.situation import Detector, State, meets
-from components.well_clear.nearly import nearly_equal
-from components.well_clear.vertical_interval import Span
+from components.well_clear.relative_motion import Span, nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 

@@ -29,8 +29,8 @@ class Interval(NamedTuple):
 def same_place(one: float, other: float) -> bool:
     """Tell whether two guidance values are one place.
 
-    As `components.well_clear.nearly.nearly_equal` has it, for two numbers at a time, which arrays
-    are ten times as slow for.
+    As `nearly_equal` of `components.well_clear.relative_motion`, for two numbers at a time: arrays
+    are ten times as slow.
     """
     if one == 0.0 or other == 0.0:
         return abs(one) < _TINY and abs(other) < _TINY

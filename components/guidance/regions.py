@@ -1,4 +1,4 @@
-"""Which values lead clear of the volumes of a region, and whose volumes count."""
+"""Which manoeuvres lead clear of the volumes of each region, around all intruders."""
 
 from typing import NamedTuple
 
@@ -8,10 +8,9 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.guidance.intervals import Interval, clear_intervals
 from components.guidance.kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
-from components.well_clear.detection import some_bounds
-from components.well_clear.nearly import surely_less
+from components.well_clear.detection import Bounds, some_bounds
+from components.well_clear.relative_motion import surely_less
 from components.well_clear.tcas import TcasAdvisory
-from components.well_clear.uncertainty import Bounds
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 

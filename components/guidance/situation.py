@@ -1,18 +1,14 @@
-"""What guidance is asked about: the ownship's state, the intruders', and volumes to keep clear."""
+"""State of aircraft, and the volumes that guidance keeps them clear of."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.well_clear.cylinder import cylinder_span
-from components.well_clear.detection import detection_span
-from components.well_clear.nearly import surely_less
+from components.well_clear.detection import Bounds, detection_span
+from components.well_clear.relative_motion import Span, surely_less
 from components.well_clear.tcas import TcasAdvisory
-from components.well_clear.uncertainty import Bounds
-from components.well_clear.vertical_interval import Span
-from components.well_clear.violation import Relative
-from components.well_clear.volume import Volume
+from components.well_clear.volume import Relative, Volume, cylinder_span
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 

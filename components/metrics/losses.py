@@ -22,10 +22,8 @@ from components.traffic.closest_approach import Approaches, closest_approaches
 from components.traffic.many_flights import ManyFlights
 from components.traffic.sample_times import OwnTimes, RegularTimes, SampleTimes
 from components.traffic.trajectory import CELLS_AT_ONCE
-from components.well_clear.curved_flights import first_inside_cylinder
-from components.well_clear.cylinder import inside_cylinder
-from components.well_clear.violation import violation_span
-from components.well_clear.volume import Volume
+from components.well_clear.separation import first_inside_cylinder
+from components.well_clear.volume import Volume, inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -129,7 +127,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     """Return when targets first are within each (horizontal, vertical), s, (flights, limits).
 
     NaN where a target never is. Flights that look between samples are asked by
-    `components.well_clear.curved_flights`, with its error bound; others at their times only.
+    `components.well_clear.separation`, with its error bound; others at their times only.
     """
     found = np.full((len(flights), len(limits_m)), np.nan)
     between = [number for number, flight in enumerate(flights) if flight.between_samples]

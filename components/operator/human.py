@@ -1,14 +1,191 @@
-"""A person at the console (``operator.human``), while ``dsa-des cdti`` runs the scene."""
+"""Consoles of operators, and a person at one (``operator.human``) under ``dsa-des cdti``."""
 
-from collections.abc import Sequence
-from typing import Literal
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, ClassVar, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field
 
-from components.messages.decisions import OperatorDecision
-from components.operator.console import Console, ConsoleParameters
-from components.operator.desk import Desk
-from dsa_des.block.wake import Wake
+from components.messages.alerts import AlertLevels, contact_name
+from components.messages.decisions import CLIMB, TURN, Decisions, OperatorDecision
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
+from dsa_des.block.component import ClockedParameters, Component, PositiveRational
+from dsa_des.block.message import Message
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Arrivals, Wake
+
+#: What the ownship may be told at once, and below what there is nothing to fly.
+MOST_TURN_RAD, MOST_CLIMB_M = math.pi, 3000.0
+_LEAST_TURN_RAD, _LEAST_CLIMB_M = 1e-4, 0.01
+
+
+class ConsoleParameters(ClockedParameters):
+    """Parameters of a console."""
+
+    scan_rate_hz: PositiveRational = Field(
+        default=Fraction(50), description="How often decisions are taken in, 1/s."
+    )
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
+    vertical_rate_mps: float = Field(
+        default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
+    )
+
+
+class _Alert(NamedTuple):
+    """An alert as the operator has it: its level, and the tick at which it came."""
+
+    level: int
+    tick: int
+
+
+class Console(Component):
+    """Turns decisions into messages; subclasses say which decisions there are."""
+
+    inputs = {"alerts": Input(AlertLevels, "queued", "The alert level of each target.")}
+    outputs = {
+        "decisions": Output(Decisions, "What the operator decided."),
+        "manoeuvres": Output(Manoeuvres, "What the ownship is told to fly."),
+    }
+    Parameters: ClassVar[Any] = ConsoleParameters
+
+    def setup(self) -> None:
+        """Start without an alert."""
+        self._alerts: dict[str, _Alert] = {}
+        self._targets: tuple[str, ...] = ()
+
+    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
+        """Return the decisions that come at the scans of a wake, with their ticks, in order."""
+        raise NotImplementedError
+
+    def run(self, wake: Wake) -> Mapping[str, Message] | None:
+        """Send what was decided."""
+        came = list(wake.arrivals("alerts"))
+        place = 0
+        made = []
+        for tick, decision in self.due(wake):
+            place = self._take_alerts(came, place, tick)
+            made.append((tick, decision, self._alerts.get(decision.target)))
+        self._take_alerts(came, place, None)
+        return self._messages(made) if made else None
+
+    def _take_alerts(self, came: list[Arrivals], row: int, until: int | None) -> int:
+        """Take in alerts from a row on that have come by an instant; return the next row."""
+        for arrived in came:  # one wire
+            alerts: AlertLevels = arrived.message
+            rows = len(alerts)
+            if until is not None:
+                rows = int(np.searchsorted(arrived.tick, until, side="right"))
+            for place in range(row, rows):
+                entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
+                self._alerts = self._after(alerts, entries, int(arrived.tick[place]))
+            row = max(row, rows)
+        return row
+
+    def _after(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
+        """Return the alerts that are on once a row of levels has come."""
+        now = {}
+        level, contacts = alerts.level[entries], alerts.contacts()[entries]
+        for place in np.flatnonzero(level > 0).tolist():
+            name = contact_name(alerts.roster.names, int(contacts[place])) or ""
+            began = self._alerts.get(name)
+            now[name] = _Alert(int(level[place]), tick if began is None else began.tick)
+        return now
+
+    def _messages(
+        self, made: list[tuple[int, OperatorDecision, _Alert | None]]
+    ) -> dict[str, Message]:
+        per_s = self.context.ticks_per_s
+        known = dict.fromkeys([*self._targets, *(d.target for _, d, _ in made if d.target)])
+        self._targets = tuple(known)
+        code = {name: place for place, name in enumerate(self._targets)}
+        ticks = np.array([tick for tick, _, _ in made], dtype=np.int64)
+        began = np.array([math.nan if a is None else a.tick / per_s for _, _, a in made])
+        decisions = Decisions(
+            ticks,
+            np.array([d.kind for _, d, _ in made], dtype=np.int64),
+            np.array([code.get(d.target, -1) for _, d, _ in made], dtype=np.int64),
+            np.array([d.turn_rad for _, d, _ in made]),
+            np.array([d.climb_m for _, d, _ in made]),
+            np.array([0 if a is None else a.level for _, _, a in made], dtype=np.int64),
+            began,
+            ticks / per_s - began,
+            np.array([d.wall_time_s for _, d, _ in made]),
+            self._targets,
+        )
+        told = [(tick, self._told(d)) for tick, d, _ in made if _is_flown(d)]
+        if not told:
+            return {"decisions": decisions}
+        manoeuvres = Manoeuvres.of([tick for tick, _ in told], [one for _, one in told])
+        return {"decisions": decisions, "manoeuvres": manoeuvres}
+
+    def _told(self, decision: OperatorDecision) -> Manoeuvre:
+        if decision.kind == TURN:
+            rate_rad_s = math.radians(self.p.turn_rate_deg_s)
+            return Manoeuvre(turn_rad=decision.turn_rad, rate_rad_s=rate_rad_s)
+        return Manoeuvre(climb_m=decision.climb_m, climb_rate_mps=self.p.vertical_rate_mps)
+
+
+def _is_flown(decision: OperatorDecision) -> bool:
+    if decision.kind == TURN:
+        return abs(decision.turn_rad) >= _LEAST_TURN_RAD
+    return decision.kind == CLIMB and abs(decision.climb_m) >= _LEAST_CLIMB_M
+
+
+#: A person does not decide so often between two scans; who floods the desk is refused.
+MOST_WAITING = 32
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A decision on the desk, and who is told when it was taken in.
+
+    Parameters
+    ----------
+    decision : OperatorDecision
+    taken : callable
+        Called with the simulated time, s, from the thread of the simulation.
+    """
+
+    decision: OperatorDecision
+    taken: Callable[[float], None]
+
+
+class Desk:
+    """Decisions in the order in which they came; one thread lays them down, another takes them."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: list[Laid] = []
+        self._open = True
+
+    def lay(self, laid: Laid) -> bool:
+        """Lay down a decision; False if the run is over or too many wait."""
+        with self._lock:
+            if not self._open or len(self._waiting) >= MOST_WAITING:
+                return False
+            self._waiting.append(laid)
+            return True
+
+    def take(self, time_s: float, tick: int) -> list[tuple[int, OperatorDecision]]:
+        """Take all that waits, at an instant of the simulation, and tell those who laid it."""
+        with self._lock:
+            found, self._waiting = self._waiting, []
+        for laid in found:
+            laid.taken(time_s)
+        return [(tick, laid.decision) for laid in found]
+
+    def close(self) -> list[Laid]:
+        """Take nothing more; return what was never taken in, and so never acknowledged."""
+        with self._lock:
+            self._open = False
+            found, self._waiting = self._waiting, []
+        return found
 
 
 class HumanParameters(ConsoleParameters):

@@ -1,15 +1,131 @@
-"""A recorded operator (``operator.recorded``): what was decided once is decided again."""
+"""A recorded operator (``operator.recorded``) and the tables of its decisions."""
 
-from collections.abc import Sequence
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from components.messages.decisions import OperatorDecision
-from components.operator.console import Console, ConsoleParameters
-from components.operator.decision_table import read_decisions
+from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
+from components.operator.human import MOST_CLIMB_M, MOST_TURN_RAD, Console, ConsoleParameters
 from dsa_des.block.component import ScenePath
 from dsa_des.block.wake import Wake
+from dsa_des.errors import did_you_mean
+from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text
+from dsa_des.text.safe_text import printable, shortened
+
+_NAMES = ("time_s", "decision", "target", "turn_rad", "climb_m", "wall_time_s")
+_MOST_PROBLEMS = 5
+
+
+def _nothing(value: Any) -> Any:
+    """Return 0 for an empty cell."""
+    return 0.0 if value is None or value == "" else value
+
+
+def _unknown(value: Any) -> Any:
+    return math.nan if value is None or value == "" else value
+
+
+def _no_name(value: Any) -> Any:
+    return "" if value is None else value
+
+
+class _DecisionRow(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    time_s: float = Field(ge=0, allow_inf_nan=False)
+    decision: Literal["shown", "looked", "verified", "rejected", "turn", "climb"]
+    target: Annotated[str, BeforeValidator(_no_name)] = ""
+    turn_rad: Annotated[
+        float, BeforeValidator(_nothing), Field(ge=-MOST_TURN_RAD, le=MOST_TURN_RAD)
+    ] = 0.0
+    climb_m: Annotated[
+        float, BeforeValidator(_nothing), Field(ge=-MOST_CLIMB_M, le=MOST_CLIMB_M)
+    ] = 0.0
+    wall_time_s: Annotated[float, BeforeValidator(_unknown)] = math.nan
+
+    def decided(self) -> OperatorDecision:
+        kind = KINDS.index(self.decision)
+        turn_rad = self.turn_rad if kind == TURN else 0.0
+        climb_m = self.climb_m if kind == CLIMB else 0.0
+        return OperatorDecision(kind, self.target, turn_rad, climb_m, self.wall_time_s)
+
+
+def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
+    """Return the decisions of a table with their times, s, in order.
+
+    Parameters
+    ----------
+    path : Path
+        A run's ``decisions.parquet``, its folder, or a CSV file with the columns ``time_s`` and
+        ``decision``, and where they are needed ``target``, ``turn_rad``, ``climb_m`` and
+        ``wall_time_s``.
+
+    Raises
+    ------
+    ValueError
+        It cannot be read, or a row holds what no operator can decide.
+    """
+    if path.is_dir():
+        path = path / "decisions.parquet"
+    try:
+        rows = _of_parquet(path) if path.suffix == ".parquet" else _of_csv(path)
+    except InputFileError as error:
+        raise ValueError(f"{path}: {error}") from None
+    found: list[tuple[float, OperatorDecision]] = []
+    problems: list[str] = []
+    for where, row in rows:
+        try:
+            read = _DecisionRow.model_validate(row)
+        except ValidationError as error:
+            problems += [_said(where, problem) for problem in error.errors(include_url=False)]
+            continue
+        if found and read.time_s < found[-1][0]:
+            problems.append(f"{where}: time_s is {read.time_s:g}: it must not go back")
+        found.append((read.time_s, read.decided()))
+    if problems:
+        more = len(problems) - _MOST_PROBLEMS
+        said = problems[:_MOST_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
+        raise ValueError(f"{path}: " + "; ".join(said))
+    return found
+
+
+def _of_csv(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    reader = csv.DictReader(io.StringIO(read_input_text(path)))
+    _check_names(path, reader.fieldnames or [])
+    return [(f"line {reader.line_num}", row) for row in reader]
+
+
+def _of_parquet(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    content = read_input_bytes(path)
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(pa.BufferReader(content))
+    except (pa.ArrowException, OSError) as error:
+        raise ValueError(f"{path}: is no Parquet file that can be read ({error})") from error
+    _check_names(path, table.column_names)
+    return [(f"row {number}", row) for number, row in enumerate(table.to_pylist(), start=1)]
+
+
+def _check_names(path: Path, names: Iterable[str]) -> None:
+    known = [name for name in names if name is not None]
+    for needed in _NAMES[:2]:
+        if needed not in known:
+            near = did_you_mean(needed, known)
+            raise ValueError(f"{path}: has no column {needed!r}: it is no table of decisions{near}")
+
+
+def _said(where: str, problem: Any) -> str:
+    name = ".".join(str(part) for part in problem["loc"])
+    value = shortened(printable(str(problem["input"])), 60)
+    return f"{where}: {name} is {value!r}: {problem['msg'].lower()}"
 
 
 class RecordedParameters(ConsoleParameters):

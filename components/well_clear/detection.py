@@ -1,14 +1,173 @@
-"""When straight flights meet what an alert level keeps them out of: whichever kind it is."""
+"""When straight flights meet a volume, with and without uncertainty of their states."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from components.well_clear.relative_motion import (
+    Horizontal,
+    Span,
+    horizontal_of,
+    surely_less,
+    vertical_span,
+    within_time,
+)
 from components.well_clear.tcas import TcasAdvisory, tcas_span
-from components.well_clear.uncertainty import Bounds, uncertain_violation_span
-from components.well_clear.vertical_interval import Span
-from components.well_clear.violation import Relative, violation_span
-from components.well_clear.volume import Volume
+from components.well_clear.volume import Relative, Volume, horizontal_span, violation_span
+from dsa_des.arrays.types import BoolArray, FloatArray
+
+#: Where one bound is above zero, all are at least this, m and m/s.
+LEAST_BOUND = 1e-3
+
+
+class Bounds(NamedTuple):
+    """How far the true relative state may lie from the one given, each (n,) and not negative.
+
+    Parameters
+    ----------
+    position_m, height_m, velocity_mps, climb_mps : ndarray
+        Radius of the horizontal position, of the height, of the velocity, of the climb rate.
+    """
+
+    position_m: FloatArray
+    height_m: FloatArray
+    velocity_mps: FloatArray
+    climb_mps: FloatArray
+
+
+def uncertain_violation_span(
+    volume: Volume, relative: Relative, bounds: Bounds, begin_s: Any = 0.0, end_s: Any = np.inf
+) -> Span:
+    """Return from when to when pairs of aircraft may violate a volume of modified tau.
+
+    Parameters
+    ----------
+    volume : Volume
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
+    bounds : Bounds
+        Where all four are 0, the result is that of `violation_span`.
+    begin_s, end_s : float or (n,)
+
+    Returns
+    -------
+    Span
+        Infinity and minus infinity where there is no violation.
+    """
+    east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
+    known = np.all(np.stack(np.broadcast_arrays(*bounds)) == 0.0, axis=0)
+    e = Bounds(*(np.maximum(bound, LEAST_BOUND) for bound in bounds))
+    vertical = _vertical(volume, up, climb, e, end_s)
+    motion = horizontal_of(east, north, v_east, v_north)
+    horizontal = _horizontal(volume, (east, north, v_east, v_north), motion, e, end_s)
+    entry = np.maximum(np.maximum(vertical.begin_s, horizontal.begin_s), begin_s)
+    leave = np.minimum(vertical.end_s, horizontal.end_s)
+    plain = violation_span(volume, relative, begin_s, end_s)
+    some = surely_less(entry, leave)
+    return Span(
+        np.where(known, plain.begin_s, np.where(some, entry, np.inf)),
+        np.where(known, plain.end_s, np.where(some, leave, -np.inf)),
+    )
+
+
+def _vertical(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
+    above = _upper_part(volume, up, climb, e, end_s)
+    below = _upper_part(volume, -up, -climb, e, end_s)
+    return _hull(above, below)
+
+
+def _upper_part(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
+    """Return the hull over the relative heights that are not negative."""
+    low, high = np.maximum(up - e.height_m, 0.0), up + e.height_m
+    slow, fast = climb - e.climb_mps, climb + e.climb_mps
+
+    def span(height: FloatArray, rate: FloatArray) -> Span:
+        return vertical_span(height, rate, volume.vertical_m, volume.vertical_time_s, 0.0, end_s)
+
+    leaving = _only(span(low, np.maximum(slow, 0.0)), (high >= 0.0) & (fast >= 0.0))
+    first, last = span(low, slow), span(high, np.minimum(fast, 0.0))
+    ends = np.where(np.isfinite(last.begin_s), last.end_s, end_s)
+    there = (high >= 0.0) & (slow <= 0.0) & np.isfinite(first.begin_s)
+    return _hull(leaving, _only(Span(first.begin_s, ends), there))
+
+
+def _horizontal(
+    volume: Volume,
+    state: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    motion: Horizontal,
+    e: Bounds,
+    end_s: Any,
+) -> Span:
+    radius_m, tau_s = volume.horizontal_m, volume.horizontal_time_s
+    range_m, speed = np.sqrt(motion.range_sq_m2), np.sqrt(motion.speed_sq_m2_s2)
+    reach = radius_m + e.position_m
+    near = range_m <= reach
+    now = near | within_time(motion, radius_m, tau_s, volume.time_variable)
+    slow = speed <= e.velocity_mps
+    nearest, fastest = np.maximum(range_m - e.position_m, 0.0), speed + e.velocity_mps
+    zero = np.zeros(np.shape(range_m))
+    head_on = horizontal_of(nearest, zero, -fastest, zero)
+    worst = _worst_pair(state, range_m, speed, nearest, fastest, e)
+    plain = horizontal_span(motion, volume, end_s).begin_s
+    towards = worst.closing_m2_s < 0.0
+    entry = np.minimum(
+        plain, np.where(towards, horizontal_span(worst, volume, end_s).begin_s, np.inf)
+    )
+    entry = np.where(slow, horizontal_span(head_on, volume, end_s).begin_s, entry)
+    entry = np.where(now, 0.0, entry)
+    growing = motion.speed_sq_m2_s2 - e.velocity_mps**2
+    half = motion.closing_m2_s - e.velocity_mps * reach
+    under = half * half - growing * (motion.range_sq_m2 - reach * reach)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        leave = (np.sqrt(np.maximum(under, 0.0)) - half) / growing
+    leave = np.where(under >= 0.0, leave, -np.inf)
+    leave = np.where(slow, np.where(near | np.isfinite(entry), end_s, -np.inf), leave)
+    some = (entry <= end_s) & (leave >= 0.0) & (entry <= leave)
+    return Span(
+        np.where(some, np.maximum(entry, 0.0), np.inf),
+        np.where(some, np.minimum(leave, end_s), -np.inf),
+    )
+
+
+def _worst_pair(
+    state: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    range_m: FloatArray,
+    speed: FloatArray,
+    nearest: FloatArray,
+    fastest: FloatArray,
+    e: Bounds,
+) -> Horizontal:
+    """Return the position and velocity within the bounds that lead most directly to each other.
+
+    Angles count from the direction towards the intruder, in which the position's cone is centred.
+    """
+    east, north, v_east, v_north = state
+    ahead = -(east * v_east + north * v_north)
+    aside = north * v_east - east * v_north
+    off = np.arctan2(aside, ahead)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        position_cone = np.arcsin(np.minimum(e.position_m / range_m, 1.0))
+        velocity_cone = np.arcsin(np.minimum(e.velocity_mps / speed, 1.0))
+    low = np.maximum(-position_cone, off - velocity_cone)
+    high = np.minimum(position_cone, off + velocity_cone)
+    side = np.sign(off)
+    overlap: BoolArray = np.asarray(low <= high)
+    of_position = np.where(overlap, 0.5 * (low + high), side * position_cone)
+    of_velocity = np.where(overlap, 0.5 * (low + high), off - side * velocity_cone)
+    return horizontal_of(
+        -nearest * np.cos(of_position),
+        -nearest * np.sin(of_position),
+        fastest * np.cos(of_velocity),
+        fastest * np.sin(of_velocity),
+    )
+
+
+def _only(span: Span, where: BoolArray) -> Span:
+    return Span(np.where(where, span.begin_s, np.inf), np.where(where, span.end_s, -np.inf))
+
+
+def _hull(one: Span, other: Span) -> Span:
+    return Span(np.minimum(one.begin_s, other.begin_s), np.maximum(one.end_s, other.end_s))
 
 
 def detection_span(

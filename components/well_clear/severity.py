@@ -1,10 +1,11 @@
-"""Severity of a loss of well clear (SLoWC): how deep the three dimensions are penetrated."""
+"""How bad a loss of well clear is: its severity (SLoWC), and the probability of a collision."""
+
+from typing import Any
 
 import numpy as np
 
 from components.well_clear.relative_motion import horizontal_of, time_to_closest_s
-from components.well_clear.violation import Relative
-from components.well_clear.volume import FOOT_M
+from components.well_clear.volume import FOOT_M, Relative
 from dsa_des.arrays.types import FloatArray
 
 
@@ -63,3 +64,92 @@ def loss_severity(
     depth = (1.0 - clear[0] ** 2) * (1.0 - clear[1] ** 2) * (1.0 - clear[2] ** 2)
     # 1 - sqrt(1 - depth), without the difference of nearly equal numbers for a small depth.
     return np.asarray(100.0 * depth / (1.0 + np.sqrt(1.0 - depth)))
+
+
+#: Highest altitude of each layer below the last, m.
+LAYER_TOPS_M = np.array([2300.0, 5000.0, 10_000.0, 20_000.0, 41_000.0]) * FOOT_M
+#: Scale of the Laplace distribution of an altimeter's error by layer, m (ICAO).
+SCALE_M = np.array([35.0, 38.0, 43.0, 58.0, 72.0, 94.0]) * FOOT_M
+#: Of transponders without such an altimeter: the chance to have its scale, and the other scale, m.
+GOOD_CHANCE = np.array([0.391, 0.320, 0.345, 0.610, 0.610, 0.610])
+POOR_SCALE_M = np.array([60.0, 60.0, 69.0, 87.0, 101.0, 101.0]) * FOOT_M
+
+
+def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, FloatArray], ...]:
+    """Return (chance, scale in m) of each altimeter an aircraft may have.
+
+    Parameters
+    ----------
+    altitude_m : (n,)
+    mode_c : bool
+        A transponder of Mode C, or none.
+    """
+    layer = np.searchsorted(LAYER_TOPS_M, np.asarray(altitude_m), side="left")
+    if not mode_c:
+        return ((np.ones(np.shape(layer)), SCALE_M[layer]),)
+    good = GOOD_CHANCE[layer]
+    return ((good, SCALE_M[layer]), (1.0 - good, POOR_SCALE_M[layer]))
+
+
+def difference_beyond(height_m: Any, scale_m: Any, other_scale_m: Any) -> FloatArray:
+    """Return the chance that the difference of two Laplace errors exceeds a height.
+
+    Parameters
+    ----------
+    height_m : (n,)
+        Of any sign.
+    scale_m, other_scale_m : (n,)
+        Above 0.
+
+    Notes
+    -----
+    With c = 1/λ of either error, the tail is a mixture of exponentials; nearly equal scales are
+    taken through the limit, whose error is of second order in their difference.
+    """
+    one, other = np.asarray(scale_m, dtype=float), np.asarray(other_scale_m, dtype=float)
+    x = np.abs(np.asarray(height_m, dtype=float))
+    mean = 0.5 * (one + other)
+    alike = np.abs(one - other) < 1e-6 * mean
+    apart = np.where(alike, 1.0, one * one - other * other)
+    tail = np.where(
+        alike,
+        0.5 * np.exp(-x / mean) * (1.0 + x / (2.0 * mean)),
+        (one * one * np.exp(-x / one) - other * other * np.exp(-x / other)) / (2.0 * apart),
+    )
+    return np.asarray(np.where(np.asarray(height_m) >= 0.0, tail, 1.0 - tail))
+
+
+def collision_probability(
+    miss_distance_m: Any,
+    height_m: Any,
+    altitude_m: tuple[Any, Any],
+    mode_c: tuple[bool, bool] = (False, False),
+    horizontal_m: float = 500 * FOOT_M,
+    vertical_m: float = 100 * FOOT_M,
+) -> FloatArray:
+    """Return the probability of a near mid-air collision at the closest approach.
+
+    Parameters
+    ----------
+    miss_distance_m, height_m : (n,)
+        Horizontal miss distance, and difference of the measured altitudes there.
+    altitude_m : two of (n,)
+        Altitude of ownship and intruder.
+    mode_c : two of bool
+        Whether each one's altimeter is that of Mode C, or of no transponder.
+    horizontal_m, vertical_m : float
+
+    Returns
+    -------
+    (n,)
+        0 where the miss distance is not below `horizontal_m`.
+    """
+    height = np.asarray(height_m, dtype=float)
+    within = np.zeros(np.shape(height))
+    for chance, scale in altimeter_scales(altitude_m[0], mode_c[0]):
+        for other_chance, other in altimeter_scales(altitude_m[1], mode_c[1]):
+            inside = difference_beyond(-vertical_m - height, scale, other) - difference_beyond(
+                vertical_m - height, scale, other
+            )
+            within = within + chance * other_chance * inside
+    return np.asarray(np.where(np.asarray(miss_distance_m) < horizontal_m, within, 0.0))

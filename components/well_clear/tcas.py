@@ -5,15 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.well_clear.nearly import nearly_zero, surely_less
 from components.well_clear.relative_motion import (
+    Span,
     discriminant,
     exit_of_circle_s,
     horizontal_of,
+    nearly_zero,
+    surely_less,
+    vertical_span,
 )
-from components.well_clear.vertical_interval import Span, vertical_span
-from components.well_clear.violation import Relative
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
+from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M, Relative
 from dsa_des.arrays.types import FloatArray, IntArray
 
 

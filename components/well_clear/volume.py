@@ -1,9 +1,28 @@
-"""Volumes around an aircraft, with every size free, and those of the standards by name."""
+"""Volumes around an aircraft, those of the standards, and when straight flights violate them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from components.well_clear.relative_motion import (
+    Horizontal,
+    Span,
+    discriminant,
+    entry_of_circle_s,
+    exit_of_circle_s,
+    horizontal_of,
+    nearly_equal,
+    nearly_zero,
+    surely_less,
+    time_to_closest_s,
+    vertical_span,
+    within_time,
+)
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 FOOT_M = 0.3048
 NAUTICAL_MILE_M = 1852.0
@@ -73,3 +92,190 @@ PRESETS: Mapping[str, Volume] = MappingProxyType(
         "nmac": Volume(500 * FOOT_M, 100 * FOOT_M, time_variable="none"),
     }
 )
+
+
+def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | FloatArray) -> Span:
+    """Return when, in [0, duration], the horizontal condition of a volume holds.
+
+    Parameters
+    ----------
+    motion : Horizontal
+        At time 0.
+    volume : Volume
+    duration_s : float or ndarray
+
+    Returns
+    -------
+    Span
+        One interval: the set is convex for every time variable.
+    """
+    radius_m = volume.horizontal_m
+    p, speed_sq = motion.closing_m2_s, motion.speed_sq_m2_s2
+    delta = discriminant(motion, radius_m)
+    root = np.sqrt(np.maximum(delta, 0.0))
+    still = nearly_zero(speed_sq)
+    inside = motion.range_sq_m2 <= radius_m * radius_m
+    leave = exit_of_circle_s(motion, radius_m, root)
+    leave = np.where(inside & still, duration_s, np.minimum(leave, duration_s))
+    entry, ahead = _entry_from_outside(motion, volume, delta, root, still)
+    entry = np.where(inside, 0.0, np.maximum(entry, 0.0))
+    met = inside | (ahead & (delta >= 0.0) & (p <= 0.0) & (entry <= duration_s))
+    return Span(np.where(met, entry, np.inf), np.where(met, leave, -np.inf))
+
+
+def _entry_from_outside(
+    motion: Horizontal, volume: Volume, delta: FloatArray, root: FloatArray, still: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return the entry of those who are not yet within the radius, and whether there is one."""
+    tau_s = volume.horizontal_time_s
+    if volume.time_variable == "modified_tau":
+        return _modified_tau_entry(motion, volume, delta), motion.closing_m2_s < 0.0
+    circle = entry_of_circle_s(motion, volume.horizontal_m, root)
+    if volume.time_variable == "time_to_closest":
+        return np.minimum(circle, time_to_closest_s(motion) - tau_s), ~still
+    if volume.time_variable == "time_to_entry":
+        return circle - tau_s, ~still
+    return circle, ~still
+
+
+def _modified_tau_entry(motion: Horizontal, volume: Volume, delta: FloatArray) -> FloatArray:
+    """Return the smaller root of r²(t) + τ s·v(t) = D², 0 where it has passed.
+
+    Its discriminant is 4Δ(D) + (τ v²)², a sum without cancellation where the flight meets the
+    circle. Where the constant term is not positive, the condition holds now.
+    """
+    tau_s, radius_m = volume.horizontal_time_s, volume.horizontal_m
+    a, p = motion.speed_sq_m2_s2, motion.closing_m2_s
+    linear = 2.0 * p + tau_s * a
+    constant = np.maximum(motion.range_sq_m2 + tau_s * p - radius_m * radius_m, 0.0)
+    below = np.sqrt(4.0 * np.maximum(delta, 0.0) + (tau_s * a) ** 2) - linear
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(np.where(constant > 0.0, 2.0 * constant / below, 0.0))
+
+
+#: Position east, north, up (m) and velocity (m/s) of the ownship less the intruder's.
+Relative = Sequence[Any]
+
+
+def violates(volume: Volume, relative: Relative) -> BoolArray:
+    """Tell whether pairs of aircraft violate a volume now.
+
+    Parameters
+    ----------
+    volume : Volume
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less intruder.
+
+    Returns
+    -------
+    (n,) of bool
+    """
+    east, north, up, v_east, v_north, climb = _arrays(relative)
+    motion = horizontal_of(east, north, v_east, v_north)
+    radius_m = volume.horizontal_m
+    near = (motion.range_sq_m2 <= radius_m * radius_m) | within_time(
+        motion, radius_m, volume.horizontal_time_s, volume.time_variable
+    )
+    closing = (climb != 0.0) & (up * climb <= 0.0)
+    soon = closing & (np.abs(up) <= volume.vertical_time_s * np.abs(climb))
+    return np.asarray(near & ((np.abs(up) <= volume.vertical_m) | soon))
+
+
+def violation_span(
+    volume: Volume, relative: Relative, begin_s: Any = 0.0, end_s: Any = np.inf
+) -> Span:
+    """Return from when to when pairs of aircraft in straight flight violate a volume.
+
+    Parameters
+    ----------
+    volume : Volume
+    relative : six of (n,)
+        As for `violates`, at time 0; they may be broadcast against each other.
+    begin_s, end_s : float or (n,)
+        The times looked at, begin not after end.
+
+    Returns
+    -------
+    Span
+        Entry and exit (n,), s; infinity and minus infinity where there is no violation. A flight
+        that only touches the volume, for no longer than rounding, does not violate it.
+
+    Notes
+    -----
+    The vertical condition holds in one interval; within it the horizontal one is a quadratic,
+    solved in the form whose terms do not cancel.
+    """
+    east, north, up, v_east, v_north, climb = _arrays(relative)
+    vertical = vertical_span(up, climb, volume.vertical_m, volume.vertical_time_s, begin_s, end_s)
+    some = surely_less(vertical.begin_s, vertical.end_s)
+    start = np.where(some, vertical.begin_s, 0.0)
+    motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
+    duration = np.where(some, vertical.end_s - start, 0.0)
+    within = horizontal_span(motion, volume, duration)
+    entry, leave = start + within.begin_s, start + within.end_s
+    some &= surely_less(entry, leave)
+    return Span(np.where(some, entry, np.inf), np.where(some, leave, -np.inf))
+
+
+def _arrays(relative: Relative) -> list[FloatArray]:
+    return [np.asarray(part, dtype=np.float64) for part in relative]
+
+
+def inside_cylinder(
+    distance_m: FloatArray, height_m: FloatArray, horizontal_m: float, vertical_m: float
+) -> BoolArray:
+    """Tell whether aircraft are within a cylinder now, its boundary left out.
+
+    Parameters
+    ----------
+    distance_m, height_m : (n,)
+        Horizontal distance and difference in height, of any sign.
+    horizontal_m, vertical_m : float
+        Radius and half of the height.
+    """
+    return np.asarray((distance_m < horizontal_m) & (np.abs(height_m) < vertical_m))
+
+
+def cylinder_span(
+    horizontal_m: float | FloatArray,
+    vertical_m: float | FloatArray,
+    relative: Relative,
+    begin_s: Any = 0.0,
+    end_s: Any = np.inf,
+) -> Span:
+    """Return from when to when pairs in straight flight are inside a cylinder.
+
+    Parameters
+    ----------
+    horizontal_m, vertical_m : float or ndarray
+        Radius and half of the height.
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
+    begin_s, end_s : float or (n,)
+        The times looked at, begin before end.
+
+    Returns
+    -------
+    Span
+        An open interval: touching the cylinder is not entering it. Infinity and minus infinity
+        where it is not entered.
+    """
+    east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
+    motion = horizontal_of(east, north, v_east, v_north)
+    delta = discriminant(motion, horizontal_m)
+    root = np.sqrt(np.maximum(delta, 0.0))
+    radius_sq = np.asarray(horizontal_m * horizontal_m)
+    still = nearly_zero(v_east) & nearly_zero(v_north)
+    near = (motion.range_sq_m2 < radius_sq) & ~nearly_equal(motion.range_sq_m2, radius_sq)
+    entry = np.where(still, -np.inf, entry_of_circle_s(motion, horizontal_m, root))
+    leave = np.where(still, np.inf, exit_of_circle_s(motion, horizontal_m, root))
+    level = nearly_zero(climb)
+    speed = np.abs(np.where(level, 1.0, climb))
+    along = np.where(climb < 0.0, -up, up)
+    entry = np.maximum(entry, np.where(level, -np.inf, (-vertical_m - along) / speed))
+    leave = np.minimum(leave, np.where(level, np.inf, (vertical_m - along) / speed))
+    some = np.where(still, near, delta > 0.0) & (~level | (np.abs(up) < vertical_m))
+    entry = np.minimum(np.maximum(entry, begin_s), end_s)
+    leave = np.maximum(np.minimum(leave, end_s), begin_s)
+    some = some & surely_less(entry, leave)
+    return Span(np.where(some, entry, np.inf), np.where(some, leave, -np.inf))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.alert_table import alert_table, without_memory
+from components.alerting.alert_tables import alert_table, without_memory
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import alert_levels
 from components.well_clear.tcas import tcas_span

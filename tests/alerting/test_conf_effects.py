@@ -11,8 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.alert_table import alert_table
-from components.alerting.bands_over_time import bands_table
+from components.alerting.alert_tables import alert_table, bands_table
 from components.alerting.command import alert
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels

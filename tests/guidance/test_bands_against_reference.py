@@ -10,9 +10,8 @@ import pytest
 
 from components.alert_configuration.conf_file import read_conf
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
-from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many
+from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many, resolution
 from components.guidance.regions import GuidedIntruders
-from components.guidance.resolution import resolution
 from components.guidance.situation import State
 from components.traffic.daa_file import read_daa_samples
 from tests.alerting.reference_data import reference_file

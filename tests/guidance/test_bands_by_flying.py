@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from components.alert_configuration.conf_file import default_values
 from components.guidance.altitudes import Altitudes
+from components.guidance.bands import resolution
 from components.guidance.intervals import Band, Interval, clear_intervals, painted, same_place
 from components.guidance.kinds import kind_of
-from components.guidance.resolution import resolution
 from components.guidance.situation import Detector, State
-from components.well_clear.nearly import nearly_equal
-from components.well_clear.violation import violates
-from components.well_clear.volume import Volume
+from components.well_clear.relative_motion import nearly_equal
+from components.well_clear.volume import Volume, violates
 
 VALUES = {**default_values()[0], "max_alt": 2000.0, "max_hs": 150.0}
 LOOKAHEAD_S, HORIZON_S, FLOWN_S = 150.0, 100.0, 0.02

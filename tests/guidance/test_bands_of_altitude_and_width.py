@@ -11,8 +11,7 @@ from components.guidance.bands import guidance_of_many
 from components.guidance.kinds import KINDS, kind_of
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import Detector, State
-from components.well_clear.violation import violates
-from components.well_clear.volume import Volume
+from components.well_clear.volume import Volume, violates
 from tests.alerting.conf_text import CONF
 from tests.guidance.test_bands_by_flying import (
     BELOW,

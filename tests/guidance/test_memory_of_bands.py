@@ -7,18 +7,14 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import default_values, read_conf
-from components.alerting.alert_table import without_memory
-from components.alerting.bands_over_time import TABLE_UNITS
+from components.alerting.alert_tables import TABLE_UNITS, without_memory
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
-from components.guidance.band_memory import BandMemory
-from components.guidance.bands import guidance_of_many
+from components.guidance.bands import Resolution, guidance_of_many
 from components.guidance.intervals import Band
+from components.guidance.memory import BandMemory, GuidanceMemory, ResolutionMemory
 from components.guidance.recovery import Recovery
 from components.guidance.regions import GuidedIntruders
-from components.guidance.remembered import GuidanceMemory
-from components.guidance.resolution import Resolution
-from components.guidance.resolution_memory import ResolutionMemory
 from components.guidance.situation import State
 from tests.alerting.reference_data import reference_file
 

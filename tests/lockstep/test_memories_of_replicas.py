@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.alerting.followed_tracks import FollowedTracks
-from components.alerting.memory import MemoryRule
-from components.alerting.track_memory import TrackMemory
+from components.alerting.believed_tracks import BelievedTracks
+from components.alerting.memory import LevelMemory, MemoryRule
 from components.tracking.stub import TrackerStub
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.lockstep import lock_step
@@ -44,11 +43,13 @@ def test_places_of_a_replica_that_has_no_scan_for_a_while(lock):
 
 def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
     """Two targets change places from one look to the next."""
-    tracks = FollowedTracks()
+    tracks = BelievedTracks()
     here, there = [0.0, 0.0, 0.0], [500.0, 0.0, 0.0]
     tracks.add_truth(
-        np.array([10, 20, 30]), np.array([[here, there], [there, here], [here, there]])
-    )
+        np.array([10, 20, 30]),
+        np.array([1.0, 2.0, 3.0]),
+        np.array([[here, there], [there, here], [here, there]]),
+    )  # fmt: skip
     named = tracks._nearest(np.array([10, 15, 20, 29, 30]), np.full((5, 3), 10.0))
     assert named.tolist() == [0, 0, 1, 1, 0]
 
@@ -58,7 +59,7 @@ def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
 )
 def test_tracks_are_gone_by_the_time_of_their_own_run(times_s, left):
     """A run is at 0 s when another one is at 8 s, and a third has no scan at all."""
-    memory = TrackMemory(MemoryRule(hysteresis_s=5.0, persistence_s=0.0, m=0, n=1))
+    memory = LevelMemory(MemoryRule(hysteresis_s=5.0, persistence_s=0.0, m=0, n=1))
     due = np.ones((3, 2), dtype=bool)
     memory.levels(np.array([0, 1, 2]), np.full(3, 7), np.array([0.0, 8.0, 0.0]), due, due)
     memory.forget(np.array([0, 1]), np.array(times_s))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from components.well_clear.curved_flights import FINEST_S, first_inside_cylinder
+from components.well_clear.separation import FINEST_S, first_inside_cylinder
 
 D_M, Z_M = 610.0, 76.0
 

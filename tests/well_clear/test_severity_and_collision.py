@@ -4,12 +4,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from components.well_clear.collision_probability import (
+from components.well_clear.severity import (
     altimeter_scales,
     collision_probability,
     difference_beyond,
+    loss_severity,
+    miss_distance_m,
 )
-from components.well_clear.severity import loss_severity, miss_distance_m
 
 FOOT_M = 0.3048
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.well_clear.collision_probability import collision_probability
+from components.well_clear.severity import collision_probability
 from components.well_clear.tcas import recovery_sizes_m, tcas_span
 
 FOOT_M, MILE_M = 0.3048, 1852.0

@@ -4,10 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
+from components.well_clear.detection import Bounds, uncertain_violation_span
 from components.well_clear.tcas import RESOLUTION_ADVISORY, TRAFFIC_ADVISORY, tcas_span
-from components.well_clear.uncertainty import Bounds, uncertain_violation_span
-from components.well_clear.violation import violation_span
-from components.well_clear.volume import FOOT_M, Volume
+from components.well_clear.volume import FOOT_M, Volume, violation_span
 from tests.well_clear.test_violation_spans import random_states, span_by_bisection
 
 END_S = 60.0

@@ -6,9 +6,15 @@ import mpmath
 import numpy as np
 import pytest
 
-from components.well_clear.cylinder import cylinder_span, inside_cylinder
-from components.well_clear.violation import violates, violation_span
-from components.well_clear.volume import PRESETS, TIME_VARIABLES, Volume
+from components.well_clear.volume import (
+    PRESETS,
+    TIME_VARIABLES,
+    Volume,
+    cylinder_span,
+    inside_cylinder,
+    violates,
+    violation_span,
+)
 
 END_S = 180.0
 

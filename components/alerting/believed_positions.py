@@ -1,0 +1,198 @@
+"""Flights believed from positions: straight lines through those of the last seconds."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.configuration import Deviations
+from components.alerting.own_poses import OwnPoses, run_begins
+from components.geometry.attitude import body_to_ned
+from components.geometry.daidalus_sphere import east_north_m
+from components.messages.fused import FusedDetections
+from components.messages.targets import TrafficStates
+from components.messages.tracks import Tracks
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.wake import Arrivals, Wake
+
+# Positions closer in time than this are one instant, from which no velocity follows, s.
+_SHORTEST_S = 1e-6
+
+
+class BelievedFlights(NamedTuple):
+    """Flights as they are believed at some scans: a row for each scan, or for each flight."""
+
+    known: BoolArray  # (rows, columns)
+    # Six of (rows, columns): east, north, up in m and their rates in m/s, ownship less target.
+    relative: tuple[FloatArray, ...]
+    scan: IntArray | None = None  # which scan each row belongs to; by default, rows are scans
+    # By default, columns are targets; -1 for a track that belongs to none.
+    target: IntArray | None = None
+    number: IntArray | None = None  # of tracks
+    deviations: Deviations | None = None  # of (rows,)
+
+
+class BelievedPositions:
+    """Positions of the last seconds, true or measured, and straight flights fitted to them."""
+
+    def __init__(self, keep_s: float, targets: int) -> None:
+        self._keep_s = keep_s
+        self._came = np.empty(0, dtype=np.int64)
+        self._time_s = np.empty(0)
+        #: East, north, up (n, targets, 3); NaN where a target was not seen.
+        self._position_m = np.empty((0, targets, 3))
+
+    def add_truth(self, came: IntArray, time_s: FloatArray, position_m: FloatArray) -> None:
+        """Take in positions at instants since the start of their run, and when they came."""
+        self._came = np.concatenate([self._came, came])
+        self._time_s = np.concatenate([self._time_s, time_s])
+        self._position_m = np.concatenate([self._position_m, position_m])
+        if bool((self._came[1:] < self._came[:-1]).any()):  # replicas that go side by side
+            self._keep(np.argsort(self._came, kind="stable"))
+
+    def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
+        """Take in what was measured in body axes, by the attitude of when it was measured."""
+        sights: Tracks | FusedDetections = arrived.message
+        row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
+        new = np.isfinite(sights.range_m) & (sights.target >= 0)
+        if isinstance(sights, Tracks):
+            new &= sights.updated  # others came with an earlier row
+        # The attitude of when it was measured, of those that have arrived.
+        came = arrived.tick[row]
+        pose = own.pose_of(sights.measured_tick, came, run_begins(came, wake), new)
+        new &= pose >= 0
+        row = row[new]
+        yaw, pitch, roll = own.attitude_rad(pose[new])
+        azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
+        range_m = sights.range_m[new]
+        level = range_m * np.cos(elevation)
+        body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
+        north, east, down = body_to_ned(*body, yaw, pitch, roll)
+        # A row of its own for every instant of measurement.
+        line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
+        position = np.full((len(made), *self._position_m.shape[1:]), np.nan)
+        position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
+        self.add_truth(came, wake.own_ticks(made) / wake.ticks_per_s, position)
+
+    def forget(self, ticks: IntArray, times_s: FloatArray, wake: Wake) -> None:
+        """Drop what no scan after some asks for."""
+        if wake.side_by_side:  # the next scans come after all of these
+            self._keep(np.flatnonzero(self._time_s >= float(times_s.min()) - self._keep_s))
+            return
+        # What came before the last run began is of runs that have passed.
+        young = self._time_s >= float(times_s[-1]) - self._keep_s
+        self._keep(np.flatnonzero(young & (self._came >= run_begins(ticks[-1:], wake))))
+
+    def _keep(self, lines: IntArray) -> None:
+        self._came, self._time_s = self._came[lines], self._time_s[lines]
+        self._position_m = self._position_m[lines]
+
+    def flights(
+        self,
+        ticks: IntArray,
+        times_s: FloatArray,
+        begins: IntArray,
+        own: Mapping[str, FloatArray],
+        poses: OwnPoses,
+    ) -> BelievedFlights:
+        """Return the flights at some scans, of what came between their runs' begins and them."""
+        known, state = self._states(begins, ticks, times_s)
+        # Positions count from the ownship: its own less theirs is the other way round.
+        return BelievedFlights(known, tuple(-state))
+
+    def _states(
+        self, since: IntArray, now: IntArray, now_s: FloatArray
+    ) -> tuple[BoolArray, FloatArray]:
+        """Return whose flight is known (n, targets), and its state (6, n, targets), else 0.
+
+        It is known from positions at two instants, not older than `keep_s`.
+        """
+        first = np.searchsorted(self._came, since)
+        counts = np.searchsorted(self._came, now, side="right") - first
+        of = np.repeat(np.arange(len(now)), counts)
+        start = np.cumsum(counts) - counts
+        line = np.arange(len(of)) + (first - start)[of]
+        young = self._time_s[line] >= now_s[of] - self._keep_s
+        of, line = of[young], line[young]
+        counts = np.bincount(of, minlength=len(now))
+        start = np.cumsum(counts) - counts
+        targets = self._position_m.shape[1]
+        known = np.zeros((len(now), targets), dtype=bool)
+        state = np.zeros((6, len(now), targets))
+        # Instants with as many positions are added up alike, each as it would be by itself.
+        for count in np.flatnonzero(np.bincount(counts)).tolist():
+            alike = np.flatnonzero(counts == count)
+            if count < 2:
+                continue
+            lines = line[start[alike] + np.arange(count)[:, np.newaxis]]
+            known[alike], state[:, alike] = _fitted(
+                self._time_s[lines], self._position_m[lines], now_s[alike]
+            )
+        return known, state
+
+
+def true_positions_m(states: TrafficStates) -> FloatArray:
+    """Return where targets are from the ownship, east, north, up (rows, targets, 3), or NaN."""
+    own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
+    east, north = east_north_m(np.radians(states.lat_deg), np.radians(states.lon_deg), *own)
+    up = states.alt_m - states.own_alt_m[:, np.newaxis]
+    position = np.full((len(states), len(states.roster), 3), np.nan)
+    there = np.where(states.present[:, :, np.newaxis], np.stack([east, north, up], -1), np.nan)
+    position[:, states.columns] = there
+    return position
+
+
+def _by_instant(
+    tick: IntArray, came: IntArray, row: IntArray, measured: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the line of each entry, and when each line came and was measured.
+
+    `tick` and `came` are of a message's rows, `row` and `measured` of its entries.
+    """
+    if np.array_equal(measured, tick[row]):
+        return row, came, tick
+    # A row without entries has its line all the same, whatever other rows the wake brings.
+    silent = np.flatnonzero(np.bincount(row, minlength=len(tick)) == 0)
+    every = np.stack([np.concatenate([row, silent]), np.concatenate([measured, tick[silent]])])
+    pairs, line = np.unique(every, axis=1, return_inverse=True)
+    return line.reshape(-1)[: len(row)], came[pairs[0]], pairs[1]
+
+
+def _fitted(
+    time_s: FloatArray, position_m: FloatArray, now_s: FloatArray
+) -> tuple[BoolArray, FloatArray]:
+    """Return the states at some instants of least-squares lines through positions.
+
+    Parameters
+    ----------
+    time_s : (positions, n)
+    position_m : (positions, n, targets, 3)
+    now_s : (n,)
+    """
+    seen = np.isfinite(position_m[..., 0])
+    count = np.maximum(seen.sum(axis=0), 1)
+    # Relative to now, so that clock readings do not cost digits.
+    ago_s = np.where(seen, (time_s - now_s)[:, :, np.newaxis], 0.0)
+    mean_s = _sum(ago_s) / count
+    off_s = np.where(seen, ago_s - mean_s, 0.0)
+    spread = _sum(off_s * off_s)
+    known = np.asarray(spread > _SHORTEST_S**2)
+    position = np.where(seen[..., np.newaxis], position_m, 0.0)
+    mean_m = position.sum(axis=0) / count[..., np.newaxis]
+    moved = np.where(seen[..., np.newaxis], position - mean_m, 0.0)
+    slope = (off_s[..., np.newaxis] * moved).sum(axis=0)
+    rate = slope / np.where(known, spread, 1.0)[..., np.newaxis]
+    now_m = mean_m - rate * mean_s[..., np.newaxis]
+    state = np.concatenate([np.moveaxis(now_m, -1, 0), np.moveaxis(rate, -1, 0)])
+    return known, np.where(known, state, 0.0)
+
+
+def _sum(values: FloatArray) -> FloatArray:
+    """Return the sums over the first axis of (positions, n, targets), each as it would be alone.
+
+    NumPy adds the numbers of a single target in pairs, and those of several one after the other.
+    """
+    if values.shape[2] != 1:
+        return np.asarray(values.sum(axis=0))
+    alone = np.ascontiguousarray(values[:, :, 0].T)
+    return np.asarray(alone.sum(axis=1))[:, np.newaxis]

@@ -1,0 +1,272 @@
+"""Flights believed from tracks with states: carried on straight, in the ownship's plane."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.configuration import Deviations, largest
+from components.alerting.believed_positions import BelievedFlights
+from components.alerting.own_poses import OwnPoses
+from components.estimation.frame import ned_axes
+from components.geometry.daidalus_sphere import east_north_m, east_north_mps
+from components.geometry.enu import enu_to_geodetic
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.wake import Arrivals, Wake
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+# Upper triangle of a covariance in its columns.
+_PAIRS = tuple(COVARIANCE)
+# A track farther than this from every target belongs to none, for whoever evaluates, m.
+_SAME_TARGET_M = 1000.0
+_OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
+
+
+class _Estimates(NamedTuple):
+    """Tracks as they were estimated, (tracks,) in the last axis.
+
+    Parameters
+    ----------
+    number : (tracks,)
+    time_s : (tracks,)
+        That their states speak of.
+    state : (6, tracks)
+        North, east, down and their rates in the frame.
+    covariance : (21, tracks)
+    origin : (3, tracks)
+        Of the frame: latitude, longitude (deg), height (m).
+    """
+
+    number: IntArray
+    time_s: FloatArray
+    state: FloatArray
+    covariance: FloatArray
+    origin: FloatArray
+
+    @classmethod
+    def of(cls, tracks: StateTracks) -> "_Estimates":
+        return cls(
+            tracks.track,
+            tracks.state_s,
+            np.stack([getattr(tracks, name) for name in _STATE]),
+            np.stack([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
+            np.stack([tracks.origin_lat_deg, tracks.origin_lon_deg, tracks.origin_alt_m]),
+        )
+
+    def take(self, which: IntArray | BoolArray) -> "_Estimates":
+        parts: Any = (part[..., which] for part in self)
+        return _Estimates(*parts)
+
+    def with_more(self, more: "_Estimates") -> "_Estimates":
+        both: Any = zip(self, more, strict=True)
+        return _Estimates(*(np.concatenate(parts, axis=-1) for parts in both))
+
+
+_NONE = _Estimates(
+    np.empty(0, dtype=np.int64), np.empty(0), np.empty((6, 0)), np.empty((21, 0)), np.empty((3, 0))
+)
+
+
+class EstimatedFlights:
+    """What has come of trackers' states: confirmed and coasted tracks that have a range.
+
+    Of one run or of many; what came in each run stands together, in order.
+    """
+
+    def __init__(self) -> None:
+        #: When each row came, where its tracks begin and how many there are.
+        self._came: IntArray = np.empty(0, dtype=np.int64)
+        self._begin: IntArray = np.empty(0, dtype=np.int64)
+        self._count: IntArray = np.empty(0, dtype=np.int64)
+        self._estimate = _NONE
+
+    def add(self, came: IntArray, tracks: StateTracks) -> None:
+        """Take in tracks of a tracker, and when each row came."""
+        good = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
+        before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
+        self._came = np.concatenate([self._came, came])
+        self._begin = np.concatenate([self._begin, len(self._estimate.number) + before[:-1]])
+        self._count = np.concatenate([self._count, np.diff(before)])
+        self._estimate = self._estimate.with_more(_Estimates.of(tracks).take(np.flatnonzero(good)))
+        if bool((self._came[1:] < self._came[:-1]).any()):
+            self._keep_rows(np.argsort(self._came, kind="stable"))
+
+    def _keep_rows(self, which: IntArray | BoolArray) -> None:
+        self._came, self._begin = self._came[which], self._begin[which]
+        self._count = self._count[which]
+
+    def keep(self, which: BoolArray) -> None:
+        """Keep some of the rows that came."""
+        if which.all():
+            return
+        self._keep_rows(which)
+        self._estimate = self._estimate.take(_each(self._begin, self._count)[1])
+        self._begin = np.cumsum(self._count) - self._count
+
+    @property
+    def came(self) -> IntArray:
+        """When the rows that are remembered came."""
+        return self._came
+
+    def states(
+        self, now: IntArray, now_s: FloatArray, begins: IntArray, own_place: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
+        """Return the flights that are known at some instants, by instant and track.
+
+        Parameters
+        ----------
+        now : (instants,) of int
+            Ticks; what comes later is not known yet.
+        now_s : (instants,)
+            The same, since the start of the run; states are carried on straight until then.
+        begins : (instants,) of int
+            When the run of each begins.
+        own_place : (3, instants)
+            Of the ownship: latitude and longitude (rad), height (m).
+
+        Returns
+        -------
+        instant, number : (flights,) of int
+            Place of the instant, and the track's number; ascending.
+        state : (6, flights)
+            Place from the ownship, east, north, up in its plane, and velocity over ground there.
+        deviations : Deviations of (flights,)
+        """
+        last = np.searchsorted(self._came, now, side="right") - 1
+        some = np.flatnonzero(last >= np.searchsorted(self._came, begins))
+        place, entry = _each(self._begin[last[some]], self._count[last[some]])
+        instant = some[place]
+        order = np.lexsort((self._estimate.number[entry], instant))
+        instant, estimate = instant[order], self._estimate.take(entry[order])
+        ahead_s = now_s[instant] - estimate.time_s
+        state = _in_plane(estimate, ahead_s, own_place[:, instant])
+        return instant, estimate.number, state, _deviations(estimate.covariance, ahead_s)
+
+
+def _each(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the row of every entry of some rows, and its place."""
+    row = np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    return row, np.arange(len(row)) + (begin - first)[row]
+
+
+def _in_plane(estimate: _Estimates, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
+    """Return places and velocities in the plane that touches the sphere below the ownship."""
+    north, east, down = estimate.state[:3] + estimate.state[3:] * ahead_s
+    lat_deg, lon_deg, alt_m = enu_to_geodetic(
+        east, north, -down,
+        reference_lat_deg=estimate.origin[0], reference_lon_deg=estimate.origin[1],
+        reference_alt_m=estimate.origin[2],
+    )  # fmt: skip
+    # The frame's axes are those of its origin; velocity counts along those of the target's place.
+    there, here = ned_axes(lat_deg, lon_deg), ned_axes(estimate.origin[0], estimate.origin[1])
+    in_space = sum(v * axis for v, axis in zip(estimate.state[3:], here, strict=True))
+    v_north, v_east, v_down = ((in_space * axis).sum(axis=0) for axis in there)
+    own_lat, own_lon, own_alt_m = own_place
+    lat, lon = np.radians(lat_deg), np.radians(lon_deg)
+    return np.stack(
+        [
+            *east_north_m(lat, lon, own_lat, own_lon),
+            alt_m - own_alt_m,
+            *east_north_mps(lat, lon, v_east, v_north, own_lat, own_lon),
+            -v_down,
+        ]
+    )
+
+
+def _deviations(covariance: FloatArray, ahead_s: FloatArray) -> Deviations:
+    """Return the standard deviations of states that are carried on straight."""
+
+    def of(i: int, j: int) -> AnyArray:
+        return covariance[_PAIRS.index((min(i, j), max(i, j)))]
+
+    def later(i: int, j: int) -> AnyArray:
+        return of(i, j) + ahead_s * (of(i, j + 3) + of(j, i + 3)) + ahead_s**2 * of(i + 3, j + 3)
+
+    def root(variance: AnyArray) -> AnyArray:
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    return Deviations(
+        largest(root(later(1, 1)), root(later(0, 0)), later(0, 1)),
+        root(later(2, 2)),
+        largest(root(of(4, 4)), root(of(3, 3)), of(3, 4)),
+        root(of(5, 5)),
+    )
+
+
+class BelievedTracks:
+    """Tracks of one tracker over time, in one run or in many; what came in each stands together."""
+
+    def __init__(self) -> None:
+        self._estimates = EstimatedFlights()
+        self._true_came: IntArray = np.empty(0, dtype=np.int64)
+        self._true_m: FloatArray = np.empty((0, 0, 3))
+
+    def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
+        """Take in the tracks of a tracker."""
+        self._estimates.add(arrived.tick, arrived.message)
+
+    def add_truth(self, came: IntArray, time_s: FloatArray, position_m: FloatArray) -> None:
+        """Take in where the targets are (rows, targets, 3): a track is named by the nearest."""
+        held = self._true_m if len(self._true_m) else np.empty((0, *position_m.shape[1:]))
+        self._true_came = np.concatenate([self._true_came, came])
+        self._true_m = np.concatenate([held, position_m])
+        if bool((self._true_came[1:] < self._true_came[:-1]).any()):
+            self._keep_true(np.argsort(self._true_came, kind="stable"))
+
+    def _keep_true(self, which: IntArray | BoolArray) -> None:
+        self._true_came, self._true_m = self._true_came[which], self._true_m[which]
+
+    def flights(
+        self,
+        ticks: IntArray,
+        times_s: FloatArray,
+        begins: IntArray,
+        own: Mapping[str, FloatArray],
+        poses: OwnPoses,
+    ) -> BelievedFlights:
+        """Return the flights of tracks at some scans, one in each row.
+
+        `own` has the ownship's velocity, NaN where unknown yet.
+        """
+        # Without two poses the ownship's own velocity is not known, and no relative one.
+        asked = np.flatnonzero(np.isfinite(own["east_mps"]))
+        found = self._estimates.states(
+            ticks[asked], times_s[asked], begins[asked], poses.place(ticks[asked])
+        )
+        scan, number, state, deviations = asked[found[0]], *found[1:]
+        mine = (own[name][scan] for name in _OWN_VELOCITY)
+        velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
+        relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))
+        known = np.ones((len(scan), 1), dtype=bool)
+        target = self._nearest(ticks[scan], state[:3].T)
+        return BelievedFlights(known, relative, scan, target, number, deviations)
+
+    def _nearest(self, ticks: IntArray, position_m: FloatArray) -> IntArray:
+        """Return the target nearest to each of some positions (n, 3), -1 where none is near."""
+        if self._true_m.shape[1] == 0 or len(ticks) == 0:
+            return np.full(len(ticks), -1, dtype=np.int64)
+        last = np.maximum(np.searchsorted(self._true_came, ticks, side="right") - 1, 0)
+        away = self._true_m[last] - position_m[:, np.newaxis]
+        range_m = np.nan_to_num(np.linalg.norm(away, axis=2), nan=np.inf)
+        return np.where(range_m.min(axis=1) <= _SAME_TARGET_M, range_m.argmin(axis=1), -1)
+
+    def forget(self, ticks: IntArray, times_s: FloatArray, wake: Wake) -> None:
+        """Drop what later ones have replaced at some scans."""
+        self._estimates.keep(_still_asked(self._estimates.came, ticks, wake))
+        kept = _still_asked(self._true_came, ticks, wake)
+        if not kept.all():
+            self._keep_true(kept)
+
+
+def _still_asked(came: IntArray, ticks: IntArray, wake: Wake) -> BoolArray:
+    """Return which rows are asked for after some scans: the last before them, and later ones."""
+    run, of_scan = wake.replica_of(came), wake.replica_of(ticks)
+    ends = np.flatnonzero(np.append(of_scan[1:] != of_scan[:-1], True))
+    last = np.searchsorted(came, ticks[ends], side="right") - 1
+    place = np.searchsorted(of_scan[ends], run)
+    there = np.minimum(place, len(ends) - 1)
+    # Of runs without a scan all rows; side by side these come again, else they have passed.
+    kept = (of_scan[ends][there] != run) | (np.arange(len(came)) >= last[there])
+    return kept if wake.side_by_side else kept & (run >= of_scan[-1])

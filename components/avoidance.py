@@ -1,0 +1,191 @@
+"""An avoidance that flies out of the bands of guidance (``avoidance.daidalus``)."""
+
+import math
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from components.guidance.daidalus import ConfParameters, changes_out, smaller
+from components.messages.alerts import AlertLevels
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
+from components.messages.tracks import Tracks
+from dsa_des.block.component import Component, NonNegativeRational, Parameters
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+_KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
+# Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
+# 2 m/s² and a quarter of gravity.
+_TURN_RATE_RAD_S = math.radians(3.0)
+_VERTICAL_RATE_MPS = 500.0 * 0.3048 / 60.0
+_ACCELERATION_MPS2, _VERTICAL_ACCELERATION_MPS2 = 2.0, 0.25 * 9.80665
+
+
+class TurnOutParameters(ConfParameters):
+    """Parameters of turning out of a band."""
+
+    level: int = Field(default=2, ge=1, description="Turn when an alert is of this level or above.")
+    manoeuvre: Literal["turn", "climb", "speed", "vertical_speed"] = Field(
+        default="turn",
+        description="Whether to change direction, altitude, ground speed or vertical speed.",
+    )
+    beyond_deg: float = Field(
+        default=0.0, ge=0, le=90, description="Turn so much beyond the edge of the band, deg."
+    )
+    beyond_m: float = Field(
+        default=0.0, ge=0, le=3000, description="Climb or descend so much beyond its edge, m."
+    )
+    beyond_mps: float = Field(
+        default=0.0, ge=0, le=50, description="Change speeds so much beyond their edge, m/s."
+    )
+    pause_s: NonNegativeRational = Field(
+        default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
+    )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to manoeuvres that are not chosen."""
+        used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
+        keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
+        because = f"manoeuvre is '{self.manoeuvre}'"
+        return super().without_effect() + self.idle(*sorted(keys), because=because)
+
+
+class TurnOut(Component):
+    """Steers the ownship by the smallest change that leads clear, when an alert is due.
+
+    The change is one of direction, altitude, ground speed or vertical speed. The bands are those of
+    DAIDALUS, each instant by itself, over all targets whose flights the alerting knows. Where no
+    value is clear it goes towards the recovery band; without one it leaves the ownship alone.
+    """
+
+    inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
+    outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
+    Parameters = TurnOutParameters
+    windowed = True
+    lockstep = True
+    side_by_side = True
+    rewindable = True
+
+    def setup(self) -> None:
+        """Read the configuration; start free to turn."""
+        self._configuration, self._alerter = self.p.read()
+        rate_deg_s = math.degrees(self._configuration["turn_rate"])
+        if 0.0 < rate_deg_s < SLOWEST_TURN_DEG_S:
+            raise ValueError(
+                f"turn_rate of its configuration is {rate_deg_s:g} deg/s: it must be at least "
+                f"{SLOWEST_TURN_DEG_S:g}, or 0 for 3"
+            )
+        self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
+        #: By replica, from when on it may turn again.
+        self._free_from: dict[int, int] = {}
+
+    def run(self, wake: Wake) -> Manoeuvres | None:
+        """Look at every instant with an alert."""
+        alerts: AlertLevels | None = wake["alerts"]
+        if alerts is None:
+            return None
+        told: dict[int, Manoeuvre] = {}
+        alerted = np.flatnonzero(alerts.highest() >= self.p.level)
+        left = zip(alerted.tolist(), wake.replica[alerted].tolist(), strict=True)
+        waiting = list(left)
+        kind = _KINDS[self.p.manoeuvre]
+        while waiting:
+            # The first row of every replica at which it is free, and then on to the next ones.
+            now: dict[int, int] = {}
+            later = []
+            for place, run in waiting:
+                if run in now:
+                    later.append((place, run))
+                elif wake.ticks[place] >= self._free_from.get(run, 0):
+                    now[run] = place
+            rows = list(now.values())
+            found = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+            for (run, place), changes in zip(now.items(), found, strict=True):
+                change = None if changes is None else smaller(changes)
+                if change is not None:
+                    told[place] = self._manoeuvre(change)
+                    self._free_from[run] = int(wake.ticks[place]) + self._pause_ticks
+            waiting = later
+        return Manoeuvres.at_rows(wake.ticks, told)
+
+    def _manoeuvre(self, change: float) -> Manoeuvre:
+        """Return what makes a change."""
+        conf = self._configuration
+        if self.p.manoeuvre == "climb":
+            beyond_m = math.copysign(self.p.beyond_m, change)
+            rate_mps = conf["vertical_rate"] or _VERTICAL_RATE_MPS
+            return Manoeuvre(climb_m=change + beyond_m, climb_rate_mps=rate_mps)
+        if self.p.manoeuvre in ("speed", "vertical_speed"):
+            beyond = change + math.copysign(self.p.beyond_mps, change)
+            if self.p.manoeuvre == "speed":
+                acceleration = conf["horizontal_accel"] or _ACCELERATION_MPS2
+                return Manoeuvre(speed_mps=beyond, acceleration_mps2=acceleration)
+            acceleration = conf["vertical_accel"] or _VERTICAL_ACCELERATION_MPS2
+            return Manoeuvre(vertical_speed_mps=beyond, vertical_acceleration_mps2=acceleration)
+        away = min(abs(change) + math.radians(self.p.beyond_deg), math.pi)
+        rate_rad_s = conf["turn_rate"] or _TURN_RATE_RAD_S
+        return Manoeuvre(turn_rad=math.copysign(away, change), rate_rad_s=rate_rad_s)
+
+
+class TurnAwayParameters(Parameters):
+    """Parameters of turning away."""
+
+    range_km: float = Field(default=5.0, gt=0, description="Turn for tracks nearer than this, km.")
+    turn_deg: float = Field(
+        default=30.0, gt=0, le=180, description="Change of heading, away from the nearest, deg."
+    )
+    rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turn, deg/s."
+    )
+    pause_s: NonNegativeRational = Field(
+        default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
+    )
+
+
+class TurnAway(Component):
+    """Turns away from the nearest track in range, and then leaves the ownship alone for a while.
+
+    It closes the loop from what is sensed to where the ownship flies; the rule itself is as simple
+    as can be. Tracks without a range are not acted on.
+    """
+
+    inputs = {"tracks": Input(Tracks, "trigger", "What is held of every target.")}
+    outputs = {"manoeuvres": Output(Manoeuvres, "Turns that the ownship is told to fly.")}
+    Parameters = TurnAwayParameters
+    windowed = True
+    lockstep = True
+    side_by_side = True
+    rewindable = True
+
+    def setup(self) -> None:
+        """Start free to turn."""
+        self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
+        #: By replica, from when on it may turn again.
+        self._free_from: dict[int, int] = {}
+
+    def run(self, wake: Wake) -> Manoeuvres | None:
+        """Look for the nearest track at every instant."""
+        tracks = wake["tracks"]
+        if tracks is None:
+            return None
+        near = tracks.range_m <= 1000.0 * self.p.range_km
+        row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
+        ticks, turns = [], []
+        replica = wake.replica
+        for place in np.unique(row[near]).tolist():
+            tick = int(wake.ticks[place])
+            run = int(replica[place])
+            if tick < self._free_from.get(run, 0):
+                continue
+            entries = np.flatnonzero(near & (row == place))
+            nearest = entries[np.argmin(tracks.range_m[entries])]
+            to_the_right = tracks.azimuth_rad[nearest] <= 0.0
+            ticks.append(tick)
+            turns.append(math.radians(self.p.turn_deg) * (1.0 if to_the_right else -1.0))
+            self._free_from[run] = tick + self._pause_ticks
+        if not ticks:
+            return None
+        rate = np.full(len(ticks), math.radians(self.p.rate_deg_s))
+        return Manoeuvres(np.array(ticks, dtype=np.int64), np.array(turns), rate)

@@ -1,1 +1,0 @@
-"""The ownship's reaction to what it sees."""

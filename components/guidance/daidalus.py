@@ -1,0 +1,220 @@
+"""Bands of guidance in a scene (``guidance.daidalus``), and the ways out of them."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from components.alert_configuration.conf_file import read_conf
+from components.alert_configuration.configuration import Alerter, Configuration, Deviations, margins
+from components.guidance.bands import Guidance, guidance_of_many, resolution
+from components.guidance.intervals import FULL_TURN, same_place
+from components.guidance.regions import GuidedIntruders
+from components.guidance.situation import State
+from components.messages.alerts import BAND_KINDS, BAND_REGIONS, AlertLevels, GuidanceBands
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component, Parameters, ScenePath
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+
+class ConfParameters(Parameters):
+    """A configuration and the alerter of all targets."""
+
+    conf: ScenePath = Field(
+        description="Volumes, times and rate of turn: a .conf file of DAIDALUS."
+    )
+    alerter: int = Field(
+        default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
+    )
+
+    @field_validator("conf", mode="after")
+    @classmethod
+    def _readable(cls, value: Any) -> Any:
+        read_conf(value)
+        return value
+
+    def read(self) -> tuple[Configuration, Alerter]:
+        """Return the configuration and the alerter.
+
+        Raises
+        ------
+        ValueError
+            The file has fewer alerters.
+        """
+        configuration = read_conf(self.conf)
+        count = len(configuration.alerters)
+        if self.alerter > count:
+            raise ValueError(
+                f"alerter is {self.alerter}: it must be at most {count}, the number of alerters "
+                f"of {self.conf}"
+            )
+        return configuration, configuration.alerters[self.alerter - 1]
+
+
+_OWN = ("alt_m", "east_mps", "north_mps", "climb_mps")
+_RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
+
+
+Changes = tuple[float, float]
+
+
+def changes_out(
+    kind_name: str,
+    configuration: Configuration,
+    alerter: Alerter,
+    alerts: AlertLevels,
+    rows: Sequence[int],
+) -> list[Changes | None]:
+    """Return the smallest changes to either side that lead out of the bands at some instants.
+
+    Parameters
+    ----------
+    kind_name : {"hdir", "hs", "vs", "alt"}
+    configuration : Configuration
+    alerter : Alerter
+        Of all targets.
+    alerts : AlertLevels
+    rows : sequence of int
+        Of the message; each is looked at by itself.
+
+    Returns
+    -------
+    list of (float, float) or None
+        To the left or down, negative, and to the right or up, positive, rad, m/s or m; infinite
+        where nothing there leads out. None where the own value needs no change or is not known yet.
+    """
+    region, cyclic = configuration["corrective_region"], kind_name == "hdir"
+    return [
+        None if guided is None else _changes(guided, region, cyclic)
+        for guided in bands_around(kind_name, configuration, alerter, alerts, rows)
+    ]
+
+
+def bands_around(
+    kind_name: str,
+    configuration: Configuration,
+    alerter: Alerter,
+    alerts: AlertLevels,
+    rows: Sequence[int],
+) -> list[Guidance | None]:
+    """Return the bands at some instants, each by itself; None where nothing is known yet.
+
+    Parameters are those of `changes_out`.
+    """
+    found: list[Guidance | None] = [None] * len(rows)
+    own = np.array([alerts.own_motion[name][rows] for name in _OWN]).reshape(len(_OWN), -1)
+    known = np.flatnonzero(np.isfinite(own).all(axis=0))
+    first = alerts.offsets[np.asarray(rows, dtype=np.int64)]
+    counts = alerts.offsets[np.asarray(rows, dtype=np.int64) + 1] - first
+    for count in np.flatnonzero(np.bincount(counts[known])).tolist():
+        alike = known[counts[known] == count]
+        zero = np.zeros(len(alike))
+        state = State(zero, zero, *own[:, alike])
+        intruders = [
+            _intruder(alerts, first[alike] + i, state, configuration, alerter) for i in range(count)
+        ]
+        every = guidance_of_many(kind_name, configuration, state, intruders)
+        for place, guided in zip(alike.tolist(), every, strict=True):
+            found[place] = guided
+    return found
+
+
+def _intruder(
+    alerts: AlertLevels,
+    entries: IntArray,
+    own: State,
+    configuration: Configuration,
+    alerter: Alerter,
+) -> GuidedIntruders:
+    """Return one intruder of each of some ownships."""
+    parts = [alerts.relative[name][entries] for name in _RELATIVE]
+    bounds = None
+    if alerts.deviations:
+        wrong = Deviations(*(alerts.deviations[name][entries] for name in Deviations._fields))
+        bounds = margins(configuration, wrong, np.hypot(parts[0], parts[1]))
+    state = State(*(mine - part for mine, part in zip(own, parts, strict=True)))
+    early = np.zeros(len(entries), dtype=np.int64)
+    return GuidedIntruders(state, alerter, early, bounds=bounds)
+
+
+def _changes(found: Guidance, region: str, cyclic: bool) -> Changes | None:
+    way = resolution(found.bands, found.own_value, region, cyclic)
+    if way is None:
+        return None
+    if not cyclic:
+        return way.low - found.own_value, way.high - found.own_value
+    low = -((found.own_value - way.low) % FULL_TURN) if math.isfinite(way.low) else -math.inf
+    high = (way.high - found.own_value) % FULL_TURN if math.isfinite(way.high) else math.inf
+    return low, high
+
+
+def smaller(changes: tuple[float, float]) -> float | None:
+    """Return the smaller of two changes, to the right or up where they are equal.
+
+    None where there is neither.
+    """
+    low, high = changes
+    change = high if high <= -low or same_place(high, -low) else low
+    return change if math.isfinite(change) else None
+
+
+_NAMES = {"direction": "hdir", "altitude": "alt"}
+
+
+class GuidanceParameters(ConfParameters):
+    """Parameters of guidance."""
+
+    level: int = Field(
+        default=1, ge=0, description="Bands are given where an alert is of this level or above."
+    )
+
+
+class DaidalusGuidance(Component):
+    """Which directions and altitudes lose separation, by the rules of DAIDALUS (RTCA DO-365).
+
+    Over all targets whose flights the alerting knows, at each of its scans by itself. It steers
+    nobody; `avoidance.daidalus` flies out of the same bands.
+    """
+
+    inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
+    outputs = {"bands": Output(GuidanceBands, "Directions and altitudes that lose separation.")}
+    Parameters = GuidanceParameters
+    windowed = True
+    lockstep = True
+    rewindable = True
+
+    def setup(self) -> None:
+        """Read the configuration."""
+        self._configuration, self._alerter = self.p.read()
+
+    def run(self, wake: Wake) -> GuidanceBands | None:
+        """Give the bands of every instant with an alert."""
+        alerts: AlertLevels | None = wake["alerts"]
+        if alerts is None:
+            return None
+        rows = np.flatnonzero(alerts.highest() >= self.p.level).tolist()
+        found: list[tuple[int, int, int, float, float]] = []
+        for number, kind in enumerate(BAND_KINDS):
+            every = bands_around(_NAMES[kind], self._configuration, self._alerter, alerts, rows)
+            for place, guided in enumerate(every):
+                found += [
+                    (place, number, BAND_REGIONS.index(band.region), band.low, band.high)
+                    for band in (() if guided is None else guided.bands)
+                    if band.region != "NONE"
+                ]
+        if not found:
+            return None
+        found.sort(key=lambda one: one[0])
+        table = np.array(found)
+        line, code = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
+        turned = code == BAND_KINDS.index("direction")
+        ends = [
+            np.where(where, table[:, k], math.nan) for where in (turned, ~turned) for k in (3, 4)
+        ]
+        region = table[:, 2].astype(np.int64)
+        ticks = wake.ticks[np.array(rows, dtype=np.int64)]
+        return GuidanceBands(ticks, offsets_of(line, len(rows)), code, region, *ends)

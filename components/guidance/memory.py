@@ -1,0 +1,383 @@
+"""Memory of guidance: M-of-N and persistence of bands, hysteresis of resolutions."""
+
+import math
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from components.alert_configuration.configuration import REGIONS, Configuration
+from components.guidance.bands import Guidance, Resolution, away, is_red, resolution
+from components.guidance.intervals import FULL_TURN, Band, joined, named_recovery, same_place
+from components.guidance.recovery import Recovery
+
+_OUTSIDE = -1
+_SEVERE = ("FAR", "MID", "NEAR")
+
+
+class BandMemory:
+    """The memory of one kind of bands of one ownship.
+
+    Parameters
+    ----------
+    values : mapping
+        Values of a configuration, by key.
+    cyclic : bool
+        Whether the values are directions, of which 0 and a full turn are one place.
+    """
+
+    def __init__(self, values: Any, cyclic: bool) -> None:
+        self._hysteresis_s: float = values["hysteresis_time"]
+        self._m, self._n = int(values["alerting_m"]), int(values["alerting_n"])
+        self._counts = self._hysteresis_s > 0.0 and 0 < self._m <= self._n
+        self._persistence_s: float = values["persistence_time"]
+        self._persists = self._persistence_s > 0.0 and values["bands_persistence"]
+        self._persists = self._persists and self._hysteresis_s > 0.0
+        self._cyclic = cyclic
+        self._last_s: float | None = None
+        self._clear()
+
+    def _clear(self) -> None:
+        self._places: list[float] = []
+        self._queues: list[tuple[list[int], list[int]]] = []
+        self._held: Band | None = None
+        self._risen_s = 0.0
+
+    def step(
+        self, now_s: float, line: list[Band], own_value: float, recovery: Recovery | None
+    ) -> list[Band]:
+        """Take in the bands of one instant, and return them as remembered.
+
+        Parameters
+        ----------
+        now_s : float
+        line : list of Band
+            As painted, before NONE is called RECOVERY.
+        own_value : float
+        recovery : Recovery or None
+            Of that instant.
+
+        Returns
+        -------
+        list of Band
+            From the lowest to the highest value.
+        """
+        since_s = None if self._last_s is None else now_s - self._last_s
+        if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
+            self._clear()
+        self._last_s = now_s
+        if self._counts:
+            line = self._counted(line)
+        if self._persists:
+            line = self._persisting(now_s, line, own_value)
+        # Ways out that are remembered count as long as one is needed, also where none is left now.
+        if recovery is None:
+            line = joined(b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line)
+        recovers = recovery is not None and recovery.time_s >= 0.0
+        bands = named_recovery(line) if recovers else line
+        if self._persists:
+            self._remember(bands, own_value)
+        return bands
+
+    def _counted(self, line: list[Band]) -> list[Band]:
+        """Return the line in which each colour is the m-th largest of its place's last n."""
+        places = [line[0].low, *(band.high for band in line)]
+        colours = [REGIONS.index(band.region) for band in line]
+        # Colours to the left and to the right of each place.
+        left, right = [_OUTSIDE, *colours], [*colours, _OUTSIDE]
+        if self._cyclic:
+            left[0], right[-1] = left[-1], right[0]
+        if not self._places:
+            self._places = list(places)
+            self._queues = [
+                (self._first(a), self._first(b)) for a, b in zip(left, right, strict=True)
+            ]
+        self._meet(places, left, right)
+        found: list[int] = []
+        for queues, a, b in zip(self._queues, left, right, strict=True):
+            for queue, colour in zip(queues, (a, b), strict=True):
+                queue.append(colour)
+                del queue[0]
+            found.append(sorted(queues[1])[-self._m])
+        made = joined(
+            Band(low, high, REGIONS[max(colour, 0)])
+            for low, high, colour in zip(places[:-1], places[1:], found[:-1], strict=True)
+        )
+        last = len(self._places) - 1
+        kept = [
+            i for i in range(last + 1) if i in (0, last) or self._queues[i][0] != self._queues[i][1]
+        ]
+        self._places = [self._places[i] for i in kept]
+        self._queues = [self._queues[i] for i in kept]
+        return made
+
+    def _first(self, colour: int) -> list[int]:
+        return [colour] * self._m + [_OUTSIDE] * (self._n - self._m)
+
+    def _meet(self, places: list[float], left: list[int], right: list[int]) -> None:
+        """Let the line and the memory hold the same places, one for one, from the lowest on."""
+        at = 0
+        while at < max(len(places), len(self._places)):
+            mine = self._places[at] if at < len(self._places) else math.inf
+            other = places[at] if at < len(places) else math.inf
+            if not same_place(mine, other):
+                if mine < other:
+                    places.insert(at, mine)
+                    left.insert(at, left[at])
+                    right.insert(at, left[at + 1])
+                else:
+                    queue = self._queues[at][0]
+                    self._places.insert(at, other)
+                    self._queues.insert(at, (list(queue), list(queue)))
+            at += 1
+
+    def _persisting(self, now_s: float, line: list[Band], own_value: float) -> list[Band]:
+        """Return the line with the remembered band painted over milder ones while it is young."""
+        held = self._held
+        if held is None:
+            self._risen_s = now_s
+            return line
+        region = _region_at(line, own_value)
+        colour, remembered = REGIONS.index(region), REGIONS.index(held.region)
+        if colour < remembered and 0.0 <= now_s - self._risen_s < self._persistence_s:
+            return _painted_over(line, held, remembered)
+        if region in _SEVERE and colour > remembered:
+            self._risen_s = now_s
+        return line
+
+    def _remember(self, bands: list[Band], own_value: float) -> None:
+        at = band_at(bands, own_value)
+        self._held = None
+        if bands[at].region not in _SEVERE:
+            return
+        self._held = bands[at]
+        first, last = bands[0], bands[-1]
+        across = self._cyclic and len(bands) > 1 and first.region == last.region
+        if across and at in (0, len(bands) - 1):
+            # Beyond a full turn where it holds north.
+            self._held = Band(last.low, first.high + FULL_TURN, first.region)
+
+
+def band_at(bands: list[Band], value: float) -> int:
+    """Return the band that holds a value: of two that meet there, the free or milder one."""
+    holding = [
+        i
+        for i, band in enumerate(bands)
+        if band.low <= value <= band.high
+        or same_place(band.low, value)
+        or same_place(band.high, value)
+    ]
+    if not holding:  # beyond the limits
+        return 0 if value < bands[0].low else len(bands) - 1
+
+    def mildness(i: int) -> int:
+        region = bands[i].region
+        return -1 if region == "RECOVERY" else REGIONS.index(region)
+
+    return min(holding, key=mildness)
+
+
+def _region_at(bands: list[Band], value: float) -> str:
+    return bands[band_at(bands, value)].region
+
+
+def _painted_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
+    """Return the line with a band painted over those of milder regions."""
+    spans = [(held.low, held.high)]
+    if held.high > line[-1].high and not same_place(held.high, line[-1].high):
+        spans = [(held.low, line[-1].high), (line[0].low, held.high - FULL_TURN)]
+    places = [line[0].low, *(band.high for band in line)]
+    least, most = places[0], places[-1]
+    for value in (edge for span in spans for edge in span):
+        if least < value < most and not any(same_place(place, value) for place in places):
+            places.append(value)
+    places.sort()
+    made = []
+    for low, high in pairwise(places):
+        middle = 0.5 * (low + high)
+        region = next(b.region for b in line if b.low <= middle <= b.high)
+        inside = any(a <= middle <= b for a, b in spans)
+        if inside and REGIONS.index(region) < remembered:
+            region = held.region
+        made.append(Band(low, high, region))
+    return joined(made)
+
+
+_LOW, _HIGH = 0, 1
+
+
+class ResolutionMemory:
+    """The memory of one kind of resolutions of one ownship.
+
+    An earlier way out is kept while the preferred side is young, while the recovery cylinder was
+    larger, or while it is near the new one; and as long as the bands between the two are not red.
+    The preferred side changes only when it is no longer young and the other way clearly shorter.
+
+    Parameters
+    ----------
+    values : mapping
+        Values of a configuration, by key.
+    kind_name : {"hdir", "hs", "vs", "alt"}
+    """
+
+    def __init__(self, values: Any, kind_name: str) -> None:
+        self._hysteresis_s: float = values["hysteresis_time"]
+        self._persistence_s: float = values["persistence_time"]
+        self._near: float = values[f"persistence_preferred_{kind_name}"]
+        self._least_red = REGIONS.index(values["corrective_region"])
+        self._cyclic = kind_name == "hdir"
+        self._last_s: float | None = None
+        self._clear()
+
+    def _clear(self) -> None:
+        self._shown = [math.nan, math.nan]
+        # How often the recovery cylinder had been made smaller for what is shown.
+        self._shrinks = [-1, -1]
+        self._prefers_high = False
+        self._since_s: float | None = None
+
+    def step(
+        self,
+        now_s: float,
+        found: Resolution | None,
+        bands: list[Band],
+        own_value: float,
+        recovery: Recovery | None,
+    ) -> Resolution | None:
+        """Take in the resolution of one instant, and return the one that is shown.
+
+        Parameters
+        ----------
+        now_s : float
+        found : Resolution or None
+            Of the bands of that instant.
+        bands : list of Band
+            The bands as remembered.
+        own_value : float
+        recovery : Recovery or None
+        """
+        since_s = None if self._last_s is None else now_s - self._last_s
+        if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
+            self._clear()
+        self._last_s = now_s
+        if self._hysteresis_s == 0.0:
+            return found
+        raw = [math.nan, math.nan] if found is None else [found.low, found.high]
+        shrinks = -1 if recovery is None else recovery.shrinks
+        if self._since_s is None or now_s <= self._since_s or self._near == 0.0:
+            self._shown, self._shrinks, self._since_s = list(raw), [shrinks, shrinks], None
+        else:
+            young = now_s - self._since_s < self._persistence_s
+            for side in (_HIGH, _LOW):
+                holds = young or self._shrinks[side] < shrinks
+                if not self._keeps(side, raw[side], bands, own_value, holds):
+                    self._shown[side], self._shrinks[side] = raw[side], shrinks
+        self._prefer(now_s, raw, own_value, shrinks)
+        if found is None:
+            return None
+        return Resolution(self._shown[_LOW], self._shown[_HIGH], self._prefers_high)
+
+    def _keeps(
+        self, side: int, raw: float, bands: list[Band], own_value: float, holds: bool
+    ) -> bool:
+        """Tell whether the way out that was shown stays; `holds` however far it is."""
+        old = self._shown[side]
+        if not (math.isfinite(old) and math.isfinite(raw)):
+            return False
+        beyond = self._outwards(side, own_value, old)
+        if not (beyond <= math.pi if self._cyclic else beyond >= 0.0):
+            return False
+        if not holds and self._outwards(side, raw, old) >= self._near:
+            return False
+        return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
+
+    def _outwards(self, side: int, start: float, end: float) -> float:
+        """Return how far it is from one value to another, to a side."""
+        way = end - start if side == _HIGH else start - end
+        return way % FULL_TURN if self._cyclic else way
+
+    def _band_of(self, side: int, edge: float, bands: list[Band]) -> int:
+        """Return which band that is not red begins above an edge, or ends below it."""
+        if self._cyclic and (same_place(edge, 0.0) or same_place(edge, FULL_TURN)):
+            return 0 if side == _HIGH else len(bands) - 1
+        free = [i for i, band in enumerate(bands) if not is_red(band, self._least_red)]
+        if side == _HIGH:
+            return next((i for i in free if same_place(bands[i].low, edge)), -1)
+        return next((i for i in reversed(free) if same_place(bands[i].high, edge)), -1)
+
+    def _leads(self, start: int, end: int, bands: list[Band]) -> bool:
+        """Tell whether bands lead to another one, towards the preferred side, and none is red."""
+        if start < 0:
+            return False
+        at = start
+        while at != end:
+            at += 1 if self._prefers_high else -1
+            if self._cyclic:
+                at %= len(bands)
+            if at == start or not 0 <= at < len(bands) or is_red(bands[at], self._least_red):
+                return False
+        return True
+
+    def _prefer(self, now_s: float, raw: list[float], own_value: float, shrinks: int) -> None:
+        low, high = raw
+        if not (math.isfinite(low) or math.isfinite(high)):
+            self._prefers_high, self._since_s = False, None
+        elif not math.isfinite(high):
+            if self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+        elif not math.isfinite(low):
+            if not self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+        else:
+            down, up = (away(own_value, edge, self._cyclic) for edge in (low, high))
+            nearer_high = up <= down or same_place(up, down)
+            other = self._shrinks[_LOW if self._prefers_high else _HIGH]
+            mine = self._shrinks[_HIGH if self._prefers_high else _LOW]
+            if self._since_s is None:
+                self._prefers_high, self._since_s = nearer_high, now_s
+            elif now_s - self._since_s < self._persistence_s or abs(up - down) < self._near:
+                return
+            elif other <= mine and nearer_high != self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+
+    def _switch(self, now_s: float, raw: list[float], shrinks: int) -> None:
+        self._prefers_high, self._since_s = not self._prefers_high, now_s
+        for side in (_LOW, _HIGH):
+            if self._shrinks[side] >= shrinks:
+                self._shown[side] = raw[side]
+
+
+class Remembered(NamedTuple):
+    """The bands of one kind at one instant, and the way out of them.
+
+    Parameters
+    ----------
+    bands : list of Band
+    resolution : Resolution or None
+    """
+
+    bands: list[Band]
+    resolution: Resolution | None
+
+
+class GuidanceMemory:
+    """What is remembered of the guidance of one kind, for one ownship.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        With `hysteresis_time` 0 every instant stands by itself.
+    kind_name : {"hdir", "hs", "vs", "alt"}
+    """
+
+    def __init__(self, configuration: Configuration, kind_name: str) -> None:
+        self._cyclic = kind_name == "hdir"
+        self._corrective: str = configuration["corrective_region"]
+        self._bands = BandMemory(configuration, self._cyclic)
+        self._resolutions = ResolutionMemory(configuration, kind_name)
+
+    def step(self, now_s: float, found: Guidance) -> Remembered:
+        """Take in the guidance of one instant, later than the last, and return what is shown."""
+        own_value, recovery = found.own_value, found.recovery
+        bands = self._bands.step(now_s, found.line, own_value, recovery)
+        way = resolution(bands, own_value, self._corrective, self._cyclic)
+        shown = self._resolutions.step(now_s, way, bands, own_value, recovery)
+        return Remembered(bands, shown)

@@ -1,0 +1,176 @@
+"""Separation of aircraft now and projected, and between samples of a curved flight."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from components.well_clear.relative_motion import (
+    horizontal_of,
+    modified_tau_s,
+    nearly_zero,
+    time_to_closest_s,
+)
+from components.well_clear.volume import Relative
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+
+class PairSeparation(NamedTuple):
+    """Present and projected distances of pairs of aircraft, each (n,).
+
+    Parameters
+    ----------
+    horizontal_m, vertical_m : ndarray
+        Distances now.
+    horizontal_mps, vertical_mps : ndarray
+        Relative speeds (not rates of the distances).
+    miss_horizontal_m, miss_vertical_m : ndarray
+        Projected closest distances within the lookahead.
+    time_to_closest_s, closest_m : ndarray
+        Of the horizontal closest approach; 0 and the distance now if it is past.
+    time_to_level_s : ndarray
+        Until the aircraft are at one height; NaN where they do not come closer.
+    modified_tau_s : ndarray
+        NaN where the aircraft are within the distance or do not come closer.
+    """
+
+    horizontal_m: FloatArray
+    vertical_m: FloatArray
+    horizontal_mps: FloatArray
+    vertical_mps: FloatArray
+    miss_horizontal_m: FloatArray
+    miss_vertical_m: FloatArray
+    time_to_closest_s: FloatArray
+    closest_m: FloatArray
+    time_to_level_s: FloatArray
+    modified_tau_s: FloatArray
+
+
+def separation(
+    relative: Relative, lookahead_s: float, tau_distance_m: FloatArray
+) -> PairSeparation:
+    """Return present and projected distances in straight flight.
+
+    Parameters
+    ----------
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less intruder.
+    lookahead_s : float
+        How far ahead is looked.
+    tau_distance_m : (n,)
+        The distance of modified tau; NaN gives none.
+    """
+    east, north, up, v_east, v_north, climb = relative
+    motion = horizontal_of(east, north, v_east, v_north)
+    range_m = np.sqrt(motion.range_sq_m2)
+    closest_s = time_to_closest_s(motion)
+    ahead_s = np.maximum(closest_s, 0.0)
+    seen_s = np.minimum(ahead_s, lookahead_s)
+    closing = motion.closing_m2_s < 0.0
+    moving = ~nearly_zero(climb)
+    level_s = -up / np.where(moving, climb, 1.0)
+    level_s = np.where(moving & (level_s >= 0.0), level_s, np.nan)
+    approach = up * climb < 0.0
+    passes = approach & (np.where(approach, -up / np.where(climb == 0, 1, climb), 0) <= lookahead_s)
+    later_m = np.where(passes, 0.0, np.abs(up + climb * lookahead_s))
+    distance = np.where(np.isnan(tau_distance_m), 0.0, tau_distance_m)
+    tau_s = np.where(
+        (motion.range_sq_m2 > tau_distance_m * tau_distance_m) & closing,
+        modified_tau_s(motion, distance),
+        np.nan,
+    )
+    return PairSeparation(
+        range_m,
+        np.abs(up),
+        np.sqrt(motion.speed_sq_m2_s2),
+        np.abs(climb),
+        np.where(closing, np.hypot(east + seen_s * v_east, north + seen_s * v_north), range_m),
+        np.where(approach, later_m, np.abs(up)),
+        ahead_s,
+        np.hypot(east + ahead_s * v_east, north + ahead_s * v_north),
+        level_s,
+        tau_s,
+    )
+
+
+#: Intervals are cut down to this, s.
+FINEST_S = 1e-3
+# Flights along the very edge would be cut up all the way: with so many pieces it ends.
+_MOST_PIECES = 100_000
+_FIRST_PIECES = 64
+_PAIRS_AT_ONCE = 128
+
+
+def first_inside_cylinder(
+    apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
+    between_s: tuple[FloatArray, FloatArray],
+    closing_mps: FloatArray,
+    horizontal_m: float,
+    vertical_m: float,
+) -> FloatArray:
+    """Return when pairs of flights first are inside a cylinder, s; NaN for those that never are.
+
+    The boundary is outside. Each is within `FINEST_S` of the true one. Where a flight comes inside
+    for less than that, it may be left out: it is then inside by no more than `closing_mps` times
+    half of `FINEST_S`, 0.1 m at 200 m/s. Where more than 100,000 pieces along the edge would have
+    to be cut, their length stands for `FINEST_S`.
+
+    Parameters
+    ----------
+    apart : callable
+        Horizontal distance and difference in height (m, not negative) of pairs (n,) at times (n,).
+    between_s : two of (pairs,)
+        The times looked at.
+    closing_mps : (pairs,)
+        Neither distance changes faster.
+    horizontal_m, vertical_m : float
+        Radius and half of the height.
+    """
+    begin_s, end_s = between_s
+    if len(begin_s) > _PAIRS_AT_ONCE:  # flights along the very edge would take all of the memory
+        rest = (begin_s[_PAIRS_AT_ONCE:], end_s[_PAIRS_AT_ONCE:])
+        return np.concatenate([
+            first_inside_cylinder(
+                apart, (begin_s[:_PAIRS_AT_ONCE], end_s[:_PAIRS_AT_ONCE]),
+                closing_mps[:_PAIRS_AT_ONCE], horizontal_m, vertical_m,
+            ),
+            first_inside_cylinder(
+                lambda pair, time_s: apart(pair + _PAIRS_AT_ONCE, time_s), rest,
+                closing_mps[_PAIRS_AT_ONCE:], horizontal_m, vertical_m,
+            ),
+        ])  # fmt: skip
+    earliest = np.full(len(begin_s), np.inf)
+    length = (end_s - begin_s) / _FIRST_PIECES
+    looked_at = np.flatnonzero(end_s >= begin_s)
+    pair = np.repeat(looked_at, _FIRST_PIECES)
+    number = np.tile(np.arange(_FIRST_PIECES, dtype=np.float64), len(looked_at))
+    start: FloatArray = begin_s[pair] + length[pair] * number
+    while len(start):
+        half = 0.5 * length
+        across_m, high_m = apart(pair, start + half[pair])
+        drift_m = (closing_mps * half)[pair]
+        maybe, within = _judged(across_m, high_m, drift_m, horizontal_m, vertical_m)
+        pieces = np.bincount(pair[maybe], minlength=len(length))
+        last = ((length <= FINEST_S) | (2 * pieces > _MOST_PIECES))[pair]
+        inside = (across_m < horizontal_m) & (high_m < vertical_m)
+        within, maybe = np.where(last, inside, within), np.where(last, inside, maybe)
+        np.minimum.at(earliest, pair[within], start[within])
+        cut = maybe & ~within & (start < earliest[pair])
+        pair, start = pair[cut], start[cut]
+        start = np.concatenate([start, start + half[pair]])
+        pair = np.concatenate([pair, pair])
+        length = half
+    return np.where(np.isfinite(earliest), earliest, np.nan)
+
+
+def _judged(
+    across_m: FloatArray,
+    high_m: FloatArray,
+    drift_m: FloatArray | float,
+    horizontal_m: float,
+    vertical_m: float,
+) -> tuple[BoolArray, BoolArray]:
+    """Return which pieces may hold a time inside, and which are surely inside all through."""
+    maybe = (across_m - drift_m < horizontal_m) & (high_m - drift_m < vertical_m)
+    within = (across_m + drift_m <= horizontal_m) & (high_m + drift_m <= vertical_m)
+    return maybe, within
