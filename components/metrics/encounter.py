@@ -30,7 +30,7 @@ from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
 
-#: By what a closest approach may be censored, see `components.traffic.censored.end_of_look`.
+#: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
 #: The end of a run that a block ended before its time.
 _EARLY_END = "the early end of the run"

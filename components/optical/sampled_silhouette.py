@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.arguments.checks import FloatArray
 from components.optical.convex_hull import PLATE_ASPECT_RATIO, union_area
 from components.optical.mesh import TriangleMesh

@@ -14,7 +14,7 @@ from components.optical.silhouette_exact import exact_area, line_of_sight_in_tar
 from components.optical.silhouette_thesis import thesis_area
 
 if TYPE_CHECKING:
-    from components.aircraft.silhouette_table import SilhouetteTable
+    from components.aircraft.aspect_tables import SilhouetteTable
     from components.optical.mesh import TriangleMesh
 
 MODELS = ("exact", "thesis", "aspect_table", "convex_hull")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.radar.detection import required_snr
 from components.radar.link_budget import LinkBudget, with_bandwidth
 from components.radar.swerling import SwerlingParameters

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.radar.detection import detection_probability, required_snr
 from components.radar.detection.approximations import detection_table
 from components.radar.link_budget import LinkBudget, detection_range

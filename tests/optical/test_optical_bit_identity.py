@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.contrast import contrast_gain
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
