@@ -146,7 +146,7 @@ def refuse_cues(block: Any) -> None:
         )
 
 
-def said_of_cues(block: Any) -> list[str]:
+def cue_warnings(block: Any) -> list[str]:
     """Warn of a wire of cues that changes nothing, and of parameters that no cue ever uses."""
     given = [
         name
