@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
-from components.geometry.wrapping import past
+from components.geometry.angles import past
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
-from components.geometry.wrapping import past
+from components.geometry.angles import past
 
 _SQUARE_FOOT_M2 = 0.3048**2
 

@@ -16,8 +16,8 @@ from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.estimation.frame import place_in_frame
+from components.geometry.angles import local_axes
 from components.geometry.ellipsoid import north_east_up
-from components.geometry.normals import local_axes
 from components.stone_soup.objects import (
     POSITION,
     VELOCITY,

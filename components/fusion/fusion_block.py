@@ -10,7 +10,7 @@ from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
-from components.navigation.effects import navigation_errs
+from components.navigation.errors import navigation_errs
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component

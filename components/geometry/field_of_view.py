@@ -7,8 +7,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import FloatArray, common_shape, squarable
-from components.geometry.wrapping import TWO_PI, wrap_pi_unchecked
+from components.arguments.checks import common_shape, squarable
+from components.geometry.angles import TWO_PI, wrap_pi_unchecked
+from dsa_des.arrays.types import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
 

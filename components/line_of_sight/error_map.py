@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.angles import wrap_by_sines
 from components.geometry.attitude import unit_vector
 from components.geometry.directions import angle_of_chord, chord_between
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.line_of_sight import EARTH_MODELS, LineOfSight
-from components.geometry.wrapping import wrap_by_sines
+from components.geometry.earth_models import EARTH_MODELS, LineOfSight
+from components.geometry.ellipsoid import enu_to_geodetic
 from dsa_des.arrays.types import FloatArray
 
 ALTITUDE_M = 1000.0

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from components.aircraft.silhouette_table import SilhouetteTable
-from components.arguments.checks import FloatArray, finite
+from components.arguments.checks import finite
+from dsa_des.arrays.types import FloatArray
 from dsa_des.files.input_files import InputFileError, status_of
 from dsa_des.text.safe_text import shortened
 

@@ -1,21 +1,107 @@
-"""The strength of a target's signature on the image, and the threshold of its detection."""
+"""Signature of a target on the image, its smear by the turning line of sight included."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    FloatArray,
+    angle,
     broadcast_flat,
     finite,
     not_negative,
     positive,
     unflatten,
 )
-from components.optical.line_of_sight_rate import line_of_sight_rate
+from components.geometry.angles import wrap_by_sines
+from components.geometry.directions import angle_between
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+
+
+def line_of_sight_rate(
+    azimuth_rad: ArrayLike,
+    elevation_rad: ArrayLike,
+    previous_azimuth_rad: ArrayLike,
+    previous_elevation_rad: ArrayLike,
+    interval_s: ArrayLike,
+    *,
+    seen_before: ArrayLike = True,
+    model: str = "exact",
+) -> Any:
+    """Give the angular rate of the line of sight between two looks: the dynamic signature V.
+
+    - ``exact``: angle between the two lines of sight / interval (errata 11). No jump where the
+      azimuth wraps, none near the zenith.
+    - ``thesis``: hypot(Δp, Δq) / interval (eq. 16-17) with Δp wrapped into [-pi, pi]; up to
+      1/cos(elevation) too fast, so useless near the zenith.
+
+    A target without a previous look has no rate: 0. The caller keeps the previous angles per
+    target and drops them when the target leaves the field of view, so that it starts anew.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad : array_like, rad
+        Direction now. In a frame that does not turn (north-east-down) the rate is the target's
+        own; in body axes, as in the thesis, the ownship's turning is in it.
+    previous_azimuth_rad, previous_elevation_rad : array_like, rad
+        Direction at the previous look, same frame; anything, NaN included, where not seen before.
+    interval_s : array_like, s
+        Time since that look: after k missed frames it is k + 1 frame times. Anything where not
+        seen before.
+    seen_before : array_like of bool
+        Whether there was a previous look.
+    model : {"exact", "thesis"}
+
+    Returns
+    -------
+    array of the broadcast shape, rad/s
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown, an angle that counts is not finite, or an interval that counts is
+        not above 0.
+
+    Notes
+    -----
+    Thesis eq. 16-17, errata 11.
+    """
+    if model not in ("exact", "thesis"):
+        raise ValueError(f"model is {model!r}: it must be 'exact' or 'thesis'")
+    seen = np.asarray(seen_before, dtype=bool)
+    azimuth = angle("azimuth_rad", azimuth_rad)
+    elevation = angle("elevation_rad", elevation_rad)
+    previous_azimuth = angle(
+        "previous_azimuth_rad", np.where(seen, _floats(previous_azimuth_rad), 0.0)
+    )
+    previous_elevation = angle(
+        "previous_elevation_rad", np.where(seen, _floats(previous_elevation_rad), 0.0)
+    )
+    interval = positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
+    shape, (p, q, p_before, q_before, time, seen_flag) = broadcast_flat(
+        azimuth_rad=azimuth,
+        elevation_rad=elevation,
+        previous_azimuth_rad=previous_azimuth,
+        previous_elevation_rad=previous_elevation,
+        interval_s=interval,
+        seen_before=seen.astype(np.float64),
+    )
+    if model == "exact":
+        moved = angle_between(p_before, q_before, p, q)
+    else:
+        turn = p - p_before
+        moved = np.hypot(wrap_by_sines(turn), q - q_before)
+    return unflatten(np.where(seen_flag > 0.0, moved, 0.0) / time, shape)
+
+
+def _floats(value: ArrayLike) -> Any:
+    return np.asarray(value, dtype=np.float64)
+
 
 __all__ = [
     "confidence",
@@ -211,3 +297,87 @@ def detection_range(
     if sensor_pixels is not None:
         distance = np.where(weight * gain * most >= wanted, distance, 0.0)
     return unflatten(np.where(needs_image, distance, np.inf), shape)
+
+
+class DynamicSignature(Effect):
+    """The rate of the line of sight adds b·V to the signature."""
+
+    name = "dynamic signature"
+    acts_on = "signature"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for the weight b."""
+        weight = block.p.dynamic_weight
+        return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return what is added to every cell's signature."""
+        return MovingTargets(block.p.dynamic_weight, block.p.rate, block.context.ticks_per_s)
+
+
+class MovingTargets:
+    """Remembers where each target was at the last scan, and weighs how fast it moves.
+
+    Parameters
+    ----------
+    weight_s : float
+        b of eq. 18, s/rad.
+    model : {"exact", "thesis"}
+    ticks_per_s : int
+    """
+
+    def __init__(self, weight_s: float, model: str, ticks_per_s: int) -> None:
+        self.weight_s = weight_s
+        self.model = model
+        self._ticks_per_s = ticks_per_s
+        # Of each replica, tick and NED angles of its last scan, one column per target; NaN where
+        # it saw none.
+        self._tick: IntArray = np.empty(0, dtype=np.int64)
+        self._angles: FloatArray = np.empty((2, 0, 0))
+
+    def __call__(self, cells: Cells) -> FloatArray:
+        """Return b·V of every cell."""
+        return self.weight_s * self.rate(cells)
+
+    def rate(self, cells: Cells) -> FloatArray:
+        """Return each cell's rate of the line of sight since the scan before, rad/s.
+
+        A target's first look has none, nor has the first after a scan that did not see it.
+        """
+        replica, targets = cells.replica_of_scan, len(cells.roster)
+        self._remember(int(replica.max(initial=0)) + 1, targets)
+        begins = np.append(True, replica[1:] != replica[:-1])
+        # Before the scans of each replica stands its last one.
+        place = np.arange(len(replica)) + np.cumsum(begins)
+        of, earlier = replica[begins], place[begins] - 1
+        angles = np.full((2, len(replica) + len(of), targets), np.nan)
+        tick = np.zeros(len(replica) + len(of), dtype=np.int64)
+        angles[:, earlier], tick[earlier] = self._angles[:, of], self._tick[of]
+        here = place[cells.row]
+        angles[:, here, cells.target] = cells.azimuth_rad, cells.elevation_rad
+        tick[place] = cells.scan_ticks
+        last = np.append(earlier[1:], len(tick)) - 1
+        self._tick[of], self._angles[:, of] = tick[last], angles[:, last]
+        azimuth, elevation = angles[:, here - 1, cells.target]
+        interval = (tick[here] - tick[here - 1]) / self._ticks_per_s
+        return np.asarray(
+            line_of_sight_rate(
+                cells.azimuth_rad,
+                cells.elevation_rad,
+                azimuth,
+                elevation,
+                np.where(np.isnan(azimuth), 1.0, interval),
+                seen_before=~np.isnan(azimuth),
+                model=self.model,
+            )
+        )
+
+    def _remember(self, replicas: int, targets: int) -> None:
+        """Remember so many replicas at least."""
+        known = len(self._tick)
+        if known < replicas:
+            angles = np.full((2, replicas, targets), np.nan)
+            angles[:, :known] = self._angles.reshape(2, known, targets)
+            self._angles = angles
+            self._tick = np.append(self._tick, np.zeros(replicas - known, dtype=np.int64))

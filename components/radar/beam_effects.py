@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.wrapping import TWO_PI
+from components.geometry.angles import TWO_PI
 from components.messages.detections import Detections
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
 from components.messages.targets import GatedTargets, RelativeTargets

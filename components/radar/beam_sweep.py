@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, positive, unflatten
-from components.geometry.wrapping import TWO_PI, wrap_pi
+from components.geometry.angles import TWO_PI, wrap_pi
 from dsa_des.arrays.types import BoolArray
 
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
+from components.geometry.angles import TWO_PI
 from components.geometry.field_of_view import sector_width_rad
-from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
 from components.radar.resolution_cells import ResolutionCells, resolution_cells
 from components.radar.resolution_parameters import CELL_SIZES

@@ -6,8 +6,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from components.geometry.angles import TWO_PI
 from components.geometry.field_of_view import sector_width_rad
-from components.geometry.wrapping import TWO_PI
 from components.radar.resolution_parameters import ResolutionParameters
 from components.radar.time_budget import (
     BeamPositions,

@@ -5,9 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
+from components.atmosphere.attenuation import gas_specific_attenuation
+from components.atmosphere.slant_path import (
+    AttenuationTable,
+    attenuation_table,
+    one_way_attenuation_db,
+    two_way_transmission,
+)
 from components.environment.tables import Weather
 from components.radar.clutter_effects import no_rain_echo
 from components.radar.radar_block import CellFactor

@@ -17,7 +17,7 @@ from components.messages.detections import Detections, LastingError, SensorOffer
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.navigation.effects import NavigationReport, lasting_navigation, navigation_noise
+from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
 from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule

@@ -11,7 +11,7 @@ from components.estimation.batched import is_everything, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected
-from components.geometry.wrapping import wrap_pi_unchecked
+from components.geometry.angles import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.filter_bank import PairMeasurement, log_mixture
 from components.tracking.rules import TrackerRules

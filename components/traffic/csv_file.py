@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.traffic.sample_table import (
     UNITS,
     SampleColumn,

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import FloatArray, local_axes
+from components.geometry.angles import FloatArray, local_axes
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.sample_table import (
     UNITS,
     SampleColumn,

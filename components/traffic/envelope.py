@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.angles import wrap_by_sines
 from components.geometry.ellipsoid import (
     ECCENTRICITY_SQUARED,
     SEMI_MAJOR_AXIS_M,
     line_of_sight,
 )
-from components.geometry.wrapping import wrap_by_sines
 from components.messages.reach import REACH_MARGIN
 from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.legs import ScriptedTrajectory

@@ -8,7 +8,7 @@ from copy import copy
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.traffic.geodesic_motion import geodesic_state
 from components.traffic.leg_builder import hold_state
 from components.traffic.leg_table import LegTable

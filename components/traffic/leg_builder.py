@@ -10,9 +10,8 @@ from typing import Literal
 import numpy as np
 from geographiclib.geodesic import Geodesic
 
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import FloatArray
-from components.geometry.wrapping import TWO_PI, heading_from_deg, past
+from components.geometry.angles import TWO_PI, FloatArray, heading_from_deg, past
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.attitude_from_path import STANDARD_GRAVITY_MPS2
 from components.traffic.geodesic_motion import (
     flight_time_s,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.traffic.leg_builder import FORMULAS
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.piece_search import PieceSearch

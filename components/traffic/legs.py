@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.wrapping import heading_from_deg, wrap_longitude_deg
+from components.geometry.angles import heading_from_deg, wrap_longitude_deg
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.leg_builder import LegBuilder, Segment, segment_state
 from components.traffic.leg_types import (
     AnyLeg,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from dsa_des.arrays.types import IntArray
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.geometry.enu import enu_to_geodetic
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.flight_protocols import Trajectory
 from components.traffic.legs import ScriptedTrajectory

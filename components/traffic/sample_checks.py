@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""

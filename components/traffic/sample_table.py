@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.traffic.traffic_file import (
     MOST_OF_A_CELL,
     MOST_PROBLEMS,

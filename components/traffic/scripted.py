@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
-from components.geometry.enu import enu_to_geodetic
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.flight_protocols import Trajectory

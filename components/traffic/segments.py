@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from components.geometry.angles import (
+    FloatArray,
+    Vector,
+    local_axes,
+    normal_to_degrees,
+    wrap_difference_rad,
+    wrap_heading_rad,
+    wrap_longitude_deg,
+)
 from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, radii_of_curvature
-from components.geometry.normals import FloatArray, Vector, local_axes, normal_to_degrees
 from components.geometry.state import TrajectoryState
-from components.geometry.wrapping import wrap_difference_rad, wrap_heading_rad, wrap_longitude_deg
 
 RAD_PER_DEG = np.pi / 180.0
 

@@ -13,8 +13,7 @@ from typing import overload
 
 import numpy as np
 
-from components.geometry.normals import FloatArray
-from components.geometry.wrapping import heading_from_deg, wrap_longitude_deg
+from components.geometry.angles import FloatArray, heading_from_deg, wrap_longitude_deg
 from components.traffic.geodesic_motion import geodesic_parameter_table
 from components.traffic.leg_builder import Segment
 from components.traffic.legs import LONGEST_FLIGHT_S, MOST_ALT_M, ScriptedTrajectory

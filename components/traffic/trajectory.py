@@ -8,10 +8,9 @@ from copy import copy
 import numpy as np
 import numpy.typing as npt
 
+from components.geometry.angles import FloatArray, Vector, wrap_heading_rad, wrap_longitude_deg
 from components.geometry.ellipsoid import line_of_sight
-from components.geometry.normals import FloatArray, Vector
 from components.geometry.state import TrajectoryState
-from components.geometry.wrapping import wrap_heading_rad, wrap_longitude_deg
 from components.traffic.attitude_from_path import attitude_from_path, fit_path
 from components.traffic.sample_checks import all_within_limits, checked_samples
 from components.traffic.segments import evaluate_segments, fit_segments, locate

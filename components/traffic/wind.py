@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.normals import FloatArray
-from components.geometry.wrapping import wrap_heading_rad
+from components.geometry.angles import FloatArray, wrap_heading_rad
 from components.traffic.attitude_from_path import SLOWEST_TRACK_MPS
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.geometry.state import TrajectoryState
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.steered_flight import SteeredFlight

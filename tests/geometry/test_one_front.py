@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components.geometry import ellipsoid
-from components.geometry.line_of_sight import ATTITUDE_MODELS, EARTH_MODELS, LineOfSight
+from components.geometry.earth_models import ATTITUDE_MODELS, EARTH_MODELS, LineOfSight
 from components.geometry.sensor_angles import sensor_angles
 
 OWN = SimpleNamespace(

@@ -115,7 +115,7 @@ with tempfile.TemporaryDirectory() as folder:
     assert not copy.folder.is_relative_to(ROOT)
 print(json.dumps(found))
 """
-FILE = "components/geometry/wrapping.py"
+FILE = "components/geometry/angles.py"
 TESTS = "test_angle_wrapping"
 
 
