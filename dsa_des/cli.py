@@ -11,8 +11,7 @@ from typing import Any
 import click
 
 from dsa_des import __version__
-from dsa_des.commands.plain_errors import plain_errors
-from dsa_des.commands.plugins import PluginGroup
+from dsa_des.commands.group import PluginGroup, plain_errors
 
 
 def _scene_options(
@@ -76,15 +75,10 @@ def main() -> None:
     metavar="FACTOR",
     help="Pace the run: FACTOR simulated seconds per second; results do not change.",
 )
-@click.option(
-    "--check-rewinding",
-    is_flag=True,
-    help="Run every window twice from its saved state; name the block that differs. Slow.",
-)
 @plain_errors
 def run(**options: Any) -> None:
     """Run SCENE and say which sensor saw which intruder, when, and how far away."""
-    from dsa_des.commands.run import run_scene
+    from dsa_des.commands.scene import run_scene
 
     run_scene(**options)
 
@@ -99,7 +93,7 @@ def run(**options: Any) -> None:
 @plain_errors
 def check(**options: Any) -> None:
     """Check SCENE without running it; report everything that is wrong at once."""
-    from dsa_des.commands.check import check_scene_file
+    from dsa_des.commands.scene import check_scene_file
 
     check_scene_file(**options)
 
@@ -124,7 +118,7 @@ def graph(**options: Any) -> None:
 @plain_errors
 def explain(**options: Any) -> None:
     """Say which effects SCENE calls for, which it does not, and because of what."""
-    from dsa_des.commands.explain import explain_scene
+    from dsa_des.commands.scene import explain_scene
 
     explain_scene(**options)
 
@@ -174,7 +168,7 @@ def cost(**options: Any) -> None:
 @plain_errors
 def components(name: str | None) -> None:
     """List the block types, or describe one: its ports, parameters, units and bounds."""
-    from dsa_des.commands.components import show_components
+    from dsa_des.commands.catalogue import show_components
 
     show_components(name)
 
@@ -184,7 +178,7 @@ def components(name: str | None) -> None:
 @plain_errors
 def examples(copy: str | None) -> None:
     """List the shipped scenes and studies: their names stand for their files everywhere."""
-    from dsa_des.commands.examples import show_examples
+    from dsa_des.commands.catalogue import show_examples
 
     show_examples(copy)
 

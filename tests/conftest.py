@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+# Tests share helpers and scenes; importlib mode by itself puts nothing on the path.
+sys.path.extend(sorted({str(p.parent) for p in Path(__file__).parent.rglob("*.py")} - {*sys.path}))
 # A machine that is busy with something else is no defect of what is tested.
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy")

@@ -1,29 +1,81 @@
 """One detection for one track: the nearest in turn, or the assignment that is best for all.
 
 Pairs are those whose detection lies in the gate of the track. Both rules return which pairs are
-taken; no track and no detection is in two of them.
+taken; no track and no detection is in two of them. Clusters of tracks and detections that share
+gates are decided apart from all others.
 """
+
+import math
+from functools import lru_cache
 
 import numpy as np
 
-from components.association.clusters import alone, groups, labels
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+
+@lru_cache(maxsize=64)
+def gate_threshold(probability: float, size: int) -> float:
+    """Return the squared Mahalanobis distance that holds detections with a probability."""
+    low, high = 0.0, 1.0
+    while 1.0 - probability < _beyond(high, size):
+        high *= 2.0
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return high
+        if 1.0 - probability < _beyond(middle, size):
+            low = middle
+        else:
+            high = middle
+
+
+def _beyond(distance: float, size: int) -> float:
+    """Return the probability of a larger squared distance (Abramowitz, Stegun, 26.4.4 and 5)."""
+    half = 0.5 * distance
+    total = 0.0 if size % 2 == 0 else math.erfc(math.sqrt(half))
+    term = math.exp(-half) * (1.0 if size % 2 == 0 else math.sqrt(half) / math.gamma(1.5))
+    power = 1.0 if size % 2 == 0 else 1.5
+    for _ in range(size // 2):
+        total += term
+        term *= half / power
+        power += 1.0
+    return total
+
+
+def alone(track: IntArray, detection: IntArray) -> BoolArray:
+    """Return which pairs are the only one of both their track and their detection."""
+    if len(track) == 0:
+        return np.zeros(0, dtype=bool)
+    tracks, detections = np.bincount(track), np.bincount(detection)
+    return np.asarray((tracks[track] == 1) & (detections[detection] == 1))
+
+
+def labels(track: IntArray, detection: IntArray) -> IntArray:
+    """Return the cluster of each pair: its least track number."""
+    if len(track) == 0:
+        return np.zeros(0, dtype=np.int64)
+    of_track = np.arange(int(track.max()) + 1)
+    while True:
+        of_detection = np.full(int(detection.max()) + 1, len(of_track))
+        np.minimum.at(of_detection, detection, of_track[track])
+        lower = of_track.copy()
+        np.minimum.at(lower, track, of_detection[detection])
+        if np.array_equal(lower, of_track):
+            return of_track[track]
+        of_track = lower
+
+
+def groups(label: IntArray) -> list[IntArray]:
+    """Return the pairs of each cluster, clusters by label, pairs in their own order."""
+    if len(label) == 0:
+        return []
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    return np.split(order, cuts)
 
 
 def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
-    """Take the nearest pair, then the nearest of what is left, and so on.
-
-    Parameters
-    ----------
-    track, detection : (pairs,)
-    distance : (pairs,)
-        Squared Mahalanobis distances; among equal ones the earlier pair counts.
-
-    Returns
-    -------
-    ndarray of int
-        Pairs that are taken, ascending.
-    """
+    """Take the nearest pair, then the nearest of what is left, and so on."""
     taken = [np.flatnonzero(alone(track, detection))]
     left = np.flatnonzero(~alone(track, detection))
     left = left[np.argsort(distance[left], kind="stable")]
@@ -42,24 +94,7 @@ def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntAr
 def global_nearest(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
-    """Take the pairs whose sum of distances, with a price for tracks left out, is the least.
-
-    Parameters
-    ----------
-    track, detection : (pairs,)
-    distance : (pairs,)
-        Squared Mahalanobis distances or other costs.
-    missing : (pairs,) or float
-        Price of a track going without; at least the largest distance in the gate. All tracks that
-        compete have the same, the largest of theirs: else a wide gate, which costs more to leave
-        empty, would take detections from narrow ones.
-
-    Returns
-    -------
-    ndarray of int
-        Pairs that are taken, ascending. Clusters are solved one by one (Jonker-Volgenant, in
-        `scipy.optimize.linear_sum_assignment`); a cluster of one pair is taken as it is.
-    """
+    """Take the pairs whose sum of distances, with a price for tracks left out, is the least."""
     single = alone(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)

@@ -12,7 +12,7 @@ AES 50 (2014).
 
 import numpy as np
 
-from components.association.clusters import groups, labels
+from components.association.assignment import groups, labels
 from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Detections in a cluster up to which marginals are exact: a sum over 2^10 sets for each track.
@@ -25,21 +25,7 @@ _MOST_ROUNDS = 10_000
 def marginals(
     track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
 ) -> FloatArray:
-    """Return the probability of each pair; what a track's pairs leave to 1 is that it was missed.
-
-    Parameters
-    ----------
-    track, detection : (pairs,)
-        Pairs in the gate.
-    weight : (pairs,)
-        Pd N(z; ẑ, S) / (λ (1 - Pd Pg)): how much likelier the pair is than both apart.
-    exact_up_to : int
-        Detections in a cluster up to which sums are exact.
-
-    Returns
-    -------
-    ndarray of shape (pairs,)
-    """
+    """Return the probability of each pair; what a track's pairs leave to 1 is that of a miss."""
     found = np.empty(len(track))
     if len(track) == 0:
         return found
@@ -63,17 +49,7 @@ def marginals(
 
 
 def exact(weights: FloatArray) -> FloatArray:
-    """Return exact marginals of one cluster.
-
-    Parameters
-    ----------
-    weights : (tracks, detections)
-        0 for what is not in the gate.
-
-    Returns
-    -------
-    ndarray of the same shape
-    """
+    """Return exact marginals of one cluster."""
     many, count = weights.shape
     sets = 1 << count
     free = [np.flatnonzero((np.arange(sets) >> j & 1) == 0) for j in range(count)]
@@ -104,10 +80,6 @@ def propagated(weights: FloatArray) -> FloatArray:
 
     Within 0.1 of exact ones in most clusters; where several tracks share the same detections and
     misses are rare it is too sure of one way round.
-
-    Parameters
-    ----------
-    weights : (tracks, detections)
     """
     message = np.ones_like(weights)
     for _ in range(_MOST_ROUNDS):

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from dsa_des.commands.plain_errors import plain_errors
+from dsa_des.commands.group import plain_errors
 
 
 @click.command()

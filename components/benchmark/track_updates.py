@@ -18,9 +18,9 @@ from scipy.optimize import linear_sum_assignment
 
 import dsa_des
 from components.estimation.batched import product, product_transposed
-from components.estimation.frame import Place, place_in_frame
+from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import position_of
-from components.tracking.ekf import ExtendedKalman
+from components.tracking.filters import ExtendedKalman
 from components.tracking.scans import Scans, scans_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.wake import Wake
@@ -279,16 +279,16 @@ def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
     )
 
 
-def _looks(block: Listening) -> tuple[Scans, Place]:
+def _looks(block: Listening) -> tuple[Scans, SensorPose]:
     scans = Scans.joined([scans_of(wake["fused"]) for wake in block.kept])
     origin = scans.pose[:3, :1]
     lat, lon, alt = (np.repeat(value, len(scans)) for value in origin)
     pose = scans.pose
-    return scans, place_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+    return scans, pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
                                  (pose[3], pose[4], pose[5]))  # fmt: skip
 
 
-def plain_looks(scans: Scans, places: Place, ticks_per_s: int) -> list[PlainLook]:
+def plain_looks(scans: Scans, places: SensorPose, ticks_per_s: int) -> list[PlainLook]:
     """Return looks as the plain loop takes them."""
     found = []
     for k in range(len(scans)):
@@ -305,7 +305,7 @@ def plain_looks(scans: Scans, places: Place, ticks_per_s: int) -> list[PlainLook
 
 
 def _started(
-    scans: Scans, places: Place, speed_m_s: float
+    scans: Scans, places: SensorPose, speed_m_s: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return a track for each detection of the first look, as our trackers start them."""
     which = np.arange(int(scans.offsets[1]))

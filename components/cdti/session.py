@@ -13,7 +13,7 @@ from components.cdti.page import Admission
 from components.cdti.scope import Scope
 from components.operator.human import Desk, Human
 from components.operator.recorded import RecordedOperator
-from dsa_des.commands.loading import say_what_was_done
+from dsa_des.commands.scene import say_notes
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.library.scenes import load_scene
@@ -59,7 +59,7 @@ def run_session(
     # By its whole path, so that the run folder's scene finds its files from wherever it is run.
     path = Path(os.path.abspath(chosen_file(scene, "scene")))
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    say_what_was_done(loaded)
+    say_notes(loaded)
     console = _console(loaded)
     target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     target.check()

@@ -16,7 +16,7 @@ from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation

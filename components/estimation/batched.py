@@ -50,17 +50,7 @@ def symmetric(matrix: FloatArray) -> FloatArray:
 
 
 def cholesky(matrix: FloatArray) -> FloatArray:
-    """Return the lower triangular roots of positive definite matrices.
-
-    Parameters
-    ----------
-    matrix : (d, d, n)
-
-    Returns
-    -------
-    ndarray of shape (d, d, n)
-        NaN from the first pivot on that is not positive.
-    """
+    """Return the lower triangular roots of positive definite matrices."""
     size = len(matrix)
     root = np.zeros(matrix.shape)
     with np.errstate(invalid="ignore", divide="ignore"):

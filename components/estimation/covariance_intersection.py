@@ -36,31 +36,7 @@ _CLOSE = 1e-15
 def combined(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what a second piece of information does to estimates.
-
-    Parameters
-    ----------
-    covariance : (d, d, n)
-        P of the first estimate.
-    information : (d, d, n)
-        B of the second piece, along the same axes: the inverse of an estimate's covariance, or
-        HᵀR⁻¹H of one that tells less than the whole state.
-    pull : (d, n)
-        B times how far the second estimate lies from the first, or HᵀR⁻¹ times the residual.
-    rule : {"determinant", "trace", "independent"}
-        ``determinant`` takes the weight w that makes the determinant of
-        (w P⁻¹ + (1 - w) B)⁻¹ least; ``trace`` that of its first three rows and columns, the
-        position; ``independent`` adds P⁻¹ + B, which is right only if the errors have nothing in
-        common.
-
-    Returns
-    -------
-    shift : (d, n)
-        How far the combined estimate lies from the first.
-    covariance : (d, d, n)
-    weight : (n,)
-        Of the first estimate; 1 for both together where they are taken to be independent.
-    """
+    """Return what a second piece of information does to estimates."""
     root = cholesky(covariance)
     scaled = product(product(root.swapaxes(0, 1), information), root)
     # LAPACK takes matrix by matrix: the result does not depend on the company.
@@ -81,18 +57,10 @@ def combined(
 
 
 def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatArray:
-    """Return the root in [0, 1] of Σ cost (1 - λ) / (w + (1 - w) λ)^power, or the end it is beyond.
+    """Return the root in [0, 1] of Σ cost (1 - λ) / (w + (1 - w) λ)^power, or the nearer end.
 
-    Parameters
-    ----------
-    eigenvalues, cost : (d, n)
-    power : {1, 2}
-        1 for the determinant, 2 for the trace.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        By Newton's steps, halving where they leave the bracket; each element by itself.
+    By Newton's steps, halving where they leave the bracket; `power` is 1 for the determinant, 2
+    for the trace.
     """
     excess = cost * (1.0 - eigenvalues)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from components.estimation.batched import product, product_transposed, times
 from components.geometry.angles import local_axes
 from components.geometry.attitude import ned_to_body_unchecked
 from components.geometry.ellipsoid import north_east_up
@@ -16,55 +17,31 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Where sensors are and how they are turned, in frames.
+class SensorPose:
+    """Where sensors are and how they are turned, in frames."""
 
-    Parameters
-    ----------
-    position_m : (3, n)
-        Of the sensor in the frame.
-    to_body : (3, 3, n)
-        Turns a vector of the frame into body axes: nose, right wing, floor.
-    velocity_m_s : (3, n) or None
-        Of the sensor in the frame; needed where range rates are measured.
-    """
-
-    position_m: FloatArray
+    position_m: FloatArray  # (3, n), of the sensor in the frame
+    # (3, 3, n), turns a vector of the frame into body axes: nose, right wing, floor
     to_body: FloatArray
+    # (3, n) or None: Of the sensor in the frame; needed where range rates are measured
     velocity_m_s: FloatArray | None = None
 
-    def take(self, which: IntArray) -> "Place":
+    def take(self, which: IntArray) -> "SensorPose":
         """Return some of the places."""
         moves = self.velocity_m_s
-        return Place(
+        return SensorPose(
             self.position_m.take(which, axis=-1), self.to_body.take(which, axis=-1),
             None if moves is None else moves.take(which, axis=-1),
         )  # fmt: skip
 
 
-def place_in_frame(
+def pose_in_frame(
     origin_deg_m: tuple[FloatArray, FloatArray, FloatArray],
     position_deg_m: tuple[FloatArray, FloatArray, FloatArray],
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_m_s: FloatArray | None = None,
-) -> Place:
-    """Return where poses are in frames.
-
-    Parameters
-    ----------
-    origin_deg_m : three arrays (n,)
-        Latitude and longitude (deg) and height above the ellipsoid (m) of each frame's origin.
-    position_deg_m : three arrays (n,)
-        The same of the aircraft that bears the sensor.
-    attitude_rad : three arrays (n,)
-        Its heading, pitch and roll, in the north, east, down of its own place.
-    velocity_m_s : (3, n), optional
-        Its velocity over ground there.
-
-    Returns
-    -------
-    Place
-    """
+) -> SensorPose:
+    """Return where poses are in frames."""
     lat, lon, alt = position_deg_m
     # np.array joins a few short arrays in a fifth of the time that np.stack takes.
     north, east, up = north_east_up(*origin_deg_m, lat, lon, alt)
@@ -79,7 +56,7 @@ def place_in_frame(
         # Along the axes of the frame, whose components in the Earth's axes are `here`.
         in_space = sum(v * axis for v, axis in zip(velocity_m_s, there, strict=True))
         moves = np.array([_dot(in_space, axis) for axis in here])
-    return Place(np.array([north, east, -up]), turned, moves)
+    return SensorPose(np.array([north, east, -up]), turned, moves)
 
 
 def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
@@ -90,3 +67,44 @@ def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
 
 def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameChange:
+    """The way from frames to others."""
+
+    shift_m: FloatArray  # (3, n), where the old frame's origin is in the new frame
+    turn: FloatArray  # (3, 3, n), turns a vector of the old frame into the new one's axes
+
+    def positions(self, position_m: FloatArray) -> FloatArray:
+        """Return positions (3, n) of the old frame in the new one."""
+        return self.shift_m + times(self.turn, position_m)
+
+    def vectors(self, vector: FloatArray) -> FloatArray:
+        """Return vectors (3, n) of the old frame along the new one's axes."""
+        return times(self.turn, vector)
+
+    def states(self, state: FloatArray) -> FloatArray:
+        """Return positions and velocities (6, n) of the old frame in the new one."""
+        return np.concatenate([self.positions(state[:3]), self.vectors(state[3:])])
+
+    def covariances(self, covariance: FloatArray) -> FloatArray:
+        """Return covariances of position and velocity (6, 6, n) along the new frame's axes."""
+        turned = np.empty_like(covariance)
+        for i in (0, 3):
+            for j in (0, 3):
+                block = product(self.turn, covariance[i : i + 3, j : j + 3])
+                turned[i : i + 3, j : j + 3] = product_transposed(block, self.turn)
+        return turned
+
+
+def frame_change(old_deg_m: FloatArray, new_deg_m: FloatArray) -> FrameChange:
+    """Return the way from frames with some origins to frames with others."""
+    old, new = (tuple(np.ascontiguousarray(row) for row in rows) for rows in (old_deg_m, new_deg_m))
+    north, east, up = north_east_up(*new, *old)
+    there, here = ned_axes(old[0], old[1]), ned_axes(new[0], new[1])
+    turn = np.empty((3, 3, np.size(north)))
+    for i, to in enumerate(here):
+        for j, along in enumerate(there):
+            turn[i, j] = to[0] * along[0] + to[1] * along[1] + to[2] * along[2]
+    return FrameChange(np.stack([north, east, -up]), turn)

@@ -28,26 +28,15 @@ _TOGETHER = 2048
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """What a filter expects of a measurement, and how its covariance relates to it.
+    """What a filter expects of a measurement, and how its covariance relates to it."""
 
-    Parameters
-    ----------
-    expected : (m, n)
-    root : (m, m, n)
-        Lower triangular root of the covariance of the residual.
-    cross : (d, m, n)
-        Covariance of the state with the measurement.
-    jacobian : (m, d, n)
-        Of the measurement by the state; for an unscented filter the regression's slope.
-    spread : (m, n) or (m, m, n)
-        Variances of the measurement's own errors; for an unscented filter with what the
-        regression leaves over, which makes it a matrix.
-    """
-
-    expected: FloatArray
-    root: FloatArray
-    cross: FloatArray
+    expected: FloatArray  # (m, n)
+    root: FloatArray  # (m, m, n), lower triangular root of the covariance of the residual
+    cross: FloatArray  # (d, m, n), covariance of the state with the measurement
+    # (m, d, n), of the measurement by the state; for an unscented filter the regression's slope
     jacobian: FloatArray
+    # (m, n) or (m, m, n): Variances of the measurement's own errors; for an unscented filter
+    # with what the regression leaves over, which makes it a matrix
     spread: FloatArray
 
     def take(self, which: IntArray | slice) -> "Innovation":
@@ -60,23 +49,13 @@ class Innovation:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What a filter expects of any measurement of its tracks, before that one's own errors.
+    """What a filter expects of any measurement of its tracks, before that one's own errors."""
 
-    Parameters
-    ----------
-    expected : (m, n)
-    total : (m, m, n)
-        Covariance of what is expected.
-    cross, jacobian
-        As in `Innovation`.
-    left_over : (m, m, n) or None
-        What the slope leaves of `total`; None where it is exact.
-    """
-
-    expected: FloatArray
-    total: FloatArray
-    cross: FloatArray
-    jacobian: FloatArray
+    expected: FloatArray  # (m, n)
+    total: FloatArray  # (m, m, n), covariance of what is expected
+    cross: FloatArray  # As in `Innovation`
+    jacobian: FloatArray  # As in `Innovation`
+    # (m, m, n) or None: What the slope leaves of `total`; None where it is exact
     left_over: FloatArray | None = None
 
     def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
@@ -100,16 +79,7 @@ class Moments:
 
 
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
-    """Return the moments of an extended Kalman filter.
-
-    Parameters
-    ----------
-    expected : (m, n)
-    jacobian : (m, k, n)
-        By the first k components of the state; the others do not enter.
-    covariance : (d, d, n)
-        Of the predicted state.
-    """
+    """Return the moments of an extended Kalman filter."""
     cross = product_transposed(covariance[:, : jacobian.shape[1]], jacobian)
     return Moments(expected, product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
 
@@ -124,20 +94,7 @@ def innovation(
 def updated(
     state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a measurement, in Joseph form.
-
-    Parameters
-    ----------
-    state : (d, n)
-    covariance : (d, d, n)
-    found : Innovation
-    residual : (m, n)
-        Measured less expected.
-
-    Returns
-    -------
-    state, covariance : arrays of the same shapes
-    """
+    """Return state and covariance after a measurement, in Joseph form."""
     count = state.shape[1]
     if count <= _TOGETHER:
         return _updated(state, covariance, found, residual)
@@ -168,13 +125,6 @@ def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> F
     For the components that are measured (the first of `found.jacobian`) it is worked out as
     D - (D Hᵀ - K R) Kᵀ with D = P - K S Kᵀ, which is the same whatever the gain's rounding. What
     is left over, of and with the others, is P - K S Kᵀ in either form: H has no columns there.
-
-    Parameters
-    ----------
-    covariance : (d, d, n)
-    weighted : (m, d, n)
-        root⁻¹ (P Hᵀ)ᵀ; its square over m is K S Kᵀ.
-    found : Innovation
     """
     known, size = found.jacobian.shape[1], len(covariance)
     whole = np.empty(covariance.shape)
@@ -224,15 +174,6 @@ def variance_of_what_is_new(
     (of variance p), the best estimate of both has the variance (p R - κ²) / (p + R - 2 κ)
     (Bar-Shalom, Campo, IEEE Trans. AES 22 (1986)); a measurement with an error of its own would
     give the same with the variance p (p R - κ²) / (p - κ)².
-
-    Parameters
-    ----------
-    variance : (m, n)
-        R, of the measurements' errors.
-    common : (m, n)
-        How much of it is in earlier measurements too; κ is that or p, whichever is less.
-    spread : (m, n)
-        p.
     """
     # What lasts may be more than a detection states: a camera knows no range, so its angles hold
     # nothing of an error of its place.

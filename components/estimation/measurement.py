@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import squared_length, times
-from components.estimation.frame import Place
+from components.estimation.batched import product, product_transposed, squared_length, times
+from components.estimation.frame import SensorPose
 from components.geometry.angles import wrap_pi_unchecked
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the
 # range, derivatives are those of the edge.
@@ -34,56 +34,35 @@ class Kind:
         return 2 + self.has_range + self.has_range_rate
 
 
-def expected(kind: Kind, state: FloatArray, place: Place) -> FloatArray:
-    """Return what would be measured without error.
-
-    Parameters
-    ----------
-    kind : Kind
-    state : (d, n)
-        Position and velocity first, in the frame.
-    place : Place
-        Of n sensors.
-
-    Returns
-    -------
-    ndarray of shape (kind.size, n)
-        Azimuth in [-pi, pi] and elevation in rad, range in m, range rate in m/s.
-    """
-    away = state[:3] - place.position_m
-    x, y, z = times(place.to_body, away)
-    found = np.empty((kind.size, state.shape[-1]))
-    np.arctan2(y, x, out=found[0])
-    np.arctan2(-z, np.hypot(x, y), out=found[1])
+def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
+    """Return what would be measured without error."""
+    away = state[:3] - pose.position_m
+    x, y, z = times(pose.to_body, away)
+    seen = np.empty((kind.size, state.shape[-1]))
+    np.arctan2(y, x, out=seen[0])
+    np.arctan2(-z, np.hypot(x, y), out=seen[1])
     if kind.size == 2:
-        return found
+        return seen
     distance = np.sqrt(squared_length(away))
     if kind.has_range:
-        found[2] = distance
+        seen[2] = distance
     if kind.has_range_rate:
-        found[-1] = _along(away, _closing(state, place)) / np.maximum(distance, _NEAREST_M)
-    return found
+        seen[-1] = _along(away, _closing(state, pose)) / np.maximum(distance, _NEAREST_M)
+    return seen
 
 
-def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Return what would be measured, and its derivative by position and velocity.
-
-    Returns
-    -------
-    expected : (kind.size, n)
-    jacobian : (kind.size, 6, n), or (kind.size, 3, n) where no range rate is measured
-        Exact but at the zenith of the body axes.
-    """
-    away = state[:3] - place.position_m
-    turned = place.to_body
+def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
+    """Return what would be measured, and its derivative by position and velocity."""
+    away = state[:3] - pose.position_m
+    turned = pose.to_body
     x, y, z = times(turned, away)
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     square = distance * distance
     level = np.hypot(x, y)
     safe = np.maximum(level, _ZENITH * distance)
-    found = np.empty((kind.size, state.shape[-1]))
-    np.arctan2(y, x, out=found[0])
-    np.arctan2(-z, level, out=found[1])
+    seen = np.empty((kind.size, state.shape[-1]))
+    np.arctan2(y, x, out=seen[0])
+    np.arctan2(-z, level, out=seen[1])
     jacobian = np.zeros((kind.size, 6 if kind.has_range_rate else 3, state.shape[-1]))
     level_square = safe * safe
     steep = z / (safe * square)
@@ -98,37 +77,24 @@ def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray,
             np.multiply(part, axis, out=term)
             slope += term
     if kind.size == 2:
-        return found, jacobian
+        return seen, jacobian
     unit = away / distance
     if kind.has_range:
-        found[2] = distance
+        seen[2] = distance
         jacobian[2, :3] = unit
     if kind.has_range_rate:
-        closing = _closing(state, place)
+        closing = _closing(state, pose)
         rate = _along(away, closing) / distance
-        found[-1] = rate
+        seen[-1] = rate
         jacobian[-1, :3] = (closing - rate * unit) / distance
         jacobian[-1, 3:6] = unit
-    return found, jacobian
+    return seen, jacobian
 
 
 def direction(
     away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances.
-
-    Parameters
-    ----------
-    away : (3, n)
-        North, east, down or nose, right, floor.
-    covariance : (3, 3, n), or its elements (n,) by row and column
-        Its upper triangle is read.
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad, azimuth_variance_rad2, elevation_variance_rad2 : (n,) arrays
-        Variances by the derivatives of `linearised`.
-    """
+    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances."""
     x, y, z = away
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     level = np.hypot(x, y)
@@ -146,53 +112,68 @@ def direction(
 
 
 def residual(measured: FloatArray, expected: FloatArray) -> FloatArray:
-    """Return measured less expected, azimuth and elevation wrapped into (-pi, pi].
-
-    Parameters
-    ----------
-    measured, expected : (m, n)
-    """
-    found = measured - expected
-    found[0] = wrap_pi_unchecked(np.ascontiguousarray(found[0]))
-    found[1] = wrap_pi_unchecked(np.ascontiguousarray(found[1]))
-    return found
+    """Return measured less expected, azimuth and elevation wrapped into (-pi, pi]."""
+    apart = measured - expected
+    apart[0] = wrap_pi_unchecked(np.ascontiguousarray(apart[0]))
+    apart[1] = wrap_pi_unchecked(np.ascontiguousarray(apart[1]))
+    return apart
 
 
-def position_of(measured: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Return where in the frame a measurement with range lies, and the derivative by it.
-
-    Parameters
-    ----------
-    measured : (3 or 4, n)
-        Azimuth, elevation (rad), range (m); a range rate is not used.
-    place : Place
-
-    Returns
-    -------
-    position_m : (3, n)
-    jacobian : (3, 3, n)
-        By azimuth, elevation and range.
-    """
+def position_of(measured: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
+    """Return where in the frame a measurement with range lies, and the derivative by it."""
     azimuth, elevation, distance = measured[:3]
     cos_a, sin_a = np.cos(azimuth), np.sin(azimuth)
     cos_e, sin_e = np.cos(elevation), np.sin(elevation)
     body = np.stack([cos_e * cos_a, cos_e * sin_a, -sin_e])
     by_azimuth = np.stack([-cos_e * sin_a, cos_e * cos_a, np.zeros_like(azimuth)])
     by_elevation = np.stack([-sin_e * cos_a, -sin_e * sin_a, -cos_e])
-    to_frame = place.to_body.swapaxes(0, 1)
+    to_frame = pose.to_body.swapaxes(0, 1)
     unit = times(to_frame, body)
     jacobian = np.stack(
         [distance * times(to_frame, by_azimuth), distance * times(to_frame, by_elevation), unit],
         axis=1,
     )
-    return place.position_m + distance * unit, jacobian
+    return pose.position_m + distance * unit, jacobian
 
 
-def _closing(state: FloatArray, place: Place) -> FloatArray:
-    if place.velocity_m_s is None:
+def _closing(state: FloatArray, pose: SensorPose) -> FloatArray:
+    if pose.velocity_m_s is None:
         raise ValueError("a range rate needs the velocity of the sensor")
-    return state[3:6] - place.velocity_m_s
+    return state[3:6] - pose.velocity_m_s
 
 
 def _along(one: FloatArray, other: FloatArray) -> FloatArray:
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def half_angle_rad(
+    position_m: FloatArray, covariance: FloatArray, pose: SensorPose, sigmas: float
+) -> FloatArray:
+    """Return how far from its expected direction a target may be seen."""
+    seen, by_position = linearised(Kind(has_range=False), position_m, pose)
+    spread = product_transposed(product(by_position, covariance), by_position)
+    level = np.cos(seen[1])
+    across, upward = spread[0, 0] * level * level, spread[1, 1]
+    both = spread[0, 1] * level
+    # The larger eigenvalue of two by two.
+    mean, half = 0.5 * (across + upward), 0.5 * (across - upward)
+    widest = mean + np.sqrt(half * half + both * both)
+    return np.minimum(sigmas * np.sqrt(np.maximum(widest, 0.0)), np.pi)
+
+
+def axis_in_body(
+    ahead_s: FloatArray,
+    state: FloatArray,
+    direction: FloatArray,
+    has_range: BoolArray,
+    pose: SensorPose,
+) -> FloatArray:
+    """Return unit vectors from the one who looks along cones' axes, in body axes."""
+    level = np.cos(direction[1])
+    pointed = np.stack(
+        [level * np.cos(direction[0]), level * np.sin(direction[0]), -np.sin(direction[1])]
+    )
+    away = state[:3] + ahead_s * state[3:] - pose.position_m
+    away = np.where(has_range, away, pointed)
+    length = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+    return times(pose.to_body, away / np.maximum(length, 1e-9))

@@ -37,21 +37,7 @@ _UPRIGHT = 0.1
 def moved_in_polar(
     before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a correction that was found in Cartesian coordinates as one in modified polar ones.
-
-    Parameters
-    ----------
-    before, after : (d, n)
-        State before and after the correction; position and velocity first.
-    covariance : (d, d, n)
-        After it.
-    sensor_m : (3, n)
-        Position of the sensor in the frame.
-
-    Returns
-    -------
-    state, covariance : arrays of the same shapes
-    """
+    """Return a correction that was found in Cartesian coordinates as one in modified polar ones."""
     axes, distance, by_range, to_polar = _polar(before, sensor_m)
     change = times(to_polar, after[:6] - before[:6])
     return _moved(axes, distance, by_range, to_polar, change, after, covariance, sensor_m)
@@ -64,19 +50,7 @@ def ranged_in_polar(
     variance_m2: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return tracks after the first range that is measured of them, by its inverse.
-
-    Parameters
-    ----------
-    state : (d, n)
-    covariance : (d, d, n)
-    range_m, variance_m2 : (n,)
-    sensor_m : (3, n)
-
-    Returns
-    -------
-    state, covariance : arrays of the same shapes
-    """
+    """Return tracks after the first range that is measured of them, by its inverse."""
     measured = np.maximum(range_m, np.maximum(np.sqrt(variance_m2), _NEAREST_M))
     axes, distance, by_range, to_polar = _polar(state, sensor_m)
     whole = np.zeros_like(covariance)  # derivative of the polar state by the Cartesian one
@@ -188,19 +162,7 @@ def _turned(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[
 def _from_polar(
     axes: list[FloatArray], other: FloatArray, inverse: FloatArray, by_range: FloatArray
 ) -> FloatArray:
-    """Return the derivative of position and velocity by polar coordinates.
-
-    Parameters
-    ----------
-    axes : list of (3, n)
-        Turned by both angles.
-    other : (n,)
-        The second angle.
-    inverse : (n,)
-        Of the range.
-    by_range : (3, n)
-        Velocity along the axes, divided by the range.
-    """
+    """Return the derivative of position and velocity by polar coordinates."""
     line, across, third = axes
     along, side, up = by_range
     distance, cos, sin = 1.0 / inverse, np.cos(other), np.sin(other)

@@ -44,20 +44,7 @@ class Motion(Protocol):
 def predict(
     model: Motion, state: FloatArray, covariance: FloatArray, dt_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a time, linearised at the state.
-
-    Parameters
-    ----------
-    model : Motion
-    state : (d, n)
-    covariance : (d, d, n)
-    dt_s : (n,)
-        Not negative.
-
-    Returns
-    -------
-    state, covariance : arrays of the same shapes
-    """
+    """Return state and covariance after a time, linearised at the state."""
     if isinstance(model, ConstantVelocity):
         return model.predict(state, covariance, dt_s)
     step = model.jacobian(state, dt_s)
@@ -68,15 +55,10 @@ def predict(
 
 @dataclass(frozen=True)
 class ConstantVelocity:
-    """Nearly constant velocity: white acceleration.
+    """Nearly constant velocity: white acceleration."""
 
-    Parameters
-    ----------
-    intensity_m2_s3 : float
-        Of the acceleration, the same along every axis: after a time t the velocity has gained the
-        variance intensity · t.
-    """
-
+    # Of the acceleration, the same along every axis: after a time t the velocity has gained the
+    # variance intensity · t
     intensity_m2_s3: float
     size: ClassVar[int] = 6
 
@@ -125,15 +107,9 @@ class ConstantVelocity:
 
 @dataclass(frozen=True)
 class ConstantAcceleration:
-    """Nearly constant acceleration: white jerk. The state has accelerations (m/s²) at 6, 7, 8.
+    """Nearly constant acceleration: white jerk. The state has accelerations (m/s²) at 6, 7, 8."""
 
-    Parameters
-    ----------
-    intensity_m2_s5 : float
-        Of the jerk, the same along every axis.
-    """
-
-    intensity_m2_s5: float
+    intensity_m2_s5: float  # Of the jerk, the same along every axis
     size: ClassVar[int] = 9
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -177,17 +153,10 @@ class CoordinatedTurn:
 
     The state has the turn rate (rad/s, positive to the right: north over east) at 6. Velocity is
     disturbed by white acceleration, the rate by white noise of its own.
-
-    Parameters
-    ----------
-    intensity_m2_s3 : float
-        Of the acceleration.
-    turn_intensity_rad2_s3 : float
-        Of the turn rate's derivative.
     """
 
-    intensity_m2_s3: float
-    turn_intensity_rad2_s3: float
+    intensity_m2_s3: float  # Of the acceleration
+    turn_intensity_rad2_s3: float  # Of the turn rate's derivative
     size: ClassVar[int] = 7
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -232,19 +201,7 @@ class CoordinatedTurn:
 def turn_factors(
     rate_rad_s: FloatArray, dt_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return how far a turn goes along and across per unit of speed, and both by the rate.
-
-    Parameters
-    ----------
-    rate_rad_s, dt_s : (n,)
-
-    Returns
-    -------
-    along, across : (n,)
-        sin(ωt)/ω and (1 - cos ωt)/ω, in s.
-    along_by_rate, across_by_rate : (n,)
-        Their derivatives by ω, in s².
-    """
+    """Return how far a turn goes along and across per unit of speed, and both by the rate."""
     turned = rate_rad_s * dt_s
     small = np.abs(turned) < _SMALL_TURN
     safe = np.where(small, 1.0, turned)

@@ -15,7 +15,8 @@ from components.estimation.batched import (
     solve_upper,
     symmetric,
 )
-from components.estimation.frame import Place
+from components.estimation.estimator import Estimates, Estimator
+from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, residual
 from components.estimation.motion import Motion
@@ -24,17 +25,16 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass(frozen=True)
 class SigmaPoints:
-    """How sigma points are spread and weighted.
+    """How sigma points are spread and weighted."""
 
-    Parameters
-    ----------
-    alpha, beta, kappa : float
-        Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
-        defaults no weight is negative, so that no covariance can lose its sign.
-    """
-
+    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
+    # defaults no weight is negative, so that no covariance can lose its sign
     alpha: float = 1.0
+    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
+    # defaults no weight is negative, so that no covariance can lose its sign
     beta: float = 2.0
+    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
+    # defaults no weight is negative, so that no covariance can lose its sign
     kappa: float = 0.0
 
     def weights(self, size: int) -> tuple[FloatArray, FloatArray, float]:
@@ -54,6 +54,30 @@ class SigmaPoints:
         points[:, 1 : size + 1] += apart
         points[:, size + 1 :] -= apart
         return points
+
+
+@dataclass(frozen=True)
+class UnscentedKalmanFilter(Estimator):
+    """Takes the moments of motion and measurement from sigma points."""
+
+    model: Motion
+    sigma: SigmaPoints = SigmaPoints()
+
+    @property
+    def models(self) -> tuple[Motion, ...]:
+        """The one model."""
+        return (self.model,)
+
+    def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
+        """Return tracks after times (n,)."""
+        (state,), (covariance,), weights = tracks
+        state, covariance = predict_unscented(self.model, state, covariance, dt_s, self.sigma)
+        return Estimates([state], [covariance], weights)
+
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+        """Return what is expected to be measured."""
+        (state,), (covariance,), _ = tracks
+        return [unscented_moments(kind, state, covariance, pose, self.sigma)]
 
 
 def predict_unscented(
@@ -76,7 +100,7 @@ def predict_unscented(
 
 
 def unscented_moments(
-    kind: Kind, state: FloatArray, covariance: FloatArray, place: Place, sigma: SigmaPoints
+    kind: Kind, state: FloatArray, covariance: FloatArray, pose: SensorPose, sigma: SigmaPoints
 ) -> Moments:
     """Return the moments of what sigma points would be measured as.
 
@@ -87,12 +111,12 @@ def unscented_moments(
     of_mean, of_covariance, _ = sigma.weights(size)
     points = sigma.of(state, covariance)
     many = points.shape[1]
-    places = Place(
-        np.tile(place.position_m, many),
-        np.tile(place.to_body, many),
-        None if place.velocity_m_s is None else np.tile(place.velocity_m_s, many),
+    poses = SensorPose(
+        np.tile(pose.position_m, many),
+        np.tile(pose.to_body, many),
+        None if pose.velocity_m_s is None else np.tile(pose.velocity_m_s, many),
     )
-    seen = expected(kind, points.reshape(size, -1), places).reshape(kind.size, many, count)
+    seen = expected(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
     mean = _weighted(seen, of_mean)
     for angle in range(2):
         sin = _weighted(np.sin(seen[angle])[np.newaxis], of_mean)[0]

@@ -15,7 +15,7 @@ from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from components.display.recorded_run import OWNSHIP, RecordedTables
-from components.estimation.frame import place_in_frame
+from components.estimation.frame import pose_in_frame
 from components.geometry.angles import local_axes
 from components.geometry.ellipsoid import north_east_up
 from components.stone_soup.objects import (
@@ -104,7 +104,7 @@ def recorded_run(
     origin = origin or _origin(run, pose)
     lat, lon, alt = (np.full(pose.shape[1], value) for value in origin)
     moves = np.stack([columns[name] for name in _MOVES]) if range_rates else None
-    place = place_in_frame(
+    place = pose_in_frame(
         (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5]), moves
     )
     paths = {name: _path(name, flight, origin) for name, flight in flights.items()}

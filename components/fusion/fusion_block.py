@@ -6,14 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.directions import unit_vectors
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
+from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import navigation_errs
+from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
@@ -137,17 +141,7 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Build the fused rows from the best of what belongs together.
-
-        Parameters
-        ----------
-        ticks : (rows,)
-        row, target : (entries,)
-            Row and target of each fused detection, ascending in row.
-        arrivals : dict of Arrivals
-        entries : dict of (entries,)
-            By sensor: which of its detections belongs to each, -1 for none.
-        """
+        """Build the fused rows from the best of what belongs together."""
         count = len(row)
         contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
@@ -199,7 +193,7 @@ class Fusion(Component):
 
 
 def poses(message: Detections) -> FloatArray:
-    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is told."""
+    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is stated."""
     columns = message.pose_columns()
     if columns:
         return np.stack(list(columns.values()))
@@ -207,7 +201,7 @@ def poses(message: Detections) -> FloatArray:
 
 
 def velocities(message: Detections) -> FloatArray:
-    """Return the ownship's velocity at each entry, (3, entries); NaN where none is told."""
+    """Return the ownship's velocity at each entry, (3, entries); NaN where none is stated."""
     velocity = message.velocity_columns()
     if velocity is None:
         return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)
@@ -228,3 +222,87 @@ def _copy(
         return
     for column in columns:
         values[column][at] = getattr(message, column)[chosen]
+
+
+def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
+    """Return the entry detected at exactly the same instant."""
+    entry = np.full(len(asked), -1, dtype=np.int64)
+    if len(keys):
+        entry[asked.searchsorted(keys)] = np.arange(len(keys))
+    return entry
+
+
+def latest_in_gate(
+    arrivals: Arrivals, ticks: IntArray, targets: IntArray, gate_ticks: int
+) -> IntArray:
+    """Return the latest entry that arrived at the instant or at most `gate_ticks` before it."""
+    counts = np.diff(arrivals.message.offsets)
+    if not counts.any():
+        return np.full(len(ticks), -1, dtype=np.int64)
+    # Ranks of instants stay small where ticks times targets would overflow.
+    instants, rank = np.unique(np.concatenate([arrivals.tick, ticks]), return_inverse=True)
+    span = len(instants)
+    entry_tick = np.repeat(arrivals.tick, counts)
+    entry_key = arrivals.message.target * span + np.repeat(rank[: len(arrivals.tick)], counts)
+    order = np.argsort(entry_key, kind="stable")
+    asked = targets * span + rank[len(arrivals.tick) :]
+    place = np.searchsorted(entry_key[order], asked, side="right") - 1
+    entry = order[np.maximum(place, 0)]
+    fits = (
+        (place >= 0)
+        & (arrivals.message.target[entry] == targets)
+        & (ticks - entry_tick[entry] <= gate_ticks)
+    )
+    return np.where(fits, entry, -1)
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return how far each fused line of sight is from the true one at its instant.
+
+    Rungs fuse other rows, so they are compared with the truth and not row by row with each other.
+    """
+    fused: Any = block.run(wake)
+    if fused is None:
+        return {"direction": np.empty((0, 0)), "range": np.empty((0, 0))}
+    fused = true_entries(fused)
+    shape = (len(wake), len(fused.roster))
+    row = np.searchsorted(wake.ticks, np.repeat(fused.tick, np.diff(fused.offsets)))
+    line: FloatArray = np.full(shape, np.nan)
+    distance: FloatArray = np.full(shape, np.nan)
+    line[row, fused.target] = angle_apart_mrad(
+        unit_vectors(fused.azimuth_rad, fused.elevation_rad),
+        unit_vectors(fused.true_azimuth_rad, fused.true_elevation_rad),
+    )
+    distance[row, fused.target] = np.abs(fused.range_m - fused.true_range_m)
+    return {"direction": line, "range": distance}
+
+
+def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the same for the reference: sensors' grids are part of it."""
+    row, target = cells.T
+    return {name: values[row, target] for name, values in measure(block, wake, block).items()}
+
+
+def _to_the_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
+    return values
+
+
+FUSION_LADDER = Ladder(
+    "association",
+    (
+        Rung("exact_instant", "same target, same instant (Fig. 4.22)", "fusion.pick_best",
+             {"coincidence_s": 0}),
+        Rung("window", "same target, at most 0.1 s apart", "fusion.pick_best",
+             {"coincidence_s": 0.1}),
+        Rung("gated", "within 0.1 s, 2 deg and 300 m, whatever the target", "fusion.gated",
+             {"time_gate_s": 0.1, "angle_gate_deg": 2.0, "range_gate_m": 300.0}),
+    ),
+    "exact_instant",
+    (
+        Quantity("range", "m", _to_the_truth),
+        Quantity("direction", "mrad", _to_the_truth),
+    ),
+    measure,
+    truth,
+    clears=("model",),
+)  # fmt: skip

@@ -1,21 +1,154 @@
 """Gated fusion: detections that lie close in time and place belong together (``fusion.gated``)."""
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from components.fusion.carried import Carrier
-from components.fusion.fusion_block import Fusion, poses
-from components.fusion.gate_match import nearest_in_gate
-from components.fusion.ladder import FUSION
+from components.fusion.fusion_block import FUSION_LADDER, Fusion, poses
+from components.geometry.attitude import (
+    body_angles,
+    body_to_ned,
+    ned_to_body,
+    unit_vector_unchecked,
+)
+from components.geometry.directions import angle_by_haversine
+from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
+
+
+class Carrier:
+    """Carries detections of one sensor to the instants of another one's.
+
+    What is known of the time between is how the ownship turned and moved, by the poses that it
+    believed itself to have, and how the range changed, where its rate was measured. A target's
+    own motion across the line of sight is not: the gates are there for it. A detection without
+    a range is taken to be as far away as the one that it is compared with.
+    """
+
+    def __init__(
+        self,
+        one: Any,
+        one_ticks: IntArray,
+        one_pose: FloatArray,
+        other: Any,
+        other_ticks: IntArray,
+        other_pose: FloatArray,
+        ticks_per_s: int,
+    ) -> None:
+        self._one, self._other = one, other
+        self._ticks = one_ticks, other_ticks
+        self._poses = one_pose, other_pose
+        self._ticks_per_s = ticks_per_s
+
+    def __call__(
+        self, mine: IntArray, theirs: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return azimuth, elevation and range of entries `theirs` at the instants of `mine`."""
+        other = self._other
+        azimuth, elevation = other.azimuth_rad[theirs], other.elevation_rad[theirs]
+        range_m = other.range_m[theirs]
+        before, after = self._poses[1][:, theirs], self._poses[0][:, mine]
+        ticks = self._ticks[0][mine] - self._ticks[1][theirs]
+        known = np.isfinite(before).all(axis=0) & np.isfinite(after).all(axis=0)
+        moved = np.flatnonzero((ticks != 0) & known)
+        if len(moved) == 0:
+            return azimuth, elevation, range_m
+        before, after = before[:, moved], after[:, moved]
+        line = unit_vector_unchecked(azimuth[moved], elevation[moved])
+        seen = np.stack(body_to_ned(*line, *before[3:]))
+        reach = range_m[moved]
+        away = np.where(np.isnan(reach), self._one.range_m[mine[moved]], reach)
+        step = np.stack(line_of_sight_ned(*before[:3], *after[:3], validate=False))
+        # Without any range the parallax is not known.
+        vector = np.where(np.isnan(away), seen, away * seen - step)
+        length = np.sqrt((vector**2).sum(axis=0))
+        ahead = ned_to_body(*(vector / np.maximum(length, 1e-9)), *after[3:])
+        azimuth[moved], elevation[moved] = body_angles(*ahead)
+        by_rate = reach + other.range_rate_m_s[theirs[moved]] * ticks[moved] / self._ticks_per_s
+        by_step = np.where(np.isnan(reach), np.nan, length)
+        range_m[moved] = np.where(np.isnan(by_rate), by_step, by_rate)
+        return azimuth, elevation, range_m
+
+
+#: Given entries of one sensor and of another, pair by pair: azimuth, elevation and range of the
+#: other one at the instant of the first.
+Carried = Callable[[IntArray, IntArray], tuple[FloatArray, FloatArray, FloatArray]]
+
+
+def nearest_in_gate(
+    one: Any,
+    anchors: IntArray,
+    anchor_ticks: IntArray,
+    other: Any,
+    other_ticks: IntArray,
+    *,
+    gate_ticks: int,
+    angle_gate_rad: float,
+    range_gate_m: float,
+    anchor_came: IntArray | None = None,
+    other_came: IntArray | None = None,
+    keep_ticks: int | None = None,
+    carried: Carried | None = None,
+) -> IntArray:
+    """Return for each anchor the entry of the other sensor that belongs to it, or -1.
+
+    Of the entries in the gates those nearest in time count, of these the one nearest in angle,
+    then in range. Nothing but measured values decides.
+    """
+    best = np.full(len(anchors), -1, dtype=np.int64)
+    if len(other_ticks) == 0:
+        return best
+    here = anchor_ticks if anchor_came is None else anchor_came
+    there = other_ticks if other_came is None else other_came
+    in_time = np.argsort(other_ticks, kind="stable")
+    first = np.searchsorted(other_ticks[in_time], anchor_ticks - gate_ticks, side="left")
+    counts = np.searchsorted(other_ticks[in_time], anchor_ticks + gate_ticks, side="right") - first
+    which = np.repeat(np.arange(len(anchors)), counts)
+    start = np.repeat(np.cumsum(counts) - counts, counts)
+    candidate = in_time[np.arange(len(which)) - start + np.repeat(first, counts)]
+    known = there[candidate] <= here[which]
+    if keep_ticks is not None:
+        known &= there[candidate] >= here[which] - keep_ticks
+    which, candidate = which[known], candidate[known]
+    mine = anchors[which]
+    azimuth, elevation, range_m = (
+        (other.azimuth_rad[candidate], other.elevation_rad[candidate], other.range_m[candidate])
+        if carried is None
+        else carried(mine, candidate)
+    )
+    apart_rad = angle_by_haversine(
+        one.azimuth_rad[mine], one.elevation_rad[mine], azimuth, elevation
+    )
+    apart_m = np.abs(one.range_m[mine] - range_m)
+    # Where either has no range the difference is NaN, and the range gate is open.
+    inside = np.flatnonzero((apart_rad <= angle_gate_rad) & ~(apart_m > range_gate_m))
+    late = np.abs(other_ticks[candidate[inside]] - anchor_ticks[which[inside]])
+    # The first of each anchor counts. A sensor's own order would tell who is who, so that alike
+    # ones are told apart by what was measured of them, as long as that differs.
+    order = np.lexsort(
+        (
+            candidate[inside],
+            range_m[inside],
+            elevation[inside],
+            azimuth[inside],
+            apart_m[inside],
+            apart_rad[inside],
+            late,
+            which[inside],
+        )
+    )
+    chosen = inside[order]
+    anchor, place = np.unique(which[chosen], return_index=True)
+    best[anchor] = candidate[chosen[place]]
+    return best
 
 
 class GatedParameters(Parameters):
@@ -41,7 +174,7 @@ class Gated(Fusion):
     best angles first; each of their detections gathers the nearest detection of every other sensor
     in its gates. One gathered at the same instant makes no row of its own; one detection may be
     gathered by two others. What was measured at another instant is first carried to that of the
-    detection that gathers it (`components.fusion.carried`); what a row records is as it was
+    detection that gathers it (`components.fusion.gated`); what a row records is as it was
     measured, of the instants at which it was. The row bears the target of the best sensor whose
     detection has one; that is for the record, neither what is fused nor its order rests on it.
     """
@@ -49,7 +182,7 @@ class Gated(Fusion):
     Parameters = GatedParameters
     lockstep = True
     side_by_side = True
-    ladders = (FUSION,)
+    ladders = (FUSION_LADDER,)
 
     def window_s(self) -> Any:
         """Return ``time_gate_s``."""
@@ -118,7 +251,7 @@ class Gated(Fusion):
         in_order = self._in_order(rows, anchors, arrivals)
         row = np.concatenate(rows)[in_order]
         entries = {name: np.concatenate(parts)[in_order] for name, parts in gathered.items()}
-        target = self._who(entries, arrivals, order)
+        target = self._targets(entries, arrivals, order)
         return self.combine(wake.ticks, row, target, arrivals, entries)
 
     def _in_order(
@@ -136,10 +269,10 @@ class Gated(Fusion):
         rank = np.repeat(np.arange(len(anchors)), [len(mine) for _, mine in anchors])
         return np.lexsort((*measured, rank, np.concatenate(rows)))
 
-    def _who(
+    def _targets(
         self, entries: dict[str, IntArray], arrivals: dict[str, Arrivals], order: list[str]
     ) -> IntArray:
-        """Return whom each fused detection is of, for the record: nothing here rests on it."""
+        """Return the target of each fused detection, for the record: nothing here rests on it."""
         target = np.full(len(next(iter(entries.values()))), FALSE_TARGET, dtype=np.int64)
         for name in reversed(order):
             entry = entries[name]

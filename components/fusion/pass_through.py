@@ -18,7 +18,8 @@ class PassThrough(Fusion):
     """Hands on every detection alone, and says which sensor looked when, also in vain.
 
     Nothing is put together: that is the tracker's work. Entries of an instant stand by sensor, in
-    the sensor's own order. A sweeping radar's scan is not told as a look, as it has no one instant.
+    the sensor's own order. A sweeping radar's scan is not reported as a look, as it has no one
+    instant.
     """
 
     Parameters = Parameters
@@ -62,10 +63,10 @@ class PassThrough(Fusion):
             row.append(np.searchsorted(ticks, new.tick))
             sensor.append(np.full(len(message), self.sensors.index(name)))
             age.append(new.tick - message.tick)
-            told = [getattr(message, column) for column in POSE]
-            if any(values is None for values in told):
-                told = [np.full(len(message), np.nan)] * len(POSE)
-            pose.append(np.stack(told))
+            own = [getattr(message, column) for column in POSE]
+            if any(values is None for values in own):
+                own = [np.full(len(message), np.nan)] * len(POSE)
+            pose.append(np.stack(own))
         if not row:
             none = np.empty(0, dtype=np.int64)
             return Looks(np.zeros(len(ticks) + 1, dtype=np.int64), none, none, np.empty((6, 0)))

@@ -1,21 +1,88 @@
 """Pick-best fusion: radar gives range, optics give the angles (``fusion.pick_best``, §3.6)."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from components.fusion.coincidence import latest_in_gate, same_instant
-from components.fusion.false_alarms import pass_false_alarms
-from components.fusion.fusion_block import Fusion
-from components.fusion.ladder import FUSION
-from components.messages.false_detections import true_entries
+from components.fusion.fusion_block import (
+    FUSION_LADDER,
+    Fusion,
+    latest_in_gate,
+    poses,
+    same_instant,
+    velocities,
+)
+from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
+from components.messages.contributors import mask_type
+from components.messages.false_detections import FALSE_TARGET, true_entries
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
+
+
+def pass_false_alarms(
+    fused: FusedDetections, arrivals: Mapping[str, Arrivals], ranging: Sequence[str]
+) -> FusedDetections:
+    """Return fused detections with the false alarms of each instant after them."""
+    rows: list[IntArray] = [np.repeat(np.arange(len(fused)), np.diff(fused.offsets))]
+    columns: dict[str, list[Any]] = {
+        name: [getattr(fused, name)]
+        for name in (
+            "target", "azimuth_rad", "elevation_rad", "range_m", "contributors", "angle_source",
+            "range_source", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+            "measured_tick", *MEASURED,
+        )
+    }  # fmt: skip
+    own = [np.stack(list(fused.pose_columns().values()))] if fused.pose_columns() else None
+    known = fused.own_velocity
+    moves = None if known is None else [np.stack(list(known.values()))]
+    for index, name in enumerate(fused.sensors):
+        if name not in arrivals:
+            continue
+        new = arrivals[name]
+        false = np.flatnonzero(new.message.target == FALSE_TARGET)
+        if len(false) == 0:
+            continue
+        row = np.searchsorted(fused.tick, new.tick)
+        rows.append(np.repeat(row, np.diff(new.message.offsets))[false])
+        for column in ("azimuth_rad", "elevation_rad", "range_m"):
+            columns[column].append(getattr(new.message, column)[false])
+            columns[f"true_{column}"].append(np.full(len(false), np.nan))
+        for column in MEASURED:
+            columns[column].append(getattr(new.message, column)[false])
+        columns["measured_tick"].append(new.message.measured_ticks()[false])
+        if own is not None:
+            own.append(poses(new.message)[:, false])
+        if moves is not None:
+            moves.append(velocities(new.message)[:, false])
+        for column, value in (
+            ("target", FALSE_TARGET),
+            ("contributors", 1 << index),
+            ("angle_source", index),
+            ("range_source", index if name in ranging else -1),
+        ):
+            kind = mask_type(len(fused.sensors)) if column == "contributors" else np.int64
+            columns[column].append(np.full(len(false), value, dtype=kind))
+    if len(rows) == 1:
+        return fused
+    joined = np.concatenate(rows)
+    # Stable: fused detections first, then sensor by sensor.
+    order = np.argsort(joined, kind="stable")
+    values: dict[str, Any] = {name: np.concatenate(parts)[order] for name, parts in columns.items()}
+    offsets = np.searchsorted(joined[order], np.arange(len(fused) + 1))
+    if own is not None:
+        pose = np.concatenate(own, axis=1)[:, order]
+        values["own_of_entries"] = dict(zip(POSE, pose, strict=True))
+    if moves is not None:
+        velocity = np.concatenate(moves, axis=1)[:, order]
+        values["own_velocity"] = dict(zip(OWN_VELOCITY, velocity, strict=True))
+    return replace(fused, offsets=offsets, **values)
 
 
 class PickBestParameters(Parameters):
@@ -40,7 +107,7 @@ class PickBest(Fusion):
     Parameters = PickBestParameters
     lockstep = True
     side_by_side = True
-    ladders = (FUSION,)
+    ladders = (FUSION_LADDER,)
 
     def left_out(self) -> list[str]:
         """Say what decides here which detections belong together."""

@@ -2,7 +2,7 @@
 
 Every encounter is run without avoidance (*nominal*) and with it (*mitigated*), on the same random
 numbers, and has a weight that says how often it happens in the airspace. The risk ratio is what
-`dsa_des.studies.ratio` computes, under the field's names.
+`dsa_des.results.ratio` computes, under the field's names.
 """
 
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ from components.metrics.separation import RelativeFlight, relative_states, traff
 from components.well_clear.severity import collision_probability, loss_severity
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Metric, Result
-from dsa_des.studies.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 
 __all__ = [
     "METHODS", "Mitigated", "RiskParameters", "RiskRatio", "Severity", "risk_ratio",

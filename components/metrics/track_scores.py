@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 _AXES = ("north", "east", "down")
 _SETS = (

@@ -10,7 +10,7 @@ class TimeBudget(Effect):
     """Energy of a look from the time that a scan leaves for each beam.
 
     A radar's link budget then differs with its scan rate, so replicas that differ in it have
-    instances of their own: reading the rate is seen (`dsa_des.replicas.watched_parameters`).
+    instances of their own.
     """
 
     lockstep = True

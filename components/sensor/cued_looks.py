@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.cue_cone import axis_in_body
-from components.estimation.frame import place_in_frame
+from components.estimation.frame import pose_in_frame
+from components.estimation.measurement import axis_in_body
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
@@ -86,7 +86,7 @@ class ConesAhead:
         if not pose:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
-        place = place_in_frame(
+        place = pose_in_frame(
             tuple(getattr(cones, name)[entry] for name in _ORIGIN), tuple(own[:3]), tuple(own[3:])
         )
         axis = axis_in_body(

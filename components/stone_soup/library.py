@@ -17,18 +17,7 @@ import numpy as np
 
 
 def needs_stone_soup(what: str) -> None:
-    """Say how to install the extra if it is missing.
-
-    Parameters
-    ----------
-    what : str
-        What needs it, for the message.
-
-    Raises
-    ------
-    ImportError
-        Stone Soup is not installed.
-    """
+    """Say how to install the extra if it is missing."""
     try:
         import_module("stonesoup")
     except ImportError as error:
@@ -36,13 +25,7 @@ def needs_stone_soup(what: str) -> None:
 
 
 class Repeatable:
-    """What a tracker's order and draws follow from.
-
-    Parameters
-    ----------
-    seed : int
-        From 0; its low 32 bits count.
-    """
+    """What a tracker's order and draws follow from."""
 
     def __init__(self, seed: int) -> None:
         self._numbers = count()

@@ -20,8 +20,7 @@ from stonesoup.types.angle import Bearing, Elevation
 from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 
-from components.estimation.frame import Place
-from components.stone_soup.rotation import rotation_offsets
+from components.estimation.frame import SensorPose
 from dsa_des.arrays.types import FloatArray
 
 #: A run has no date: its second 0 is put here.
@@ -44,20 +43,10 @@ def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> l
 
 
 class Poses:
-    """Where sensors are and how they are turned, as measurement models take it.
-
-    Parameters
-    ----------
-    place : Place
-        Of n sensors in the frame north, east, down.
-    mapping : sequence of int
-        Where x, y and z stand in a state.
-    state_size : int
-        How many components a state has.
-    """
+    """Where sensors are and how they are turned, as measurement models take it."""
 
     def __init__(
-        self, place: Place, mapping: Sequence[int] = POSITION, state_size: int = 6
+        self, place: SensorPose, mapping: Sequence[int] = POSITION, state_size: int = 6
     ) -> None:
         self._mapping, self._size = tuple(mapping), state_size
         north, east, down = place.position_m
@@ -73,18 +62,11 @@ class Poses:
         return StateVector(self._offset[:, i])
 
     def orientation(self, i: int) -> StateVector:
-        """Return roll, pitch and yaw of sensor i (`components.stone_soup.rotation`)."""
+        """Return roll, pitch and yaw of sensor i (`components.stone_soup.objects`)."""
         return StateVector(self._angles[:, i])
 
     def model(self, i: int, variances: FloatArray) -> Any:
-        """Return what sensor i would measure of a state, and how well.
-
-        Parameters
-        ----------
-        i : int
-        variances : (2,), (3,) or (4,)
-            Of elevation, azimuth and, where they are measured, range and its rate.
-        """
+        """Return what sensor i would measure of a state, and how well."""
         common = {
             "ndim_state": self._size,
             "mapping": self._mapping,
@@ -126,20 +108,7 @@ def detections(
     variance: FloatArray,
     metadata: "list[dict[str, Any]]",
 ) -> set[Detection]:
-    """Return detections of one look.
-
-    Parameters
-    ----------
-    poses : Poses
-    which : list of int
-        Index of each detection's pose.
-    when : datetime
-    measured, variance : (4, n)
-        Azimuth, elevation, range and its rate, as our sensors give them; NaN where there is none. A
-        rate without a variance, a range or the sensor's velocity is left out.
-    metadata : list of dict
-        What each carries besides.
-    """
+    """Return detections of one look."""
     found = set()
     for k, i in enumerate(which):
         azimuth, elevation, range_m, rate = measured[:, k].tolist()
@@ -161,3 +130,25 @@ def detections(
         one.number = k
         found.add(one)
     return found
+
+
+# Nearer to straight up or down than this, yaw and roll are one and the same turn.
+_UPRIGHT = 1e-9
+
+
+def rotation_offsets(to_body: FloatArray) -> FloatArray:
+    """Return the angles that stand for rotations."""
+    # Columns along east, north, up; rows along nose, left wing, roof.
+    turned = to_body[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0])[np.newaxis, :, np.newaxis]
+    turned *= np.array([1.0, -1.0, -1.0])[:, np.newaxis, np.newaxis]
+    level = np.hypot(turned[0, 0], turned[0, 1])
+    upright = level < _UPRIGHT
+    roll = np.arctan2(turned[1, 2], turned[2, 2])
+    yaw = np.arctan2(turned[0, 1], turned[0, 0])
+    return np.stack(
+        [
+            np.where(upright, np.arctan2(-turned[2, 1], turned[1, 1]), roll),
+            np.arctan2(turned[0, 2], level),
+            np.where(upright, 0.0, yaw),
+        ]
+    )

@@ -12,23 +12,67 @@ from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
-from components.track_fusion.fused_states import fused_states
-from components.track_fusion.heads import FusionHeads, later_heads
-from components.track_fusion.ladder import RULE
-from components.track_fusion.local_tracks import LocalTracks, local_tracks
-from components.track_fusion.matching import MatchRules, matched, without_strays
-from components.track_fusion.told_tracks import (
-    Told,
+from components.track_fusion.fused_tracks import (
+    FusedColumns,
+    fused_states,
     joined,
-    nothing_told,
+    no_fused_tracks,
+    reported_after,
     state_tracks,
     taken,
-    told_after,
 )
-from dsa_des.arrays.types import IntArray
+from components.track_fusion.local_tracks import (
+    FusionRecords,
+    LocalTracks,
+    local_tracks,
+    with_newest,
+)
+from components.track_fusion.track_association import MatchRules, matched, without_strays
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
+from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
+
+# Fused tracks by number: as many as are compared.
+_TRACKS = 64
+_POSITION = ("north_m", "east_m", "down_m")
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the position of each fused track, and how uncertain it is."""
+    position = np.full((len(wake), _TRACKS, 3), np.nan)
+    spread = np.full((len(wake), _TRACKS), np.nan)
+    reported: Any = block.run(wake)
+    if reported is not None:
+        row = np.repeat(np.searchsorted(wake.ticks, reported.tick), np.diff(reported.offsets))
+        mine = np.flatnonzero(reported.has_range & (reported.track <= _TRACKS))
+        place = row[mine], reported.track[mine] - 1
+        position[place] = np.stack([getattr(reported, name)[mine] for name in _POSITION], axis=-1)
+        variance = sum(reported.covariance[f"covariance_{i}{i}_m2"][mine] for i in range(3))
+        spread[place] = np.sqrt(np.asarray(variance))
+    return {"position": position, "spread": spread}
+
+
+def _distance(values: AnyArray, reference: AnyArray) -> FloatArray:
+    return np.asarray(np.sqrt(((values - reference) ** 2).sum(axis=-1)))
+
+
+RULE = Ladder(
+    "rule",
+    (
+        Rung("independent", "information added, as if errors had nothing in common",
+             parameters={"rule": "independent"}),
+        Rung("trace", "covariance intersection, least trace of the position",
+             parameters={"rule": "trace"}),
+        Rung("determinant", "covariance intersection, least determinant",
+             parameters={"rule": "determinant"}),
+    ),
+    "determinant",
+    (Quantity("position", "m", _distance), Quantity("spread", "m")),
+    measure,
+)  # fmt: skip
+
 
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
@@ -73,26 +117,17 @@ class IntersectionParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class _Reports:
-    """What came from the trackers in a wake, in the frames of the replicas.
-
-    Parameters
-    ----------
-    tracks : LocalTracks
-    row : (tracks,)
-        Of the wake.
-    told_at : list of (reports,)
-        By tracker: the rows at which it told.
-    """
+    """What came from the trackers in a wake, in the frames of the replicas."""
 
     tracks: LocalTracks
-    row: IntArray
-    told_at: list[IntArray]
+    row: IntArray  # (tracks,), of the wake
+    reported_at: list[IntArray]  # list of (reports,): By tracker: the rows at which it reported
 
 
 class CovarianceIntersection(Component):
     """Makes one track of those that several trackers have of a target.
 
-    Whose tracks are of one target is told by what they say of it. Fused tracks bear numbers of
+    Which tracks are of one target is decided by what they say of it. Fused tracks bear numbers of
     their own, in a frame of their own: that of the first track to come. What is known of a target
     is brought to the instant of the newest report, and combined without knowing how the trackers'
     errors hang together (`components.estimation.covariance_intersection`). A track without a range
@@ -110,7 +145,7 @@ class CovarianceIntersection(Component):
     ladders = (RULE,)
 
     def setup(self) -> None:
-        """Start with no tracks, and learn who sends them."""
+        """Start with no tracks, and learn which trackers send them."""
         self.trackers = tuple(sorted(producer.block for producer in self.context.producers))
         offers = self._offers()
         ranged = {n for n, o in offers.items() if isinstance(o, SensorOffer) and o.measures_range}
@@ -122,11 +157,11 @@ class CovarianceIntersection(Component):
             self.p.stay_factor,
         )
         none = np.empty(0, dtype=np.int64)
-        self._heads = FusionHeads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
-        #: By tracker: of each replica, the newest instant that it told of.
+        self._records = FusionRecords(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
+        #: By tracker: of each replica, the newest instant that it reported of.
         self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
-        self._told = nothing_told()
+        self._reported = no_fused_tracks()
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -140,42 +175,44 @@ class CovarianceIntersection(Component):
         return self._offers()
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what the trackers told, instant by instant, and tell the fused tracks."""
+        """Take in what the trackers report, instant by instant, and report the fused tracks."""
         came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
         row_of = {name: np.searchsorted(wake.ticks, new.tick) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
             return None
         replica = wake.replica[rows]
-        heads = self._heads_of(np.unique(replica), came, row_of, wake)
-        reports = self._reports(wake, came, row_of, heads)
-        local = self._local.take(np.isin(self._local.replica, heads.replica))
-        told = taken(self._told, np.isin(self._told["replica"], heads.replica))
+        records = self._records_of(np.unique(replica), came, row_of, wake)
+        reports = self._reports(wake, came, row_of, records)
+        local = self._local.take(np.isin(self._local.replica, records.replica))
+        reported = taken(self._reported, np.isin(self._reported["replica"], records.replica))
         parts = []
         turn_of = np.arange(len(rows)) - np.searchsorted(replica, replica)
         for turn in range(int(turn_of.max()) + 1):
             at = np.flatnonzero(turn_of == turn)
-            local, heads = self._taken_in(local, heads, reports, rows[at], replica[at])
-            new = self._tell(local, heads, told, rows[at], replica[at])
+            local, records = self._taken_in(local, records, reports, rows[at], replica[at])
+            new = self._fused(local, records, reported, rows[at], replica[at])
             parts.append(new)
             kept = taken(new, new["track_status"] != DELETED)
-            told = joined([taken(told, ~np.isin(told["replica"], replica[at])), kept])
-        self._remember(heads, local, told, wake)
+            reported = joined([taken(reported, ~np.isin(reported["replica"], replica[at])), kept])
+        self._remember(records, local, reported, wake)
         return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
 
-    def _remember(self, heads: FusionHeads, local: LocalTracks, told: Told, wake: Wake) -> None:
+    def _remember(
+        self, records: FusionRecords, local: LocalTracks, reported: FusedColumns, wake: Wake
+    ) -> None:
         """Keep what is held of the replicas that may come again."""
         if wake.side_by_side:
-            others = ~np.isin(self._local.replica, heads.replica)
+            others = ~np.isin(self._local.replica, records.replica)
             self._local = LocalTracks.joined([self._local.take(others), local])
-            others = ~np.isin(self._told["replica"], heads.replica)
-            self._told = joined([taken(self._told, others), told])
-            self._heads = self._heads.kept_with(heads)
+            others = ~np.isin(self._reported["replica"], records.replica)
+            self._reported = joined([taken(self._reported, others), reported])
+            self._records = self._records.kept_with(records)
             return
-        last = heads.replica[-1]
-        self._heads = heads.take(heads.replica == last)
+        last = records.replica[-1]
+        self._records = records.take(records.replica == last)
         self._local = local.take(local.replica == last)
-        self._told = taken(told, told["replica"] == last)
+        self._reported = taken(reported, reported["replica"] == last)
 
     def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
@@ -193,12 +230,12 @@ class CovarianceIntersection(Component):
         which = np.flatnonzero(kept)
         return Arrivals(new.source, new.tick[which], new.message.take(which))
 
-    def _heads_of(
+    def _records_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
-    ) -> FusionHeads:
+    ) -> FusionRecords:
         """Return what is kept of replicas; the frame of a new one is that of its first track."""
         count = len(replicas)
-        heads = FusionHeads(
+        records = FusionRecords(
             replicas, np.full((3, count), np.nan), np.ones(count, dtype=np.int64),
             np.full(count, -np.inf), np.full((3, count), np.nan),
         )  # fmt: skip
@@ -210,30 +247,34 @@ class CovarianceIntersection(Component):
             sooner = row[entries] < first[of]
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
-            heads.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
-        old = self._heads.take(np.isin(self._heads.replica, replicas))
+            records.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
+        old = self._records.take(np.isin(self._records.replica, replicas))
         here = np.searchsorted(replicas, old.replica)
-        heads.next_number[here], heads.time_s[here] = old.next_number, old.time_s
-        heads.own_m[:, here] = old.own_m
+        records.next_number[here], records.time_s[here] = old.next_number, old.time_s
+        records.own_m[:, here] = old.own_m
         begun = ~np.isnan(old.origin[0])
-        heads.origin[:, here[begun]] = old.origin[:, begun]
-        return heads
+        records.origin[:, here[begun]] = old.origin[:, begun]
+        return records
 
     def _reports(
-        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: FusionHeads
+        self,
+        wake: Wake,
+        came: dict[str, Arrivals],
+        row_of: dict[str, IntArray],
+        records: FusionRecords,
     ) -> _Reports:
         parts, rows = [], []
-        told_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
+        reported_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
         for name, row in row_of.items():
             message, replica = came[name].message, wake.replica[row]
             index = self.trackers.index(name)
-            origin = heads.origin[:, np.searchsorted(heads.replica, replica)]
+            origin = records.origin[:, np.searchsorted(records.replica, replica)]
             masks = self._masks(message.sensors)
             found, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
             parts.append(found)
             rows.append(row[of])
-            told_at[index] = row
-        return _Reports(LocalTracks.joined(parts), np.concatenate(rows), told_at)
+            reported_at[index] = row
+        return _Reports(LocalTracks.joined(parts), np.concatenate(rows), reported_at)
 
     def _masks(self, sensors: Sequence[str]) -> list[int]:
         """Return the bit of each of a tracker's sensors among all."""
@@ -244,37 +285,44 @@ class CovarianceIntersection(Component):
     def _taken_in(
         self,
         local: LocalTracks,
-        heads: FusionHeads,
+        records: FusionRecords,
         reports: _Reports,
         at: IntArray,
         replica: IntArray,
-    ) -> tuple[LocalTracks, FusionHeads]:
+    ) -> tuple[LocalTracks, FusionRecords]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
         new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
-        for index, rows in enumerate(reports.told_at):
+        for index, rows in enumerate(reports.reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.joined([local.take(~gone), new])
-        heads = later_heads(heads, new)
-        when = heads.time_s[np.searchsorted(heads.replica, local.replica)]
+        records = with_newest(records, new)
+        when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
         idle, busy, when = local.take(~now), local.take(now & ~silent), when[now & ~silent]
         if len(busy):
             busy = without_strays(self._rules, busy, when)
             busy, next_number = matched(
-                self._rules, busy, when, len(self.trackers), heads.next_number, heads.replica
+                self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )
-            heads = replace(heads, next_number=next_number)
-        return LocalTracks.joined([idle, busy]), heads
+            records = replace(records, next_number=next_number)
+        return LocalTracks.joined([idle, busy]), records
 
-    def _tell(
-        self, local: LocalTracks, heads: FusionHeads, told: Told, at: IntArray, replica: IntArray
-    ) -> Told:
-        """Return what is told of the replicas of some rows."""
+    def _fused(
+        self,
+        local: LocalTracks,
+        records: FusionRecords,
+        reported: FusedColumns,
+        at: IntArray,
+        replica: IntArray,
+    ) -> FusedColumns:
+        """Return what is reported of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))
-        before = taken(told, np.isin(told["replica"], replica))
-        when = heads.time_s[np.searchsorted(heads.replica, mine.replica)]
+        before = taken(reported, np.isin(reported["replica"], replica))
+        when = records.time_s[np.searchsorted(records.replica, mine.replica)]
         found = fused_states(mine, when, self._rules.motion, self.p.rule)
-        of = np.searchsorted(heads.replica, found.replica)
-        return told_after(before, found, mine, heads.origin[:, of], heads.own_m[:, of], replica, at)
+        of = np.searchsorted(records.replica, found.replica)
+        return reported_after(
+            before, found, mine, records.origin[:, of], records.own_m[:, of], replica, at
+        )

@@ -1,4 +1,4 @@
-"""The tracks of several trackers in one frame: what each told last, and how that goes on."""
+"""The tracks of several trackers in one frame: what each reported last, and how that goes on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -7,8 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.estimation.batched import times
-from components.estimation.frame import Place
-from components.estimation.frame_change import frame_change
+from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
@@ -22,52 +21,33 @@ _NUMBERS = 1 << 36
 
 @dataclass(frozen=True, eq=False)
 class LocalTracks:
-    """Tracks of several trackers, in the frame of the replica that they belong to.
+    """Tracks of several trackers, in the frame of the replica that they belong to."""
 
-    Parameters
-    ----------
-    replica, tracker, number : (n,) of int
-        The tracker by its place among all of the scene, and its own number of the track.
-    system : (n,) of int
-        Number of the fused track that it belongs to; 0 for none yet.
-    status : (n,) of int
-    existence : (n,)
-    ranged : (n,) of bool
-    state, covariance : (6, n), (6, 6, n)
-        Of a track without a range 0 and the identity.
-    azimuth_rad, elevation_rad : (n,)
-        Direction along the tracker's own axes, and its variances.
-    azimuth_variance_rad2, elevation_variance_rad2 : (n,)
-    own_m : (3, n)
-        Where the ownship believed to be then.
-    turn : (3, 3, n)
-        Turns the tracker's axes into those of the frame.
-    time_s : (n,)
-        The instant that all this speaks of.
-    updated_s : (n,)
-    contributors, updated_by : (n,) of int
-        Masks over all sensors.
-    """
-
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
+    # track
     replica: IntArray
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
+    # track
     tracker: IntArray
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
+    # track
     number: IntArray
-    system: IntArray
+    system: IntArray  # (n,) of int, number of the fused track that it belongs to; 0 for none yet
     status: IntArray
     existence: FloatArray
     ranged: BoolArray
-    state: FloatArray
-    covariance: FloatArray
-    azimuth_rad: FloatArray
-    elevation_rad: FloatArray
+    state: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
+    covariance: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
+    azimuth_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
+    elevation_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
     azimuth_variance_rad2: FloatArray
     elevation_variance_rad2: FloatArray
-    own_m: FloatArray
-    turn: FloatArray
-    time_s: FloatArray
+    own_m: FloatArray  # (3, n), where the ownship believed to be then
+    turn: FloatArray  # (3, 3, n), turns the tracker's axes into those of the frame
+    time_s: FloatArray  # (n,), the instant that all this speaks of
     updated_s: FloatArray
-    contributors: IntArray
-    updated_by: IntArray
+    contributors: IntArray  # (n,) of int, masks over all sensors
+    updated_by: IntArray  # (n,) of int, masks over all sensors
 
     def __len__(self) -> int:
         return len(self.replica)
@@ -122,9 +102,9 @@ class LocalTracks:
         place = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
         return replace(self, system=np.where(known[place] == mine, old.system[place], 0))
 
-    def place(self) -> Place:
-        """Return from where, and along which axes, each tells its direction."""
-        return Place(self.own_m, self.turn.swapaxes(0, 1))
+    def place(self) -> SensorPose:
+        """Return from where, and along which axes, each reports its direction."""
+        return SensorPose(self.own_m, self.turn.swapaxes(0, 1))
 
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Return azimuth and elevation along the frame's axes."""
@@ -145,20 +125,7 @@ def local_tracks(
     masks: Sequence[int],
     tentative: bool,
 ) -> tuple[LocalTracks, IntArray]:
-    """Return the tracks of a message in the frames of their replicas, and the row of each.
-
-    Parameters
-    ----------
-    message : StateTracks
-    replica : (rows,)
-    tracker : int
-    origin_deg_m : (3, rows)
-        Of the frame of each row's replica.
-    masks : sequence of int
-        Bit of each of the message's sensors among all.
-    tentative : bool
-        Whether tentative tracks count; deleted ones never do.
-    """
+    """Return the tracks of a message in the frames of their replicas, and the row of each."""
     row = np.repeat(np.arange(len(message)), np.diff(message.offsets))
     kept = message.track_status != DELETED
     if not tentative:
@@ -206,3 +173,41 @@ def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
     for i, bit in enumerate(masks):
         found |= np.where(mask >> i & 1 == 1, np.int64(bit), 0)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class FusionRecords:
+    """What is kept of each replica beside its tracks, replicas ascending."""
+
+    replica: IntArray
+    # (3, n), of its frame (latitude, longitude in deg, height in m); NaN before the first track
+    origin: FloatArray
+    next_number: IntArray
+    time_s: FloatArray  # (n,), the newest instant that any track spoke of
+    own_m: FloatArray  # (3, n), where in the frame the ownship was then
+
+    def take(self, which: Any) -> "FusionRecords":
+        """Return those of some replicas."""
+        return FusionRecords(
+            self.replica[which], self.origin[:, which], self.next_number[which],
+            self.time_s[which], self.own_m[:, which],
+        )  # fmt: skip
+
+    def kept_with(self, newer: "FusionRecords") -> "FusionRecords":
+        """Return those of all replicas, as they are in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica))
+        names = [field.name for field in fields(self)]
+        both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
+        whole = FusionRecords(*both)
+        return whole.take(np.argsort(whole.replica, kind="stable"))
+
+
+def with_newest(records: FusionRecords, new: LocalTracks) -> FusionRecords:
+    """Return records that know the newest instant, and where the ownship is then."""
+    time_s, own_m = records.time_s.copy(), records.own_m.copy()
+    order = np.lexsort((-new.tracker, new.time_s))
+    of = np.searchsorted(records.replica, new.replica[order])
+    late = new.time_s[order] >= time_s[of]
+    time_s[of[late]] = new.time_s[order][late]
+    own_m[:, of[late]] = new.own_m[:, order][:, late]
+    return replace(records, time_s=time_s, own_m=own_m)

@@ -1,4 +1,4 @@
-"""What tracks tell sensors: cones in which to look more closely (``tracking.cues``)."""
+"""Cues of tracks to sensors: cones in which to look more closely (``tracking.cues``)."""
 
 import math
 from fractions import Fraction
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.estimation.cue_cone import half_angle_rad
-from components.estimation.frame import Place
+from components.estimation.frame import SensorPose
+from components.estimation.measurement import half_angle_rad
 from components.messages.cues import CueCones
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
@@ -67,10 +67,10 @@ class CueParameters(Parameters):
 
 
 class Cues(Component):
-    """Tells sensors in which cones tracks are thought to be.
+    """Sends sensors the cones in which tracks are thought to be.
 
-    Each cone is told with the state of its track, so that a sensor carries it on to its own scan.
-    While there is nothing to tell, and nothing was told, no message is sent.
+    Each cone comes with the state of its track, so that a sensor carries it on to its own scan.
+    While there is no cone, and the last message had none, no message is sent.
     """
 
     mark = TRACKER
@@ -83,14 +83,14 @@ class Cues(Component):
     rewindable = True
 
     def setup(self) -> None:
-        """Start with nothing told."""
+        """Start with no cones sent."""
         self._every_ticks = math.ceil(self.p.every_s * self.context.ticks_per_s)
-        #: Of each replica, when it was told last, and whether that was nothing.
+        #: Of each replica, when cues were sent last, and whether there were none.
         self._last_tick: IntArray = np.empty(0, dtype=np.int64)
         self._silent: BoolArray = np.empty(0, dtype=bool)
 
     def run(self, wake: Wake) -> CueCones | None:
-        """Tell the cones of the tracks at every instant at which they are due."""
+        """Send the cones of the tracks at every instant at which they are due."""
         tracks = wake["tracks"]
         if tracks is None:
             return None
@@ -98,11 +98,11 @@ class Cues(Component):
         rows = self._due(wake, np.bincount(row, minlength=len(tracks)) > 0)
         if not len(rows):
             return None
-        told = np.isin(row, rows)
-        return self._message(wake.ticks, tracks, rows, row[told], entry[told], half_rad[told])
+        due = np.isin(row, rows)
+        return self._message(wake.ticks, tracks, rows, row[due], entry[due], half_rad[due])
 
     def _due(self, wake: Wake, some: BoolArray) -> IntArray:
-        """Return the rows at which cues are told, given at which of them there are some."""
+        """Return the rows at which cues are sent, given at which of them there are some."""
         replica, tick = wake.replica, wake.own_ticks(wake.ticks)
         more = max(int(replica[-1]) + 1 - len(self._silent), 0)
         if more:
@@ -113,12 +113,12 @@ class Cues(Component):
         order = np.argsort(turn, kind="stable")
         for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
             of = replica[rows]
-            told = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
+            now = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
                 some[rows] | ~self._silent[of]
             )
-            due[rows] = told
-            self._last_tick[of[told]] = tick[rows[told]]
-            self._silent[of[told]] = ~some[rows[told]]
+            due[rows] = now
+            self._last_tick[of[now]] = tick[rows[now]]
+            self._silent[of[now]] = ~some[rows[now]]
         return np.flatnonzero(due)
 
     def _wanted(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
@@ -138,13 +138,13 @@ class Cues(Component):
             spread[i, i] += self.p.acceleration_intensity_m2_s3 * lasts_s**3 / 3.0
         own = np.stack([getattr(tracks, name)[entry] for name in _OWN])
         axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(entry), axis=2)
-        half = half_angle_rad(state[:3], spread, Place(own, axes), self.p.sigmas)
+        half = half_angle_rad(state[:3], spread, SensorPose(own, axes), self.p.sigmas)
         level = np.cos(tracks.elevation_rad[entry])
-        told = np.maximum(
+        angular = np.maximum(
             tracks.azimuth_variance_rad2[entry] * level * level,
             tracks.elevation_variance_rad2[entry],
         )
-        half = np.where(tracks.has_range[entry], half, self.p.sigmas * np.sqrt(told))
+        half = np.where(tracks.has_range[entry], half, self.p.sigmas * np.sqrt(angular))
         half = np.maximum(half, math.radians(self.p.least_half_angle_deg))
         kept = half <= math.radians(self.p.most_half_angle_deg)
         row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))[entry]

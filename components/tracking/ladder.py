@@ -1,11 +1,11 @@
-"""The ladders of trackers: which filter, whose detection is whose, what becomes of late looks."""
+"""The ladders of trackers: the filter, the association, and what becomes of late looks."""
 
 from typing import Any
 
 import numpy as np
 
 from components.estimation.covariance_intersection import distance_squared
-from components.estimation.frame import place_in_frame
+from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import position_of
 from components.messages.columns import POSE
 from components.messages.false_detections import true_entries
@@ -27,22 +27,22 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     """Return how far the confirmed track of each detected target is from it.
 
     Rungs have other tracks, so they are compared with the truth and not with each other: at every
-    instant at which a target was detected and tracks are told, the nearest confirmed track with a
-    range, carried back to when that was measured. Not what the tracker sees: the truth comes from
-    what it was given, after it has run.
+    instant at which a target was detected and tracks are reported, the nearest confirmed track with
+    a range, carried back to when that was measured. The tracker does not see the truth: it comes
+    from what it was given, after it has run.
     """
     fused: Any = wake["fused"]
     if fused is None:
         return {"position": np.empty((0, 0)), "nees": np.empty((0, 0))}
     shape = (len(wake), len(fused.roster))
-    found = {name: np.full(shape, np.nan) for name in ("position", "nees")}
-    told: Any = block.run(wake)
+    errors = {name: np.full(shape, np.nan) for name in ("position", "nees")}
+    tracks: Any = block.run(wake)
     fused = true_entries(fused)
-    if told is None or len(fused.target) == 0:
-        return found
-    row_of_track = np.repeat(np.searchsorted(wake.ticks, told.tick), np.diff(told.offsets))
+    if tracks is None or len(fused.target) == 0:
+        return errors
+    row_of_track = np.repeat(np.searchsorted(wake.ticks, tracks.tick), np.diff(tracks.offsets))
     row_of_entry = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
-    held = told.has_range & np.isin(told.track_status, (CONFIRMED, COASTED))
+    held = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
     track = np.flatnonzero(held)
     first = np.searchsorted(row_of_track[track], row_of_entry, side="left")
     many = np.searchsorted(row_of_track[track], row_of_entry, side="right") - first
@@ -50,8 +50,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     start = np.cumsum(many) - many
     mine = track[np.arange(len(entry)) - np.repeat(start - first, many)]
     if len(entry) == 0:
-        return found
-    error, back_s = _apart(fused, entry, told, mine, wake)
+        return errors
+    error, back_s = _apart(fused, entry, tracks, mine, wake)
     distance = np.sqrt((error**2).sum(axis=0))
     # The nearest of each entry's tracks, the first of equals.
     order = np.lexsort((distance, entry))
@@ -60,35 +60,35 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     best = order[begins]
     best = best[distance[best] <= _NEAR_M]
     row, target = row_of_entry[entry[best]], fused.target[entry[best]]
-    found["position"][row, target] = distance[best]
+    errors["position"][row, target] = distance[best]
     spread = np.empty((3, 3, len(best)))
     for (i, j), name in COVARIANCE.items():
         if j < 3:
-            spread[i, j] = spread[j, i] = told.covariance[name][mine[best]]
+            spread[i, j] = spread[j, i] = tracks.covariance[name][mine[best]]
     nees = distance_squared(error[:, best], spread) / 3.0
     # A covariance is not carried back: of late detections only the position counts.
-    found["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
-    return found
+    errors["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
+    return errors
 
 
 def _apart(
-    fused: FusedDetections, entry: IntArray, told: StateTracks, mine: IntArray, wake: Wake
+    fused: FusedDetections, entry: IntArray, tracks: StateTracks, mine: IntArray, wake: Wake
 ) -> tuple[FloatArray, FloatArray]:
     """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
     span = wake.span_ticks or 1 << 62
     measured_s = (fused.measured_tick[entry] % span) / wake.ticks_per_s
     lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
-    origin: Any = tuple(getattr(told, name)[mine] for name in _ORIGIN)
+    origin: Any = tuple(getattr(tracks, name)[mine] for name in _ORIGIN)
     turned: Any = tuple(attitude)
-    place = place_in_frame(origin, (lat, lon, alt), turned)
+    pose = pose_in_frame(origin, (lat, lon, alt), turned)
     true = np.stack(
         [fused.true_azimuth_rad[entry], fused.true_elevation_rad[entry], fused.true_range_m[entry]]
     )
-    there, _ = position_of(true, place)
-    back_s = told.state_s[mine] - measured_s
-    position = np.stack([getattr(told, name)[mine] for name in _POSITION])
-    velocity = np.stack([getattr(told, name)[mine] for name in _VELOCITY])
-    return position - back_s * velocity - there, np.abs(back_s)
+    truth_m, _ = position_of(true, pose)
+    back_s = tracks.state_s[mine] - measured_s
+    position = np.stack([getattr(tracks, name)[mine] for name in _POSITION])
+    velocity = np.stack([getattr(tracks, name)[mine] for name in _VELOCITY])
+    return position - back_s * velocity - truth_m, np.abs(back_s)
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:

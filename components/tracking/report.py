@@ -1,4 +1,4 @@
-"""What a tracker tells: the columns of its message, made once for all looks of a wake."""
+"""The message of a tracker: its columns, made once for all looks of a wake."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation import modes
 from components.estimation.batched import selected
-from components.estimation.frame import Place
+from components.estimation.estimator import Estimates, combined
+from components.estimation.frame import SensorPose
 from components.estimation.measurement import direction
 from components.messages.state_tracks import COVARIANCE, StateTracks
-from components.tracking.life import existence
+from components.tracking.management import existence
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
@@ -29,53 +29,31 @@ _PROBABILITIES = {
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """Tracks as they are told after a look.
-
-    Parameters
-    ----------
-    store : TrackStore
-    look : (tracks,)
-        The last that was worked on.
-    row : (tracks,)
-        Row of the wake at which it is told.
-    """
+    """Tracks as they are reported after a look."""
 
     store: TrackStore
-    look: IntArray
-    row: IntArray
+    look: IntArray  # (tracks,), the last that was worked on
+    row: IntArray  # (tracks,), row of the wake at which it is reported
 
     @classmethod
     def of(
         cls, store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
     ) -> "Reported":
         """Return the tracks of some replicas (ascending) after their looks."""
-        place = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
-        mine = replica[place] == store.replica
-        return cls(store.take(mine), looks[place[mine]], rows[place[mine]])
+        index = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+        mine = replica[index] == store.replica
+        return cls(store.take(mine), looks[index[mine]], rows[index[mine]])
 
 
 def state_tracks(
     reported: Sequence[Reported],
-    places: Place,
+    poses: SensorPose,
     origin: FloatArray,
     rows: IntArray,
     wake: Wake,
     sensors: tuple[str, ...],
 ) -> StateTracks:
-    """Return the message of what is told.
-
-    Parameters
-    ----------
-    reported : sequence of Reported
-    places : Place
-        Of every look.
-    origin : (3, looks)
-        Latitude, longitude (deg), height (m) of the frame.
-    rows : (n,)
-        Rows of the wake at which a message is sent.
-    wake : Wake
-    sensors : tuple of str
-    """
+    """Return the message of what is reported."""
     ticks = wake.ticks[rows]
     if not reported:
         empty = StateTracks.initial({})
@@ -89,7 +67,7 @@ def state_tracks(
     store = _Columns(reported, order)
     models = len(reported[0].store.weights)
     state, covariance = store.state(models)
-    own, origin = selected(places.position_m, look), selected(origin, look)
+    own, origin = selected(poses.position_m, look), selected(origin, look)
     seen = direction(state[:3] - own, covariance)
     unknown = ~store.plain("ranged")
     hidden = bool(unknown.any())
@@ -133,7 +111,7 @@ def state_tracks(
 
 
 class _Columns:
-    """What was told look by look, as columns in the order of the message."""
+    """What was reported look by look, as columns in the order of the message."""
 
     def __init__(self, reported: Sequence[Reported], order: IntArray) -> None:
         self._parts = [part.store.columns for part in reported]
@@ -163,7 +141,7 @@ class _Columns:
             np.stack([np.stack([one[min(i, j), max(i, j)] for j in range(6)]) for i in range(6)])
             for one in covariances
         ]
-        state, covariance = modes.combined(states, whole, weights)
+        state, covariance = combined(Estimates(states, whole, weights))
         return state, {place: covariance[place] for place in COVARIANCE}
 
     def extras(

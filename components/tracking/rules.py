@@ -1,75 +1,298 @@
-"""Everything that a tracker decides by, as numbers."""
+"""What a tracker decides by: the parameters of its block, and what follows from what sensors offer.
 
+Part of a measurement's error was in the same sensor's last one already. A value on a grid is off by
+the same as long as it stays in its cell, a bias throughout a run, an error with a correlation time
+for that long. A filter that takes such errors for new ones at every look is too sure; what is new
+in a measurement is worked out by `components.estimation.kalman.variance_of_what_is_new`.
+"""
+
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.estimation.estimator import Estimator
+from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
-from components.tracking.filter_bank import FilterBank
-from components.tracking.lasting_errors import LastingErrors
-from components.tracking.life import LifeRules
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import NonNegativeRational, Parameters
 
-Association = Literal["nearest", "gnn", "jpda"]
+_QUANTITIES = ("azimuth", "elevation", "range", "range_rate")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class LastingErrors:
+    """What of each sensor's errors lasts."""
+
+    step: FloatArray  # (4 quantities, sensors), of the grid; 0 for none
+    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
+    variance: FloatArray
+    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
+    lasts_s: FloatArray
+    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
+    across_m2: FloatArray
+
+    @classmethod
+    def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
+        """Return those of the sensors, or None where all errors are new at every look."""
+        known = {
+            (_QUANTITIES.index(quantity), j): one
+            for j, name in enumerate(sensors)
+            if isinstance(offer := offers.get(name), SensorOffer)
+            for quantity, one in (offer.lasting or {}).items()
+        }
+        if not known:
+            return None
+        most = max(len(one.parts) for one in known.values())
+        step = np.zeros((len(_QUANTITIES), len(sensors)))
+        variance, across_m2 = np.zeros((2, most, *step.shape))
+        lasts_s = np.full(variance.shape, np.inf)
+        for cell, one in known.items():
+            step[cell] = one.step
+            for k, part in enumerate(one.parts):
+                variance[k][cell], across_m2[k][cell] = part.variance, part.across_m2
+                lasts_s[k][cell] = part.lasts_s
+        return cls(step, variance, lasts_s, across_m2)
+
+    def common(
+        self,
+        rows: list[int],
+        source: IntArray,
+        variance: FloatArray,
+        moved: FloatArray,
+        since_s: FloatArray,
+        range_m: FloatArray,
+    ) -> FloatArray:
+        """Return the covariance of measurements' errors with those of their sensors' last ones."""
+        quantity = np.array(rows)[:, np.newaxis]
+        step, lasts_s = self.step[quantity, source], self.lasts_s[:, quantity, source]
+        lasting = self.variance[:, quantity, source]
+        if self.across_m2.any():
+            lasting = lasting + self.across_m2[:, quantity, source] / np.maximum(range_m, 1.0) ** 2
+        rounding = step * step / 12.0
+        white = np.maximum(variance - rounding - lasting.sum(axis=0), 0.0)
+        safe = np.where(step > 0.0, step, 1.0)
+        # A variance that comes out as 1e-20 of a step has none of its own.
+        white = np.where(white > 1e-9 * rounding, white, 0.0)
+        rounding = rounding * np.exp(-6.0 * moved / safe - 4.0 * np.pi**2 * white / (safe * safe))
+        seen = np.isfinite(since_s)
+        # Time over an infinite time constant is 0: nothing is forgotten.
+        forgotten = np.exp(-np.where(seen, since_s, 0.0) / lasts_s)
+        return np.where(seen, rounding + (lasting * forgotten).sum(axis=0), 0.0)
+
+
+#: Looks that a track's history can hold.
+LONGEST_WINDOW = 62
+# What a sensor that states no reach is taken to see: all around, as far as this.
+_FARTHEST_M = 20_000.0
+_WHOLE_RATE_M_S = 600.0
+
+
+class TrackerParameters(Parameters):
+    """Parameters of every tracker that estimates states."""
+
+    acceleration_intensity_m2_s3: float = Field(
+        default=4.0, gt=0,
+        description="Intensity of the white acceleration that targets are taken to have, m²/s³.",
+    )  # fmt: skip
+    association: Literal["nearest", "gnn", "jpda"] = Field(
+        default="gnn",
+        description="Which detection is whose: the nearest in turn, the least sum over all "
+        "(global nearest neighbour), or all of them weighed (joint probabilistic).",
+    )
+    gate_probability: float = Field(
+        default=0.997, gt=0, lt=1,
+        description="Probability that a target's detection lies in its gate.",
+    )  # fmt: skip
+    start_gate_probability: float = Field(
+        default=0.999999, ge=0, lt=1,
+        description="Probability of a wider gate about confirmed tracks: what is detected in it "
+        "starts no track of its own; 0 for none.",
+    )  # fmt: skip
+    detection_probability: float = Field(
+        default=0.9, gt=0, lt=1, description="Probability that a look at a target detects it."
+    )
+    false_alarms_per_scan: float = Field(
+        default=0.1, gt=0,
+        description="False alarms that a sensor is taken to have in a scan of its whole field.",
+    )  # fmt: skip
+    jpda_exact_detections: int = Field(
+        default=10, ge=1, le=16,
+        description="Detections in a cluster up to which `jpda` is exact; belief propagation "
+        "beyond.",
+    )  # fmt: skip
+    initiation: Literal["m_of_n", "likelihood_ratio"] = Field(
+        default="m_of_n", description="The rule that confirms a track."
+    )
+    confirm_m: int = Field(default=3, ge=1, description="Hits that confirm a track (`m_of_n`).")
+    confirm_n: int = Field(
+        default=5, ge=1, le=LONGEST_WINDOW, description="Expected looks in which they must fall."
+    )
+    false_confirmation: float = Field(
+        default=1e-4, gt=0, lt=0.5,
+        description="Share of false tracks that `likelihood_ratio` confirms.",
+    )  # fmt: skip
+    missed_confirmation: float = Field(
+        default=0.01, gt=0, lt=0.5, description="Share of true tracks that it drops."
+    )
+    start_existence: float = Field(
+        default=0.2, gt=0, lt=1,
+        description="Probability that a detection that belongs to no track is of a target.",
+    )  # fmt: skip
+    start_speed_m_s: float = Field(
+        default=70.0, gt=0,
+        description="Standard deviation of a new track's velocity along each axis, m/s.",
+    )  # fmt: skip
+    assumed_range_m: float | None = Field(
+        default=None, gt=0,
+        description="Range that is assumed of what is seen without one, m; its inverse is taken to "
+        "be known to 50 %. By default a quarter of the farthest reach of the sensors.",
+    )  # fmt: skip
+    use_range_rate: bool = Field(
+        default=True,
+        description="Whether range rates are used where a sensor states them with a variance; not "
+        "those that fold, or that are exact.",
+    )
+    delete_misses: int = Field(
+        default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
+    )
+    delete_after_s: float = Field(
+        default=6.0, gt=0, description="Time without a detection after which any track ends, s."
+    )
+    delete_above_m: float = Field(
+        default=3000.0, gt=0,
+        description="Standard deviation of a position that ends a track with a range, m.",
+    )  # fmt: skip
+
+    late: Literal["drop", "one_step", "rerun"] = Field(
+        default="one_step",
+        description="What becomes of a look that comes after a later one: tracks that the later "
+        "one updated do without it (`drop`), tracks are corrected by one step back and forth "
+        "(`one_step`), or all looks since it are worked on again in order (`rerun`).",
+    )
+    lag_s: NonNegativeRational | None = Field(
+        default=None,
+        description="How much older than the newest a look may be to be worked on after all, s; "
+        "older ones are left out and counted. By default as late as the scene says that one may "
+        "come, and 1 s at least.",
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Any:
+        if self.confirm_m > self.confirm_n:
+            raise ValueError(
+                f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "
+                "looks; allowed: at most as many"
+            )
+        return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to an association, a rule or a lateness that is not chosen."""
+        said = super().without_effect()
+        if self.association != "jpda":
+            because = f"association is '{self.association}'"
+            said += self.idle("jpda_exact_detections", because=because)
+        unused = {
+            "m_of_n": ("false_confirmation", "missed_confirmation"),
+            "likelihood_ratio": ("confirm_m", "confirm_n"),
+        }
+        said += self.idle(*unused[self.initiation], because=f"initiation is '{self.initiation}'")
+        if self.start_gate_probability <= self.gate_probability:
+            because = f"gate_probability is {self.gate_probability:g}"
+            said += self.idle("start_gate_probability", because=because)
+        return said
+
+
+@dataclass(frozen=True, eq=False)
 class TrackerRules:
-    """Everything that a tracker decides by, as numbers.
+    """What a tracker decides by: its parameters, its filter, and what the sensors offer."""
 
-    Parameters
-    ----------
-    bank : FilterBank
-    association : {"nearest", "gnn", "jpda"}
-    gate_probability, detection_probability : float
-    start_gate_probability : float
-        Of the gate of a confirmed track in which no other track starts.
-    exact_up_to : int
-        Detections in a cluster up to which JPDA is exact.
-    life : LifeRules
-    start_score : float
-        Logarithm of the odds that a first detection is of a target.
-    start_speed_m_s, start_acceleration_m_s2, start_turn_rad_s : float
-        Standard deviations along each axis of what a first detection does not tell.
-    start_range_m : (mean, standard deviation)
-        What is assumed of a target that is seen without a range.
-    delete_above_m : float
-        Standard deviation of the position (root of the sum over axes) at which a track ends.
-    delete_after_ticks : int
-        Time without a detection after which a track ends.
-    log_density : (4, sensors)
-        Logarithm of the false alarms in a scan per unit of measured volume, by kind and sensor.
-    fields : tuple of Reach or None
-        Where each sensor looks; None is everywhere.
-    rates_of : int
-        Mask of the sensors whose range rates are used.
-    ticks_per_s : int
-    lasting : LastingErrors or None
-        What of the sensors' errors is not new at every look.
-    untold_across_m2 : (sensors,)
-        As in `SensorOffer`.
-    """
-
-    bank: FilterBank
-    association: Association
-    gate_probability: float
-    start_gate_probability: float
-    detection_probability: float
-    exact_up_to: int
-    life: LifeRules
-    start_score: float
-    start_speed_m_s: float
-    start_acceleration_m_s2: float
-    start_turn_rad_s: float
-    start_range_m: tuple[float, float]
-    delete_above_m: float
-    delete_after_ticks: int
-    log_density: Any
-    fields: tuple[Reach | None, ...]
-    rates_of: int
+    p: Any  # TrackerParameters, or those of a subclass
+    estimator: Estimator
     ticks_per_s: int
-    lasting: LastingErrors | None = None
-    untold_across_m2: Any = None
+    fields: tuple[Reach | None, ...]  # where each sensor looks; None is everywhere
+    # (4, sensors): logarithm of the false alarms in a scan per unit of measured volume, by kind
+    log_density: FloatArray
+    start_range_m: tuple[float, float]  # mean and deviation assumed of what is seen angle-only
+    rates_of: int  # mask of the sensors whose range rates are used
+    lasting: LastingErrors | None  # what of the sensors' errors is not new at every look
+    untold_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
+
+    @classmethod
+    def of(
+        cls,
+        p: TrackerParameters,
+        estimator: Estimator,
+        offers: Mapping[str, Any],
+        sensors: tuple[str, ...],
+        ticks_per_s: int,
+    ) -> "TrackerRules":
+        """Return the rules for some sensors, given what they offer by name."""
+        known = [offers.get(name) for name in sensors]
+        fields = tuple(o.reach if isinstance(o, SensorOffer) else None for o in known)
+        farthest = max(
+            (f.range_max_m for f in fields if f is not None and f.range_max_m < math.inf),
+            default=_FARTHEST_M,
+        )
+        assumed = p.assumed_range_m or 0.25 * farthest
+        untold = [o.untold_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
+        used = [not why_no_range_rates(p, offer) for offer in known]
+        return cls(
+            p, estimator, ticks_per_s, fields, log_densities(fields, p.false_alarms_per_scan),
+            (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
+            LastingErrors.of(offers, sensors), np.array(untold) if any(untold) else None,
+        )  # fmt: skip
+
+    @property
+    def start_score(self) -> float:
+        """Logarithm of the odds that a first detection is of a target."""
+        return math.log(self.p.start_existence / (1.0 - self.p.start_existence))
 
     @property
     def widest_gate(self) -> float:
         """Probability of the gate outside of which a track has no say."""
-        return max(self.gate_probability, self.start_gate_probability)
+        return max(self.p.gate_probability, self.p.start_gate_probability)
+
+    @property
+    def delete_after_ticks(self) -> int:
+        """Time without a detection after which a track is deleted."""
+        return int(self.p.delete_after_s * self.ticks_per_s)
+
+    def start_deviation(self, size: int) -> float:
+        """Standard deviation, in a new track, of what a model has besides position and velocity."""
+        if size == 7:
+            return math.radians(getattr(self.p, "start_turn_deg_s", 3.0))
+        return float(getattr(self.p, "start_acceleration_m_s2", 3.0))
+
+
+def why_no_range_rates(p: TrackerParameters, offer: Any) -> str:
+    """Return why range rates of a sensor with this offer are not used; empty where they are."""
+    if not p.use_range_rate:
+        return "use_range_rate is false"
+    if not isinstance(offer, SensorOffer) or not offer.measures_range_rate:
+        return "it measures none"
+    if offer.folds_range_rate:
+        return "they fold, and are ambiguous"
+    if offer.range_rate_variance_m2_s2 == 0.0:
+        return "they are exact, and a tracker weighs measurements by their variances"
+    return ""
+
+
+def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
+    """Return the logarithm of false alarms per unit of measured volume, (4 kinds, sensors)."""
+    density = np.empty((4, len(fields)))
+    for i, field in enumerate(fields):
+        width, height, far = 2.0 * math.pi, math.pi, _FARTHEST_M
+        if field is not None:
+            low, high = field.azimuth_rad
+            width = (high - low) % (2.0 * math.pi) or 2.0 * math.pi
+            height = field.elevation_rad[1] - field.elevation_rad[0] or math.pi
+            far = min(field.range_max_m, _FARTHEST_M)
+        for code in range(4):
+            volume = width * height * (far if code & 1 else 1.0)
+            volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
+            density[code, i] = math.log(per_scan / volume)
+    return density

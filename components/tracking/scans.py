@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from components.estimation.batched import selected
+from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind
 from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
@@ -22,56 +23,31 @@ _VARIANCES = (
 
 @dataclass(frozen=True, eq=False)
 class Scans:
-    """Looks in the order of their arrival, and their detections.
+    """Looks in the order of their arrival, and their detections."""
 
-    Parameters
-    ----------
-    row : (looks,)
-        At which row of the wake each arrived, ascending.
-    tick : (looks,)
-        When it was made.
-    sensors : (looks,)
-        Mask of the sensors that looked.
-    tells_misses : (looks,) of bool
-        Whether what is not among its detections was missed.
-    pose : (6, looks)
-        Of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll (rad).
-    velocity : (3, looks)
-        Of the ownship over ground (north, east, down of its own place, m/s); NaN where a look
-        measured no range rate.
-    offsets : (looks + 1,)
-        Detections ``offsets[i]:offsets[i + 1]`` belong to look i.
-    measured, variance : (4, detections)
-        Azimuth, elevation, range, range rate; NaN where not measured.
-    contributors : (detections,)
-    source : (4, detections)
-        Index of the sensor that gave each quantity; -1 for none.
-    """
-
-    row: IntArray
-    tick: IntArray
-    sensors: IntArray
-    tells_misses: BoolArray
+    row: IntArray  # (looks,), at which row of the wake each arrived, ascending
+    tick: IntArray  # (looks,), when it was made
+    sensors: IntArray  # (looks,), mask of the sensors that looked
+    tells_misses: BoolArray  # (looks,) of bool, whether what is not among its detections was missed
+    # (6, looks), of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll
+    # (rad)
     pose: FloatArray
+    # (3, looks), of the ownship over ground (north, east, down of its own place, m/s); NaN
+    # where a look measured no range rate
     velocity: FloatArray
-    offsets: IntArray
+    offsets: IntArray  # (looks + 1,), detections ``offsets[i]:offsets[i + 1]`` belong to look i
+    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
     measured: FloatArray
+    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
     variance: FloatArray
     contributors: IntArray
-    source: IntArray
+    source: IntArray  # (4, detections), index of the sensor that gave each quantity; -1 for none
 
     def __len__(self) -> int:
         return len(self.row)
 
     def kinds(self, rates_of: int) -> IntArray:
-        """Return the kind of each detection: 1 with a range, 2 more with a range rate.
-
-        Parameters
-        ----------
-        rates_of : int
-            Mask of the sensors whose range rates are used. One that is exact is not, as it would
-            have no weight, nor one that does not come with the ownship's velocity.
-        """
+        """Return the kind of each detection: 1 with a range, 2 more with a range rate."""
         code = (~np.isnan(self.measured[2])).astype(np.int64)
         if rates_of and not np.isnan(self.velocity).all():
             moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
@@ -101,6 +77,44 @@ class Scans:
         return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
 
 
+@dataclass(frozen=True, eq=False)
+class LookBatch:
+    """One look of each of some replicas, with its detections."""
+
+    scans: Scans
+    look: IntArray  # (looks,), index into `scans`
+    replica: IntArray  # (looks,), ascending
+    detection: IntArray  # (detections,), index into `scans`
+    of: IntArray  # (detections,), the look of each, index into `look`
+    code: IntArray  # (detections,), its kind by `Scans.kinds`
+    poses: SensorPose  # of every look of `scans`
+
+    @classmethod
+    def of_looks(
+        cls, scans: Scans, look: IntArray, replica: IntArray, codes: IntArray, poses: SensorPose
+    ) -> Self:
+        """Return some looks, given the kinds of all detections and the poses of all looks."""
+        first = scans.offsets[look]
+        counts = scans.offsets[look + 1] - first
+        of = np.repeat(np.arange(len(look)), counts)
+        detection = np.arange(len(of)) + (first - (np.cumsum(counts) - counts))[of]
+        return cls(scans, look, replica, detection, of, codes[detection], poses)
+
+    @property
+    def tick(self) -> IntArray:
+        """When each look was made."""
+        return self.scans.tick[self.look]
+
+    @property
+    def contributors(self) -> IntArray:
+        """Mask of the sensors of each detection."""
+        return self.scans.contributors[self.detection]
+
+    def pose(self, of: IntArray) -> SensorPose:
+        """Return the poses of some of its looks."""
+        return self.poses.take(self.look[of])
+
+
 def kind_of(code: int) -> tuple[Kind, list[int]]:
     """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
     kind = Kind(bool(code & 1), bool(code & 2))
@@ -110,13 +124,9 @@ def kind_of(code: int) -> tuple[Kind, list[int]]:
 def scans_of(fused: FusedDetections) -> Scans:
     """Return the looks behind a message, and their detections, by arrival and then by instant.
 
-    A fusion that passes reports on tells every look, also those in vain. Of other fusions a look is
-    what was measured at one instant among the entries of a row, and a row without entries is none.
-
-    Raises
-    ------
-    ValueError
-        If an entry lacks a pose or a variance that is positive.
+    A fusion that passes reports on states every look, also those in vain. Of other fusions a look
+    is what was measured at one instant among the entries of a row, and a row without entries is
+    none.
     """
     row = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
     mask = np.asarray(fused.contributors, dtype=np.int64)
@@ -126,19 +136,19 @@ def scans_of(fused: FusedDetections) -> Scans:
         np.stack([pose[name] for name in POSE]) if pose else np.full((len(POSE), len(row)), np.nan)
     )
     looks = fused.looks
-    told = 0
+    looked = 0
     key = [row, tick, np.zeros_like(row)]
-    sensors, place = mask, own
+    sensors, poses = mask, own
     if looks is not None:
         look_row = np.repeat(np.arange(len(fused)), np.diff(looks.offsets))
-        told = len(look_row)
+        looked = len(look_row)
         key = [
             np.concatenate([look_row, row]),
             np.concatenate([fused.tick[look_row] - looks.age_ticks, tick]),
             np.concatenate([looks.sensor, fused.angle_source]),
         ]
         sensors = np.concatenate([np.int64(1) << looks.sensor, mask])
-        place = np.concatenate([looks.pose, own], axis=1)
+        poses = np.concatenate([looks.pose, own], axis=1)
     order = np.lexsort(key[::-1])
     fresh = np.ones(len(order), dtype=bool)
     same = [values[order][1:] == values[order][:-1] for values in key]
@@ -147,19 +157,19 @@ def scans_of(fused: FusedDetections) -> Scans:
     count = int(fresh.sum())
     begins = order[fresh]
     whole = np.zeros(count, dtype=bool)
-    whole[number[order < told]] = True
+    whole[number[order < looked]] = True
     if looks is None:
         whole[:] = True
     of_entry = np.empty(len(order), dtype=np.int64)
     of_entry[order] = number
-    of_entry = of_entry[told:]
+    of_entry = of_entry[looked:]
     union = np.zeros(count, dtype=np.int64)
     np.bitwise_or.at(union, number, sensors[order])
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
     measured = np.stack([getattr(fused, name) for name in _MEASURED])
     variance = np.stack([getattr(fused, name) for name in _VARIANCES])
-    seen_from = selected(place, begins)
+    seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
@@ -177,12 +187,12 @@ def scans_of(fused: FusedDetections) -> Scans:
 
 
 def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
-    """Return the ownship's velocity at each look, as the first of its entries tells it."""
+    """Return the ownship's velocity at each look, as the first of its entries has it."""
     velocity = np.full((3, count), np.nan)
     if fused.own_velocity is not None:
-        told = np.stack(list(fused.own_velocity.values()))
-        known = np.flatnonzero(~np.isnan(told).any(axis=0))[::-1]
-        velocity[:, look[known]] = told[:, known]
+        velocities = np.stack(list(fused.own_velocity.values()))
+        known = np.flatnonzero(~np.isnan(velocities).any(axis=0))[::-1]
+        velocity[:, look[known]] = velocities[:, known]
     return velocity
 
 
@@ -193,16 +203,6 @@ def when_made(
 
     A sweeping radar reports a scan as it begins, with instants at which its beam meets the targets
     later: such a look waits for the first row at or after its own instant.
-
-    Parameters
-    ----------
-    scans : Scans
-        By arrival.
-    ahead : Scans or None
-        Those that have waited.
-    wake : Wake
-    wait_ticks : int
-        How long after its own instant a look is due: until no older one can come any more.
     """
     if ahead is None and not bool((scans.tick + wait_ticks > wake.ticks[scans.row]).any()):
         return scans, None

@@ -1,52 +1,42 @@
-"""One look of every replica: predict, gate, associate, update, start and end tracks."""
+"""One look of every replica, in sequence or late: predict, gate, associate, update, manage.
+
+A late look (an out-of-sequence measurement) is worked on in one step: tracks are retrodicted to its
+instant, associated and corrected there, and the correction is carried forward to now.
+"""
 
 import numpy as np
 
-from components.estimation.batched import squared_length
-from components.estimation.frame import Place
-from components.estimation.measurement import Kind, expected
-from components.messages.reach import EVALUATE
+from components.estimation.estimator import LEAST, Estimates
+from components.estimation.out_of_sequence import (
+    Retrodiction,
+    retrodiction,
+    retrodiction_by_motion,
+)
 from components.messages.state_tracks import DELETED
-from components.tracking.gated_pairs import gated_pairs, named
-from components.tracking.hard_update import updated_by_one
-from components.tracking.life import LARGEST_SCORE, after_hits_and_misses, seeing
+from components.tracking.association import Association
+from components.tracking.gating import gated_pairs
+from components.tracking.management import expected_looks, initiated, managed, position_variance
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import Scans
-from components.tracking.soft_update import updated_by_all
-from components.tracking.start import now_seen, started
+from components.tracking.scans import LookBatch
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+# More than there are tracks in a replica.
+_NUMBERS = 1 << 32
 
 
 def step(
     rules: TrackerRules,
+    association: Association,
     store: TrackStore,
-    scans: Scans,
-    places: Place,
-    codes: IntArray,
-    looks: IntArray,
-    replica: IntArray,
+    batch: LookBatch,
     next_number: IntArray,
 ) -> tuple[TrackStore, IntArray]:
-    """Return the tracks after one look in each of some replicas, and their next numbers.
+    """Return the tracks after one look of some replicas, and the next number of each of these.
 
-    Parameters
-    ----------
-    rules : TrackerRules
-    store : TrackStore
-        Of all replicas; those that do not look stay as they are.
-    scans : Scans
-    places : Place
-        Of every look.
-    codes : (detections,)
-        `Scans.kinds`.
-    looks : (n,)
-        The look of each replica.
-    replica : (n,)
-        Ascending.
-    next_number : (n,)
-        Number that the next track of each replica bears.
+    Tracks of replicas that do not look stay as they are.
     """
+    replica = batch.replica
     of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
     here = replica[of] == store.replica
     parts = [] if here.all() else [store.take(~here)]
@@ -54,31 +44,15 @@ def step(
     part = store.take(alive)
     if len(part) < len(store):
         of = of[alive]
-    tick = scans.tick[looks]
-    detection, of_detection = detections_of(scans, looks)
-    part = predicted(rules, part, tick[of])
+    part = predicted(rules, part, batch.tick[of])
+    held = np.zeros(len(batch.detection), dtype=bool)
     if len(part):
-        part, held = looked_at(rules, part, of, scans, places, codes, looks, detection,
-                               of_detection)  # fmt: skip
-    else:
-        held = np.zeros(len(detection), dtype=bool)
+        part, held = associated(rules, association, part, of, batch)
     parts.append(part)
     if not held.all():
-        born, next_number = started(
-            rules, scans, places, codes, looks, replica, next_number,
-            detection[~held], of_detection[~held],
-        )  # fmt: skip
-        parts.append(born)
+        new, next_number = initiated(rules, batch, ~held, next_number)
+        parts.append(new)
     return TrackStore.joined(parts), next_number
-
-
-def detections_of(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the detections of looks, and to which of them each belongs."""
-    first = scans.offsets[looks]
-    counts = scans.offsets[looks + 1] - first
-    of = np.repeat(np.arange(len(looks)), counts)
-    starts = np.cumsum(counts) - counts
-    return np.arange(len(of)) + (first - starts)[of], of
 
 
 def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
@@ -86,122 +60,145 @@ def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackSto
     if len(part) == 0:
         return part
     dt_s = (tick - part.tick) / rules.ticks_per_s
-    states, covariances, weights = rules.bank.predict(
-        part.states(), part.covariances(), part.weights, dt_s
-    )
     again = dt_s == 0.0  # innovations of one instant add up
-    return part.with_columns(
-        tick=tick, weights=weights, nis=part.nis * again, freedom=part.freedom * again,
-        **named(states, covariances),
+    return part.with_estimates(
+        rules.estimator.predict(part.estimates(), dt_s),
+        tick=tick, nis=part.nis * again, freedom=part.freedom * again,
     )  # fmt: skip
 
 
-def looked_at(
+def associated(
     rules: TrackerRules,
+    association: Association,
     part: TrackStore,
     of: IntArray,
-    scans: Scans,
-    places: Place,
-    codes: IntArray,
-    looks: IntArray,
-    detection: IntArray,
-    of_detection: IntArray,
+    batch: LookBatch,
 ) -> tuple[TrackStore, BoolArray]:
-    """Return tracks after association, and which detections start no track."""
-    place = places.take(looks[of])
-    codes_here = codes[detection]
-    kinds, direction, held = gated_pairs(
-        rules, part, of, place, scans, codes_here, detection, of_detection, len(looks)
-    )
-    looked = _expected_looks(rules, part, of, scans, looks, place, direction)
-    sensors = scans.contributors[detection]
-    update = updated_by_all if rules.association == "jpda" else updated_by_one
-    changed, hit, gain = update(rules, part, kinds, sensors, place)
-    missed = ~hit
-    missed &= looked.any(axis=0)
-    vain = _looks_in_vain(part.vain, np.where(hit, changed.updated_by, 0), looked)
-    gain[~hit] = 0.0
-    gain[missed] = np.log1p(-rules.detection_probability * rules.gate_probability)
-    history, count, misses = after_hits_and_misses(
-        part.history, part.looks, part.misses, hit, missed
-    )
-    score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
-    status = rules.life.judge(part.status, history, count, misses, score, rules.start_score)
-    if rules.lasting is not None:
-        mask = np.where(hit, changed.updated_by, 0)
-        changed = changed.with_columns(**now_seen(rules, changed, place, mask))
-    changed = changed.with_columns(
-        history=history, looks=count, misses=misses, score=score, vain=vain,
-        updated_tick=np.where(hit, changed.tick, changed.updated_tick),
-    )  # fmt: skip
-    spread = position_variance(changed)
-    ended = changed.ranged & (spread > rules.delete_above_m**2)
-    ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
-    return changed.with_columns(status=np.where(ended, DELETED, status)), held
+    """Return predicted tracks after the looks `of` them, and which detections start no track."""
+    pose = batch.pose(of)
+    kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
+    looked = expected_looks(rules, part, of, batch, pose, direction)
+    changed, hit, gain = association.update(rules, part, kinds, batch.contributors, pose)
+    return managed(rules, part, changed, pose, looked, hit, gain), held
 
 
-def _looks_in_vain(vain: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
-    """Return each sensor's looks in vain after a look; `by` is the mask of who updated a track."""
-    new = vain.copy()
-    hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
-    for i, mine in enumerate(looked):
-        new[i] += mine
-        if hitting >> i & 1:
-            new[i][(by >> i & 1).astype(bool)] = 0
-    return new
-
-
-def position_variance(part: TrackStore) -> FloatArray:
-    """Return the variance of each track's position, summed over its axes.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or no number.
-    """
-    total = np.zeros(len(part))
-    for weight, spread in zip(part.weights, part.covariances(), strict=True):
-        total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
-    good = np.isfinite(total) & (total >= 0.0)
-    if not bool(good.all()):
-        number = int(part.number[~good][0])
-        raise ValueError(
-            f"the covariance of track {number} has become singular: the stated variances are "
-            "smaller than what the filter's arithmetic resolves at this range, or the noise of the "
-            "motion is too large beside them; state larger ones, or less noise"
-        )
-    return total
-
-
-def _expected_looks(
+def late_step(
     rules: TrackerRules,
-    part: TrackStore,
-    of: IntArray,
-    scans: Scans,
-    looks: IntArray,
-    place: Place,
-    direction: FloatArray | None,
-) -> BoolArray:
-    """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
-    sensors = np.where(scans.tells_misses[looks], scans.sensors[looks], 0)
-    used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
-    found = np.zeros((len(rules.fields), len(part)), dtype=bool)
-    if used == 0:
-        return found
-    mine = sensors[of]
-    sees = seeing(part.vain)
-    where: tuple[FloatArray, FloatArray, FloatArray] | None = None
-    for i, field in enumerate(rules.fields):
-        if not used >> i & 1:
-            continue
-        found[i] = (mine >> i & 1).astype(bool) & sees[i]
-        if field is None:
-            continue
-        if where is None:
-            if direction is None:
-                direction = expected(Kind(False), part.state0, place)
-            away = np.sqrt(squared_length(part.state0[:3] - place.position_m))
-            where = (*direction, np.where(part.ranged, away, 0.0))
-        there = np.ones(len(part), dtype=bool)
-        found[i] &= field.decide(*where, there) == EVALUATE
-    return found
+    association: Association,
+    store: TrackStore,
+    before: TrackStore,
+    batch: LookBatch,
+    next_number: IntArray,
+    *,
+    unless_updated: bool,
+) -> tuple[TrackStore, IntArray, BoolArray]:
+    """Return the tracks after one late look of some replicas, next numbers, and looks left out.
+
+    A look is late for the tracks that speak of a later instant. Those that were there before it,
+    as in `before`, are taken back to it by what they were then, those that are newer by what they
+    are now; others are carried on to it as ever.
+
+    With `unless_updated` tracks stay as they are that something later has updated (a later look in
+    vain does not count: it told nothing of where they are), and looks are left out that have a
+    detection that such a track would have had.
+    """
+    replica, tick = batch.replica, batch.tick
+    of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+    here = replica[of] == store.replica
+    now, of = store.take(here & (store.status != DELETED)), of[here & (store.status != DELETED)]
+    parts = [store.take(~here)]
+    held = np.zeros(len(batch.detection), dtype=bool)
+    left_out = np.zeros(len(replica), dtype=bool)
+    if len(now):
+        ahead = now.tick > tick[of]
+        index, known = _matched(before, now, tick[of])
+        groups = [
+            (ahead & known, before.take(index[ahead & known])),
+            (ahead & ~known, None),
+        ]
+        back = [
+            (one, *_retrodicted(rules, now.take(one), old, tick[of][one])) for one, old in groups
+        ]
+        then = [predicted(rules, now.take(~ahead), tick[of][~ahead]), *(one[1] for one in back)]
+        seen, held = associated(rules, association, _ordered(then), of, batch)
+        changed = [seen.take(~ahead)]
+        for one, was, states, weights in back:
+            changed.append(_carried_forward(now.take(one), was, seen.take(one), states, weights))
+        whole = _ordered(changed)
+        if unless_updated:
+            newer = now.updated_tick > tick[of]
+            left_out[of[newer & (seen.updated_tick == tick[of])]] = True
+            whole = _ordered([whole.take(~newer), now.take(newer)])
+        position_variance(whole)
+        parts.append(whole)
+    if not held.all():
+        new, next_number = initiated(rules, batch, ~held, next_number)
+        parts.append(new)
+    return _ordered(parts), next_number, left_out
+
+
+def _ordered(parts: list[TrackStore]) -> TrackStore:
+    """Return all tracks by replica and number, as searches in them want them."""
+    whole = TrackStore.joined(parts)
+    return whole.take(np.lexsort((whole.number, whole.replica)))
+
+
+def _matched(before: TrackStore, now: TrackStore, tick: IntArray) -> tuple[IntArray, BoolArray]:
+    """Return where tracks stand among those of before, and which speak of `tick` at the latest."""
+    if len(before) == 0:
+        return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
+    keys = before.replica * _NUMBERS + before.number
+    key = now.replica * _NUMBERS + now.number
+    place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+    there = (keys[place] == key) & (before.status[place] != DELETED)
+    return place, there & (before.tick[place] <= tick)
+
+
+def _retrodicted(
+    rules: TrackerRules, now: TrackStore, old: TrackStore | None, tick: IntArray
+) -> tuple[TrackStore, list[Retrodiction], FloatArray]:
+    """Return the tracks at an instant that is past, what became of them since, and of models."""
+    since_s = (now.tick - tick) / rules.ticks_per_s
+    present = zip(rules.estimator.models, now.states(), now.covariances(), strict=True)
+    if old is None:
+        until_s, chances = np.zeros(len(now)), now.weights
+        parts = [retrodiction_by_motion(model, (x, p), since_s) for model, x, p in present]
+    else:
+        until_s, chances = (tick - old.tick) / rules.ticks_per_s, old.weights
+        parts = [
+            retrodiction(model, (y, q), (x, p), until_s, since_s)
+            for (model, x, p), y, q in zip(present, old.states(), old.covariances(), strict=True)
+        ]
+    back = rules.estimator.models_then(chances, until_s, since_s)
+    weights = (back * now.weights[np.newaxis]).sum(axis=1)
+    then = Estimates([one.state for one in parts], [one.covariance for one in parts], weights)
+    return now.with_estimates(then, tick=tick), parts, back
+
+
+def _carried_forward(
+    now: TrackStore, then: TrackStore, seen: TrackStore, parts: list[Retrodiction], back: FloatArray
+) -> TrackStore:
+    """Return the tracks as they are now, after a look changed what they were then."""
+    moved = [
+        one.carried_over(x, p, seen_x, seen_p)
+        for one, x, p, seen_x, seen_p in zip(
+            parts, now.states(), now.covariances(), seen.states(), seen.covariances(), strict=True
+        )
+    ]
+    weights = _weights_now(back, then.weights, seen.weights, now.weights)
+    return seen.with_estimates(
+        Estimates([x for x, _ in moved], [p for _, p in moved], weights),
+        tick=now.tick,
+        updated_tick=np.maximum(now.updated_tick, seen.updated_tick),
+    )
+
+
+def _weights_now(
+    back: FloatArray, then: FloatArray, seen: FloatArray, now: FloatArray
+) -> FloatArray:
+    """Return the models' probabilities now after a look changed those of then."""
+    if len(now) == 1:
+        return now
+    changed = seen / np.maximum(then, LEAST)
+    weights = now * (back * changed[:, np.newaxis]).sum(axis=0)
+    return np.asarray(weights / weights.sum(axis=0))

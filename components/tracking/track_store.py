@@ -5,7 +5,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from dsa_des.arrays.types import AnyArray, BoolArray, IntArray
+from components.estimation.batched import is_everything
+from components.estimation.estimator import Estimates
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+#: Looks in vain of a sensor that never hit a track.
+NEVER = 1 << 40
 
 
 class TrackStore:
@@ -14,13 +19,9 @@ class TrackStore:
     A column is asked for as an attribute. States are ``state0``, ``state1``, … (d, n), one for each
     motion model, covariances ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely
     each model is. ``vain`` (sensors, n) counts each sensor's looks in vain since its last hit, from
-    `components.tracking.life.NEVER` where it had none. ``seen`` (3, sensors, n) is where the track
-    was expected, azimuth, elevation and range, when each sensor last updated it, and ``seen_tick``
-    (sensors, n) when that was; NaN and -1 where none did.
-
-    Parameters
-    ----------
-    columns : dict of arrays
+    `NEVER` where it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth,
+    elevation and range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that
+    was; NaN and -1 where none did.
     """
 
     #: Columns beside states, with their types.
@@ -103,6 +104,25 @@ class TrackStore:
             return whole
         return whole.take(np.argsort(whole.replica, kind="stable"))
 
+    def estimates(self) -> Estimates:
+        """Return what the filter knows of the tracks."""
+        return Estimates(self.states(), self.covariances(), self.weights)
+
+    def with_estimates(self, estimates: Estimates, **columns: Any) -> Self:
+        """Return the same tracks with other estimates, and other values in some columns."""
+        return self.with_columns(**estimate_columns(estimates), **columns)
+
+    def put(self, which: IntArray, new: dict[str, Any]) -> Self:
+        """Return tracks with other values in some columns of some of them."""
+        if is_everything(which, len(self)):
+            return self.with_columns(**new)
+        changed = {}
+        for name, values in new.items():
+            whole = self.columns[name].copy()
+            whole[..., which] = values
+            changed[name] = whole
+        return self.with_columns(**changed)
+
     def states(self) -> list[AnyArray]:
         """Return the states of every model."""
         return [self.columns[f"state{i}"] for i in range(len(self.weights))]
@@ -110,3 +130,56 @@ class TrackStore:
     def covariances(self) -> list[AnyArray]:
         """Return the covariances of every model."""
         return [self.columns[f"covariance{i}"] for i in range(len(self.weights))]
+
+
+def estimate_columns(estimates: Estimates) -> dict[str, AnyArray]:
+    """Return estimates as columns of a store."""
+    columns = {f"state{i}": x for i, x in enumerate(estimates.states)}
+    columns |= {f"covariance{i}": p for i, p in enumerate(estimates.covariances)}
+    return columns | {"weights": estimates.weights}
+
+
+class ReplicaRecords:
+    """What is kept of each replica beside its tracks, replicas ascending."""
+
+    def __init__(
+        self, replica: IntArray, next_number: IntArray, tick: IntArray, origin: FloatArray
+    ) -> None:
+        self.replica, self.next_number, self.tick = replica, next_number, tick
+        self.origin = origin
+
+    @classmethod
+    def none(cls) -> "ReplicaRecords":
+        """Return those of no replica."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(none, none, none, np.empty((3, 0)))
+
+    def take(self, which: Any) -> "ReplicaRecords":
+        """Return some of them."""
+        return ReplicaRecords(
+            self.replica[which],
+            self.next_number[which],
+            self.tick[which],
+            np.ascontiguousarray(self.origin[:, which]),
+        )
+
+    def kept_with(self, newer: "ReplicaRecords") -> "ReplicaRecords":
+        """Return those of all replicas, as they are in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica))
+        names = ("replica", "next_number", "tick", "origin")
+        both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
+        whole = ReplicaRecords(*both)
+        return whole.take(np.argsort(whole.replica, kind="stable"))
+
+    def continued_by(self, replica: IntArray, position_deg_m: FloatArray) -> "ReplicaRecords":
+        """Return those of the replicas of some looks; a new one starts at its first look."""
+        replicas, first = np.unique(replica, return_index=True)
+        new = ReplicaRecords(
+            replicas, np.ones(len(replicas), dtype=np.int64),
+            np.full(len(replicas), np.iinfo(np.int64).min), position_deg_m[:, first].copy(),
+        )  # fmt: skip
+        for old in np.flatnonzero(np.isin(self.replica, replicas)).tolist():
+            here = int(np.searchsorted(replicas, self.replica[old]))
+            new.next_number[here], new.tick[here] = self.next_number[old], self.tick[old]
+            new.origin[:, here] = self.origin[:, old]
+        return new

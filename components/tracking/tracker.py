@@ -1,41 +1,41 @@
 """The base class of trackers that estimate states: parameters, memory, and the order of looks."""
 
-import math
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from components.estimation.batched import selected
-from components.estimation.frame import place_in_frame
+from components.estimation.estimator import Estimator, ExtendedKalmanFilter
+from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer
 from components.messages.fused import FusedDetections
-from components.messages.reach import Reach
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
-from components.tracking.filter_bank import FilterBank
+from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.ladder import LADDERS
-from components.tracking.lasting_errors import LastingErrors
-from components.tracking.late_looks import (
+from components.tracking.out_of_sequence import (
     Before,
+    LookCount,
     Memory,
+    Past,
     Plan,
     gone_back,
+    latest_s,
+    left_out,
+    may_come_late,
     one_step_plan,
     rerun_plan,
     stores_before,
     straight_plan,
+    warning,
 )
-from components.tracking.lateness import LookCount, latest_s, left_out, may_come_late, warning
-from components.tracking.one_step import late_step
-from components.tracking.parameters import TrackerParameters
-from components.tracking.replica_memory import Heads, Past
 from components.tracking.report import Reported, state_tracks
-from components.tracking.rules import TrackerRules
-from components.tracking.scans import Scans, scans_of, when_made
-from components.tracking.step import step
-from components.tracking.track_store import TrackStore
+from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
+from components.tracking.scans import LookBatch, Scans, scans_of, when_made
+from components.tracking.step import late_step, step
+from components.tracking.track_store import ReplicaRecords, TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
@@ -43,9 +43,6 @@ from dsa_des.block.wake import Wake
 
 #: Bits of a mask of sensors.
 MOST_SENSORS = 62
-# What a sensor that tells no reach is taken to see: all around, as far as this.
-_FARTHEST_M = 20_000.0
-_WHOLE_RATE_M_S = 600.0
 # What makes a measured quantity exact, by the variance that then is 0.
 _EXACT = {
     "azimuth_variance_rad2": "azimuth_resolution_deg",
@@ -58,8 +55,8 @@ class Tracker(Component):
     """Estimates where targets are and how they move, from measured values alone.
 
     Tracks bear numbers of their own. Every look of every sensor is processed at its own instant;
-    tracks are told at every instant at which something came. States are in a fixed frame: north,
-    east, down where the ownship believed to be at the first look (`StateTracks`).
+    tracks are reported at every instant at which something came. States are in a fixed frame:
+    north, east, down where the ownship believed to be at the first look (`StateTracks`).
     """
 
     mark = TRACKER
@@ -70,19 +67,16 @@ class Tracker(Component):
     rewindable = True
     ladders = LADDERS
 
-    def bank(self) -> FilterBank:
-        """Return the filters; a subclass may say otherwise."""
-        return FilterBank((ConstantVelocity(self.p.acceleration_intensity_m2_s3),))
+    def estimator(self) -> Estimator:
+        """Return the filter; a subclass may give another."""
+        return ExtendedKalmanFilter(ConstantVelocity(self.p.acceleration_intensity_m2_s3))
+
+    def association(self) -> Association:
+        """Return what assigns detections to tracks; a subclass may give another."""
+        return ASSOCIATIONS[self.p.association]
 
     def setup(self) -> None:
-        """Start with no tracks.
-
-        Raises
-        ------
-        ValueError
-            If a sensor measures an angle or a range exactly: its weight would be infinite. If there
-            are more sensors than a mask has bits.
-        """
+        """Start with no tracks."""
         if len(self._offers()) > MOST_SENSORS:
             raise ValueError(
                 f"a tracker takes at most {MOST_SENSORS} sensors, and {len(self._offers())} lead "
@@ -98,9 +92,11 @@ class Tracker(Component):
                         f"be above 0, by a grid (blocks.{name}.{key}) or by errors = 'stated'"
                     )
         self.rules: TrackerRules | None = None
+        self._association = self.association()
+        self._estimator = self.estimator()
         self._sensors: tuple[str, ...] = ()
-        self._store = TrackStore.empty(self.bank().sizes, 0)
-        self._heads = Heads.none()
+        self._store = self._no_tracks(0)
+        self._records = ReplicaRecords.none()
         self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
@@ -152,142 +148,103 @@ class Tracker(Component):
             for name, offer in sorted(offers.items())
             if isinstance(offer, SensorOffer)
             and offer.measures_range_rate
-            and (why := self._why_no_rates(name, offers))
+            and (why := why_no_range_rates(self.p, offer))
         ]
 
-    def _why_no_rates(self, name: str, offers: dict[str, Any]) -> str:
-        offer = offers.get(name)
-        if not self.p.use_range_rate:
-            return "use_range_rate is false"
-        if not isinstance(offer, SensorOffer) or not offer.measures_range_rate:
-            return "it measures none"
-        if offer.folds_range_rate:
-            return "they fold, and are ambiguous"
-        if offer.range_rate_variance_m2_s2 == 0.0:
-            return "they are exact, and a tracker weighs measurements by their variances"
-        return ""
-
-    def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
-        offers = self._offers()
-        told = [offers.get(name) for name in sensors]
-        fields = tuple(o.reach if isinstance(o, SensorOffer) else None for o in told)
-        farthest = max(
-            (f.range_max_m for f in fields if f is not None and f.range_max_m < math.inf),
-            default=_FARTHEST_M,
-        )
-        assumed = self.p.assumed_range_m or 0.25 * farthest
-        existence = self.p.start_existence
-        untold = [o.untold_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in told]
-        return TrackerRules(
-            bank=self.bank(),
-            association=self.p.association,
-            gate_probability=self.p.gate_probability,
-            start_gate_probability=self.p.start_gate_probability,
-            detection_probability=self.p.detection_probability,
-            exact_up_to=self.p.jpda_exact_detections,
-            life=self.p.life(),
-            start_score=math.log(existence / (1.0 - existence)),
-            start_speed_m_s=self.p.start_speed_m_s,
-            start_acceleration_m_s2=getattr(self.p, "start_acceleration_m_s2", 3.0),
-            start_turn_rad_s=math.radians(getattr(self.p, "start_turn_deg_s", 3.0)),
-            start_range_m=(assumed, 0.5 * assumed),
-            delete_above_m=self.p.delete_above_m,
-            delete_after_ticks=int(self.p.delete_after_s * self.context.ticks_per_s),
-            log_density=log_densities(fields, self.p.false_alarms_per_scan),
-            fields=fields,
-            rates_of=sum(
-                1 << i for i, name in enumerate(sensors) if not self._why_no_rates(name, offers)
-            ),
-            ticks_per_s=self.context.ticks_per_s,
-            lasting=LastingErrors.of(offers, sensors),
-            untold_across_m2=None if not any(untold) else np.array(untold),
-        )
+    def _no_tracks(self, sensors: int) -> TrackStore:
+        return TrackStore.empty([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what came, look by look, and tell all tracks."""
+        """Take in what came, look by look, and report all tracks."""
         fused = wake["fused"]
         if fused is None:
             return None
         if self.rules is None or fused.sensors != self._sensors:
-            self.rules, self._sensors = self._rules(fused.sensors), fused.sensors
-            self._store = TrackStore.empty(self.rules.bank.sizes, len(fused.sensors))
-        told = scans_of(fused)
-        self._early += int((told.tick > wake.ticks[told.row]).sum())
-        scans, self._ahead = when_made(told, self._ahead, wake)
+            self._sensors = fused.sensors
+            self.rules = TrackerRules.of(
+                self.p, self._estimator, self._offers(), fused.sensors, self.context.ticks_per_s
+            )
+            self._store = self._no_tracks(len(fused.sensors))
+        came = scans_of(fused)
+        self._early += int((came.tick > wake.ticks[came.row]).sum())
+        scans, self._ahead = when_made(came, self._ahead, wake)
         if len(scans) == 0:
             return None
         replica = wake.replica[scans.row]
-        heads = self._heads.followed_by(replica, scans.pose[:3])
+        records = self._records.continued_by(replica, scans.pose[:3])
         store = self._store
         if not wake.side_by_side:
-            store = store.take(np.isin(store.replica, heads.replica))
+            store = store.take(np.isin(store.replica, records.replica))
         past = self._past
         begin = 0
         before: dict[int, Before] = {}
         memory: dict[int, Memory] = {}
-        if past is not None and past.replica == heads.replica[0]:
+        if past is not None and past.replica == records.replica[0]:
             begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
             scans = Scans.joined([past.scans, scans])
             replica = np.concatenate([np.full(begin, past.replica), replica])
-        of = np.searchsorted(heads.replica, replica)
+        of = np.searchsorted(records.replica, replica)
         if not self._remembers:
-            plan, left_out = straight_plan(scans, of, heads.tick)
+            plan, left_out = straight_plan(scans, of, records.tick)
         else:
             planned = rerun_plan if self.p.late == "rerun" else one_step_plan
             plan, left_out = planned(scans, of, begin, memory, self._lag_ticks)
         self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
         moves = scans.velocity if self.rules.rates_of else None
-        origin = selected(heads.origin, of)
-        places = place_in_frame(tuple(origin), *_pose(scans.pose), moves)
+        origin = selected(records.origin, of)
+        poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
         reported: list[Reported] = []
         for works in _turns(plan.of):
-            works_now = works
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
-                places_of = plan.of[late]
-                replicas = heads.replica[places_of]
+                of_late = plan.of[late]
+                replicas = records.replica[of_late]
                 old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
-                store, heads.next_number[places_of], gone = late_step(
-                    self.rules, store, old, scans, places, codes, plan.look[late], replicas,
-                    heads.next_number[places_of], unless_updated=self.p.late == "drop",
+                store, records.next_number[of_late], gone = late_step(
+                    self.rules, self._association, store, old,
+                    LookBatch.of_looks(scans, plan.look[late], replicas, codes, poses),
+                    records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 in_vain = scans.sensors[plan.look[late[gone]]]
                 self._count = self._count.of(fused.sensors, in_vain[:0], in_vain)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
-                store = self._remember(store, heads, plan, works_now, before)
+                store = self._remember(store, records, plan, works_now, before)
             if len(looks):
-                store, heads.next_number[mine] = step(
-                    self.rules, store, scans, places, codes, looks, heads.replica[mine],
-                    heads.next_number[mine],
+                store, records.next_number[mine] = step(
+                    self.rules, self._association, store,
+                    LookBatch.of_looks(scans, looks, records.replica[mine], codes, poses),
+                    records.next_number[mine],
                 )  # fmt: skip
-                heads.tick[mine] = scans.tick[looks]
-            tell = plan.tells[works]
-            if len(store) and tell.any():
+                records.tick[mine] = scans.tick[looks]
+            reports = plan.reports[works]
+            if len(store) and reports.any():
                 reported.append(
                     Reported.of(
                         store,
-                        heads.replica[plan.of[works[tell]]],
-                        plan.seen_from[works[tell]],
-                        plan.row[works[tell]],
+                        records.replica[plan.of[works[reports]]],
+                        plan.seen_from[works[reports]],
+                        plan.row[works[reports]],
                     )
                 )
         if wake.side_by_side:
-            self._heads, self._store = self._heads.kept_with(heads), store
+            self._records, self._store = self._records.kept_with(records), store
         else:
-            self._heads = heads.take(heads.replica == heads.replica[-1])
-            self._store = store.take(store.replica == heads.replica[-1])
-        self._past = Past.of(scans, memory.get(len(heads.replica) - 1), before, heads.replica[-1])
+            self._records = records.take(records.replica == records.replica[-1])
+            self._store = store.take(store.replica == records.replica[-1])
+        self._past = Past.of(
+            scans, memory.get(len(records.replica) - 1), before, records.replica[-1]
+        )
         if len(plan.look) == 0:
             return None
         rows = np.unique(plan.row)
-        return state_tracks(reported, places, origin, rows, wake, self._sensors)
+        return state_tracks(reported, poses, origin, rows, wake, self._sensors)
 
     def _remember(
         self,
         store: TrackStore,
-        heads: "Heads",
+        records: ReplicaRecords,
         plan: Plan,
         works: IntArray,
         before: dict[int, Before],
@@ -296,16 +253,16 @@ class Tracker(Component):
         back = plan.back_to[works]
         late = np.flatnonzero(back >= 0)
         if len(late):
-            replicas = heads.replica[plan.of[works[late]]].tolist()
+            replicas = records.replica[plan.of[works[late]]].tolist()
             states = {
                 number: before[look]
                 for number, look in zip(replicas, back[late].tolist(), strict=True)
             }
             store = gone_back(store, states, replicas)
-            heads.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
+            records.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
         for work in works.tolist():
-            place = int(plan.of[work])
-            before[int(plan.look[work])] = Before(store, int(heads.next_number[place]))
+            number = int(records.next_number[plan.of[work]])
+            before[int(plan.look[work])] = Before(store, number)
             for look in plan.forgotten[work]:
                 before.pop(look, None)
         return store
@@ -314,23 +271,6 @@ class Tracker(Component):
         """Return whose looks came too late, and how many had to wait for their own instant."""
         late = {self.name: self._count.late()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}
-
-
-def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
-    """Return the logarithm of false alarms per unit of measured volume, (4 kinds, sensors)."""
-    found = np.empty((4, len(fields)))
-    for i, field in enumerate(fields):
-        width, height, far = 2.0 * math.pi, math.pi, _FARTHEST_M
-        if field is not None:
-            low, high = field.azimuth_rad
-            width = (high - low) % (2.0 * math.pi) or 2.0 * math.pi
-            height = field.elevation_rad[1] - field.elevation_rad[0] or math.pi
-            far = min(field.range_max_m, _FARTHEST_M)
-        for code in range(4):
-            volume = width * height * (far if code & 1 else 1.0)
-            volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
-            found[code, i] = math.log(per_scan / volume)
-    return found
 
 
 def _turns(of: IntArray) -> list[IntArray]:

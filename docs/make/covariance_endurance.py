@@ -11,14 +11,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation import modes
-from components.estimation.frame import Place
+from components.estimation.estimator import (
+    Estimates,
+    ExtendedKalmanFilter,
+    combined,
+    pair_measurement,
+)
+from components.estimation.frame import SensorPose
+from components.estimation.interacting_models import InteractingMultipleModels
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.modified_polar import moved_in_polar
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
-from components.tracking.filter_bank import FilterBank
 from dsa_des.arrays.types import FloatArray
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
@@ -27,9 +32,12 @@ _DAYS, _SIGMA = 30.0, SigmaPoints()
 FILTERS = ("ekf", "ukf", "imm", "polar")
 
 
-BANK = FilterBank(
-    (ConstantVelocity(1e-4), CoordinatedTurn(1e-4, 1e-10)),
-    np.array([[0.0, 0.01], [0.01, 0.0]]), fresh=(0.0, 1e-6),
+IMM = InteractingMultipleModels(
+    (
+        ExtendedKalmanFilter(ConstantVelocity(1e-4)),
+        ExtendedKalmanFilter(CoordinatedTurn(1e-4, 1e-10)),
+    ),
+    np.array([[0.0, 0.01], [0.01, 0.0]]), (0.0, 1e-6),
 )  # fmt: skip
 
 
@@ -60,13 +68,13 @@ def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
         [10.0 ** rng.uniform(-10, -4, count), 10.0 ** rng.uniform(-10, -4, count),
          (distance * 10.0 ** rng.uniform(-5, -3, count)) ** 2]
     )  # fmt: skip
-    place = Place(np.zeros((3, count)), np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2))
+    place = SensorPose(np.zeros((3, count)), np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2))
     model = ConstantVelocity(1e-4)
     # Linearised at 1 m, ten metres a second and a turn within seconds would be off for ever.
     slow = covariance.copy()
     for i in range(3, 6):
         slow[i, i] = np.minimum(100.0, (0.01 * distance) ** 2)
-    bank_state = _in_turn(state, slow)
+    tracks = _in_turn(state, slow)
     mean_s = _DAYS * 86_400.0 / 1e6
     for k in range(updates):
         dt = mean_s * rng.exponential(size=count)
@@ -74,7 +82,7 @@ def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
         spread = variance[: kind.size]
         if name == "imm":
             seen = expected(kind, truth, place) + rng.normal(size=spread.shape) * np.sqrt(spread)
-            bank_state = _interacting(bank_state, dt, kind, place, seen, spread)
+            tracks = _interacting(tracks, dt, kind, place, seen, spread)
             continue
         seen = expected(kind, truth, place) + rng.normal(size=spread.shape) * np.sqrt(spread)
         if name == "ukf":
@@ -88,35 +96,33 @@ def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
             after = moved_in_polar(state, *after, place.position_m)
         state, covariance = after
     if name == "imm":
-        worst = [_quality(spread) for spread in bank_state[1]]
-        state, covariance = modes.combined(*bank_state)
+        worst = [_quality(spread) for spread in tracks.covariances]
+        state, covariance = combined(tracks)
         quality = min(least for least, _ in worst), max(apart for _, apart in worst)
         return Endured(*quality, _median_nees(state - truth, covariance))
     return Endured(*_quality(covariance), _median_nees(state - truth, covariance))
 
 
 def _interacting(
-    known: tuple[list[FloatArray], list[FloatArray], FloatArray],
+    tracks: Estimates,
     dt_s: FloatArray,
     kind: Kind,
-    place: Place,
+    pose: SensorPose,
     seen: FloatArray,
     spread: FloatArray,
-) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    states, covariances, weights = BANK.predict(*known, dt_s)
+) -> Estimates:
+    ahead = IMM.predict(tracks, dt_s)
     every = np.arange(len(dt_s))
-    moments = BANK.moments(kind, states, covariances, place)
-    said = BANK.measure(moments, every, seen, spread, None, weights)
-    return BANK.update(states, covariances, weights, every, said, every)
+    moments = IMM.expect(kind, ahead, pose)
+    pairs = pair_measurement(moments, every, seen, spread, None, ahead.weights)
+    return IMM.update(ahead, every, pairs, every)
 
 
-def _in_turn(
-    state: FloatArray, covariance: FloatArray
-) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+def _in_turn(state: FloatArray, covariance: FloatArray) -> Estimates:
     count = state.shape[1]
     turn, spread = np.zeros((7, count)), np.zeros((7, 7, count))
     turn[:6], spread[:6, :6], spread[6, 6] = state, covariance, 1e-6
-    return [state, turn], [covariance, spread], np.full((2, count), 0.5)
+    return Estimates([state, turn], [covariance, spread], np.full((2, count), 0.5))
 
 
 def _quality(covariance: FloatArray) -> tuple[float, float]:

@@ -14,8 +14,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find
-from dsa_des.commands.parameter_rows import parameter_rows
-from dsa_des.commands.scene_tables import scene_tables
+from dsa_des.commands.parameters import parameter_rows, scene_tables
 from dsa_des.files.output_file import write_file
 from dsa_des.running.processors import Processing
 from dsa_des.terminal.interruption import plain_ending

@@ -14,30 +14,32 @@ from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
     check_workers,
     finish,
-    known_results,
+    report_crashes,
+    result_names,
     run_into,
     show_study,
-    tell_crashed,
 )
 from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
+from dsa_des.results.curves import draw_scatter
+from dsa_des.results.figures import safe_name
+from dsa_des.results.folder import STUDY_JSON, StudyFolder
+from dsa_des.results.labels import short
+from dsa_des.results.printing import interval_text, times
+from dsa_des.results.record import StudyRecord
+from dsa_des.results.rows import paired_units
+from dsa_des.results.statistics import difference
+from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.studies.figures import draw_scatter
-from dsa_des.studies.folder import STUDY_JSON, StudyFolder
-from dsa_des.studies.identity import record_of
-from dsa_des.studies.labels import short
+from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import interval_text, times
-from dsa_des.studies.record import StudyRecord, results_of
-from dsa_des.studies.statistics import difference
+from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
-from dsa_des.studies.summary import paired_units
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import shortened
@@ -64,7 +66,7 @@ def compare_command(
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
         found = _compare_swap(chosen_file(paths[0]), swaps, replicas, results, workers, out)
-        tell_crashed(found, _ANEW)
+        report_crashes(found, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results, _first(results))
@@ -75,7 +77,7 @@ def compare_command(
     studies = [_study_at(path, replicas) for path in files]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
-        known_results(record.results_list(), results)
+        result_names(record.results, results)
     by_place: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
@@ -86,7 +88,7 @@ def compare_command(
         for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(found) == 2 else f"scatter-{number}"
             _compare(found[0], other, (paths[0], path), results, home / stem)
-    tell_crashed(list(by_place.values()), _ANEW)
+    report_crashes(list(by_place.values()), _ANEW)
 
 
 def _compare_swap(
@@ -113,14 +115,14 @@ def _compare_swap(
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
-    known_results(results_of(study), results)
+    result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
     by_place = dict(tables.rows.each_place())
-    metrics = tables.telling(results)
+    metrics = tables.notable_results(results)
     for at, rows in by_place.items():
         base = (*at[:place], chosen[0][1][0], *at[place + 1 :])
         if at[place] == chosen[0][1][0] or base not in by_place:
@@ -190,7 +192,7 @@ def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: P
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
     folder = run_into(study, target, workers, resume=False, again=lambda _: _ANEW)
-    return Tables(study, folder)
+    return tables_of(study, folder)
 
 
 def _shown(tables: Tables, only: Sequence[str]) -> list[str]:

@@ -8,10 +8,8 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
-from dsa_des.costs.comparison import Comparison
-from dsa_des.costs.front import parse_budgets
+from dsa_des.costs.climb import Comparison, RungCost, applies, climb, parse_budgets
 from dsa_des.costs.output import draw_costs, print_costs, write_table
-from dsa_des.costs.study import RungCost, applies, climb
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder

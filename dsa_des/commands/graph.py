@@ -6,7 +6,7 @@ from typing import Any
 
 import networkx as nx
 
-from dsa_des.commands.loading import load
+from dsa_des.commands.scene import load
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import named

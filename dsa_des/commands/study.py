@@ -5,21 +5,22 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
 from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import claim_folder, named
+from dsa_des.results.figures import draw_figures
+from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
+from dsa_des.results.printing import show
+from dsa_des.results.record import CLASS, Result, StudyRecord
+from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import STUDY_JSON, StudyFolder
-from dsa_des.studies.folder_names import latest_folder
-from dsa_des.studies.metric import CLASS, Result
-from dsa_des.studies.output import Tables
-from dsa_des.studies.printing import show
-from dsa_des.studies.record import StudyRecord
-from dsa_des.studies.runner import Clock, Stopped, run_study, why_one_by_one
+from dsa_des.studies.identity import description_text
+from dsa_des.studies.runner import Clock, Stopped, draw_run, run_study, tables_of, why_one_by_one
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
@@ -66,7 +67,7 @@ def study_command(
                 _measure(folder)
         except KeyboardInterrupt:
             _stopped("interrupted", again(folder.path), 130)
-        tell_crashed([tables], again(folder.path))
+        report_crashes([tables], again(folder.path))
     else:
         raise UsageError("give STUDY.toml, or: show FOLDER, or: report FOLDER")
 
@@ -123,7 +124,7 @@ def _stopped(reason: str, again: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def tell_crashed(found: Sequence[Tables], again: str) -> None:
+def report_crashes(found: Sequence[Tables], again: str) -> None:
     """Say how many runs crashed, and end with exit code 1 if there are any."""
     crashed = sum(tables.rows.crashed for tables in found)
     if crashed:
@@ -157,19 +158,14 @@ def run_into(
 ) -> StudyFolder:  # fmt: skip
     """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
 
-    Parameters
-    ----------
-    path : Path or callable
-        The folder, or what makes a new one.
-    again : callable
-        Takes the folder and returns the command that continues the study.
+    `path` is the folder, or what makes a new one; `again` returns the command that continues there.
     """
     check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)
     folder: StudyFolder | None = None
     try:
         folder = StudyFolder(path if isinstance(path, Path) else path())
-        folder.open(study, resume=resume)
+        folder.open(description_text(study), resume=resume)
         with _progress(study) as report:
             run_study(study, folder, executor, report)
     except Stopped as stop:
@@ -197,10 +193,13 @@ def finish(
     `only` names the results to print; by default those that the study draws. `first` prints what
     stands before the tables; without `draw` there are no figures.
     """
-    tables = Tables(study, folder)
+    if isinstance(study, Study):
+        tables, again = tables_of(study, folder), partial(draw_run, study, folder)
+    else:  # nothing of the folder's is imported, so nothing is run
+        tables, again = Tables(study, folder), None
     try:
         tables.write()
-        figures = tables.draw(only) if draw else []
+        figures = draw_figures(tables, only, again) if draw else []
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
     if not quiet:
@@ -228,13 +227,13 @@ def show_study(
     The folder's tables are read and nothing else: no scene, and no code that it names.
     """
     folder = StudyFolder(path)
-    every = known_results(folder.record.results_list(), only)
+    every = result_names(folder.record.results, only)
     finish(folder.record, folder, only=only or every, first=first, draw=draw)
 
 
 def _measure(folder: StudyFolder) -> None:
     """Measure the errors of the models of a study's first run, and keep them in its folder."""
-    from dsa_des.studies.measured_errors import measure_errors
+    from dsa_des.studies.models import measure_errors
 
     try:
         measure_errors(folder)
@@ -246,7 +245,7 @@ def _measure(folder: StudyFolder) -> None:
 
 def _report(path: Path, out: str | None, *, draw: bool, measure: bool) -> None:
     """Write one HTML page about a study's folder, into it or where `--out` says."""
-    from dsa_des.studies.report import REPORT, study_report
+    from dsa_des.results.report import REPORT, study_report
 
     folder = StudyFolder(path)
     target = path / REPORT if out is None else named(out)
@@ -256,14 +255,14 @@ def _report(path: Path, out: str | None, *, draw: bool, measure: bool) -> None:
         _measure(folder)
     try:
         if draw:
-            Tables(folder.record, folder).draw()
+            draw_figures(Tables(folder.record, folder))
         write_file(target, study_report(folder))
     except OSError as error:
         raise UsageError(f"{target}: cannot be written: {error.strerror or error}") from error
     say(f"wrote {target}")
 
 
-def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:
+def result_names(results: Sequence[Result], only: Sequence[str]) -> list[str]:
     """Return the names of results.
 
     Raises
@@ -310,7 +309,7 @@ def _list_metrics() -> None:
     from rich.table import Table
 
     from dsa_des.block.entry_points import registered
-    from dsa_des.commands.parameter_rows import parameter_rows
+    from dsa_des.commands.parameters import parameter_rows
     from dsa_des.studies.metric import METRICS, find_metric
 
     console = terminal.console(120)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.studies.labels import short, unit_of
-from dsa_des.studies.metric import EVENT, Result
-from dsa_des.studies.output import Tables
+from dsa_des.results.labels import short, unit_of
+from dsa_des.results.record import EVENT, Result
+from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 
@@ -18,14 +18,7 @@ _MOST_PLACES, _MOST_NAMED = 12, 8
 
 
 class Units:
-    """Some rows of a study: one value of a result per (encounter, replica).
-
-    Parameters
-    ----------
-    tables : Tables
-    rows : (n,)
-        Numbers of its rows.
-    """
+    """Some rows of a study: one value of a result per (encounter, replica)."""
 
     def __init__(self, tables: Tables, rows: Any) -> None:
         self.rows = rows
@@ -88,14 +81,8 @@ def say_what_changed(
 ) -> None:
     """Say what changed from one condition to another.
 
-    Parameters
-    ----------
-    names : (str, str)
-        Of the conditions.
-    places : sequence of (where, pair)
-        What is compared: the runs of both conditions at each place of the other axes.
-    results : iterable of Result
-        That both have.
+    `places` are what is compared: where, and the runs of both conditions there. Both have
+    `results`.
     """
     results = [result for result in results if result.is_number]
     width: int = console(160).width
@@ -164,14 +151,7 @@ def _change(result: Result, pair: Pair) -> _Change:
 
 
 def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
-    """Say what changes along the axis that a study compares, from its baseline to each value.
-
-    Parameters
-    ----------
-    tables : Tables
-    only : sequence of str
-        Results to tell of; by default all.
-    """
+    """Say what changes along the axis that a study compares, from its baseline to each value."""
     if tables.baseline is None:
         return
     axis, baseline = tables.baseline

@@ -13,9 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.ladder import Unavailable
-from dsa_des.costs.comparison import Comparison
-from dsa_des.costs.front import on_front
-from dsa_des.costs.study import RungCost
+from dsa_des.costs.climb import Comparison, RungCost, on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks

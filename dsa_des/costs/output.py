@@ -7,8 +7,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from dsa_des.costs.comparison import Comparison, shown
-from dsa_des.costs.study import RungCost
+from dsa_des.costs.climb import Comparison, RungCost, shown
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 from dsa_des.terminal import terminal

@@ -1,18 +1,22 @@
-"""One rung's run: what its block was given, what the run recorded, and what the block's work costs.
+"""One rung's run: what its block was given, what its work costs, and how far off it is.
 
 A block is timed by running it again, fresh, on the wakes it had in its own run: nothing but the
-block is on the clock, and its inputs are those of the run.
+block is on the clock, and its inputs are those of the run. Errors are target-scan by target-scan.
 """
 
 import copy
 import gc
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Truth, Unavailable
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -22,34 +26,23 @@ from dsa_des.scene.scene import Scene
 # Slow rungs are timed fewer times: all passes of one rung together take about this long at most.
 _LONGEST_S = 2.0
 _FEWEST = 3
-
 # A repeat is the best of so many passes: what interrupts a pass is not the block's.
 _PASSES = 10
 
 
 @dataclass
 class RungRun:
-    """A run of the scene with one rung in place.
-
-    Parameters
-    ----------
-    scene : Scene
-    block : str
-    wakes : list of Wake
-        What the block was given.
-    tables : dict
-        Recorded tables, as ``pyarrow.Table``.
-    run_cpu_s : float
-        Processor time of the whole simulation.
-    block_cpu_s : float
-        Of which the block took this much.
-    """
+    """A run of the scene with one rung in place."""
 
     scene: Scene
     block: str
+    #: What the block was given.
     wakes: list[Wake]
+    #: Recorded tables, as ``pyarrow.Table``.
     tables: dict[str, Any]
+    #: Processor time of the whole simulation.
     run_cpu_s: float
+    #: Of which the block took this much.
     block_cpu_s: float
     passes_s: list[float] = field(default_factory=list)
     _pristine: Component | None = None
@@ -156,3 +149,93 @@ def median_and_spread(repeats_s: Sequence[float]) -> tuple[float, float]:
         return repeats_s[0], 0.0
     low, middle, high = statistics.quantiles(repeats_s, n=4, method="inclusive")
     return middle, 0.5 * (high - low)
+
+
+#: Target-scans at which a rung is compared with a far more precise evaluation.
+SAMPLE = 100
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, 95th percentile and maximum of an error, and over how many target-scans."""
+
+    #: NaN when there was nothing to compare.
+    mean: float
+    p95: float
+    maximum: float
+    count: int
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> "Spread":
+        """Return the spread of errors, leaving NaN out."""
+        known = errors[~np.isnan(errors)]
+        if known.size == 0:
+            return cls(float("nan"), float("nan"), float("nan"), 0)
+        p95 = float(np.percentile(known, 95.0))
+        return cls(float(known.mean()), p95, float(known.max()), int(known.size))
+
+
+#: Ticks of a rung's rows, and its values by quantity.
+Values = tuple[IntArray, dict[str, AnyArray]]
+
+
+def values_of(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
+    """Read a ladder's quantities from a fresh block over all its wakes."""
+    block, other = run.fresh(), reference.fresh()
+    found = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
+    ticks = np.concatenate([ticks for ticks, _ in found])
+    names = [q.name for q in ladder.quantities]
+    return ticks, {name: np.concatenate([values[name] for _, values in found]) for name in names}
+
+
+def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:
+    """Return each quantity's error at the instants that both have."""
+    ticks, values = rung
+    other_ticks, others = reference
+    _, here, there = np.intersect1d(ticks, other_ticks, return_indices=True)
+    spreads = {}
+    for quantity in ladder.quantities:
+        apart = quantity.difference(values[quantity.name][here], others[quantity.name][there])
+        spreads[quantity.name] = Spread.of(apart)
+    return spreads
+
+
+def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, Spread], str]:
+    """Return a rung's error against a far more precise evaluation, or why there is none."""
+    if ladder.truth is None:
+        return {}, "nothing more exact is known"
+    try:
+        parts = _sampled(ladder.truth, run, _known(ladder, values), values[0])
+    except ImportError as error:
+        return {}, f"not measured: {error}"
+    except Unavailable as error:
+        return {}, str(error)
+    spreads = {name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]}
+    count = max(spread.count for spread in spreads.values())
+    return spreads, f"measured at {count} target-scans"
+
+
+def _known(ladder: Ladder, values: Values) -> IntArray:
+    """Return (row, target) of a sample, evenly spread over what the first quantity knows."""
+    first = values[1][ladder.quantities[0].name]
+    unknown = np.isnan(first)
+    pairs = np.unique(np.argwhere(~unknown)[:, :2], axis=0)
+    if len(pairs) > SAMPLE:
+        pairs = pairs[np.linspace(0, len(pairs) - 1, SAMPLE).astype(np.int64)]
+    return pairs
+
+
+def _sampled(
+    truth: Truth, run: RungRun, pairs: IntArray, ticks: IntArray
+) -> Sequence[Mapping[str, FloatArray]]:
+    if len(pairs) == 0:
+        raise Unavailable("no target-scan to measure at")
+    block = run.fresh()
+    parts = []
+    start = 0
+    for wake in run.wakes:
+        inside = (pairs[:, 0] >= start) & (pairs[:, 0] < start + len(wake))
+        if inside.any():
+            parts.append(truth(block, wake, pairs[inside] - np.array([start, 0])))
+        start += len(wake)
+    return parts

@@ -30,11 +30,6 @@ class Variants:
 
     ``[accuracy]`` is left out of all of them, since it lets the engine choose rungs by itself.
 
-    Parameters
-    ----------
-    path, sets, swaps, seed, duration_s
-        As for `dsa_des.scene.scene.load_scene`.
-
     Raises
     ------
     SceneError
@@ -65,11 +60,7 @@ class Variants:
     def with_rungs(self, choices: Iterable[Choice], shared: Iterable[Choice] = ()) -> Scene:
         """Return the scene with these rungs in their blocks.
 
-        Parameters
-        ----------
-        choices : iterable of Choice
-        shared : iterable of Choice
-            Rungs of which only the `Rung.shared` parameters are set, after `choices`.
+        Of rungs `shared` only the `Rung.shared` parameters are set, after `choices`.
 
         Raises
         ------

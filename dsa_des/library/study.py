@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -13,15 +13,17 @@ from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
 from dsa_des.record.drawing import PictureFile, pictures_in
+from dsa_des.results.figures import draw_figures
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.tables import DIFFERENCES, SUMMARY
 from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.identity import description_text
 from dsa_des.studies.metric import METRICS, Metric
-from dsa_des.studies.output import DIFFERENCES, SUMMARY, Tables
-from dsa_des.studies.runner import Progress, Stopped, run_study
+from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
 from dsa_des.studies.study import Study, changed_scene
 from dsa_des.studies.study_file import read_study, study_of_tables
 from dsa_des.text.safe_text import shortened
@@ -48,7 +50,7 @@ class StudyResult:
         self._study, self._folder, self._home = study, folder, home
         if home is not None:
             finalize(self, rmtree, home, ignore_errors=True)
-        self._tables = Tables(study, folder)
+        self._tables = tables_of(study, folder)
         self._tables.write()
         if home is None:
             _ = self.figures
@@ -76,7 +78,7 @@ class StudyResult:
     @cached_property
     def figures(self) -> dict[str, PictureFile]:
         """All figures by name."""
-        self._tables.draw()
+        draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
         return {
             name: PictureFile(name, png) for name, png in pictures_in(self._folder.path).items()
         }
@@ -294,7 +296,7 @@ def _run_into(
 ) -> None:
     executor = make_executor("local", workers, None)
     try:
-        folder.open(study, resume=resume)
+        folder.open(description_text(study), resume=resume)
         run_study(study, folder, executor, progress or (lambda _: None))
     except Stopped as stop:
         if str(stop) == "interrupted":

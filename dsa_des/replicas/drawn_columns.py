@@ -9,9 +9,11 @@ them where one of the three is refused, is checked replica by replica.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from inspect import signature
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, overload
@@ -22,7 +24,6 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, PlainSerializer
 from dsa_des.block.component import ClockedParameters, Component, Parameters
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica, item_of, key_path, scene_of
-from dsa_des.replicas.watched_parameters import reading, watched_type
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import NANOSECONDS, parse_rational
@@ -285,7 +286,7 @@ def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColu
         mine = [column for column in columns if column.block == name]
         block = scene.blocks[name]
         try:
-            with reading() as read:
+            with _reading() as read:
                 parameters = _validated(block.parameters, [column.path for column in mine])
                 if read:
                     raise _NoColumn
@@ -323,4 +324,37 @@ def _validated(old: Any, paths: Sequence[Path]) -> Any:
         if mine != [()]:
             given[name] = _validated(given[name], mine)
     drawn = frozenset(name for name, mine in parts.items() if mine == [()])
-    return watched_type(type(old), drawn).model_validate(given)
+    return _watched_type(type(old), drawn).model_validate(given)
+
+
+#: Fields that were read while `_reading`, by watched types; None at other times.
+_noted: list[set[str]] = []
+# What does not show any field's value. All else of a model's own may show all of them.
+_HARMLESS = frozenset({"__class__", "__pydantic_fields_set__"})
+_ALL_FIELDS = frozenset(dir(BaseModel)) - _HARMLESS - {"model_fields", "model_fields_set"}
+
+
+@contextmanager
+def _reading() -> Iterator[set[str]]:
+    """Give the names that are read meanwhile of what `_watched_type` makes."""
+    _noted.append(set())
+    try:
+        yield _noted[-1]
+    finally:
+        _noted.pop()
+
+
+@lru_cache(maxsize=256)
+def _watched_type(model: type[BaseModel], fields: frozenset[str]) -> type[BaseModel]:
+    """Return a model like another one that notes when one of some fields is read.
+
+    It is validated as the other one is; to look at all fields at once is to read them too.
+    """
+
+    def get(self: Any, name: str) -> Any:
+        if _noted and (name in fields or name in _ALL_FIELDS):
+            _noted[-1].add(name)
+        return object.__getattribute__(self, name)
+
+    space = {"__getattribute__": get, "__module__": model.__module__, "__doc__": model.__doc__}
+    return type(model.__name__, (model,), space)

@@ -6,7 +6,7 @@ parameters differ between replicas, is split into one instance each
 replica as an additional column.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -22,7 +22,6 @@ from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.lookahead import Edge, lookahead_ticks, opened_loops
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.replicas.watched_parameters import WatchedParameters
 from dsa_des.replicas.windows import ReplicaWindows, SideBySideWindows
 from dsa_des.running.channel import Channel
 from dsa_des.running.effect_plan import plan, unspent
@@ -43,7 +42,9 @@ __all__ = ["NotInLockStep", "Replicas", "lock_step"]
 
 # Side by side, windows that hold fewer rows than this of each replica cost more than runs apart.
 _MOST_WINDOWS_PER_SCAN = 10.0
-_OF_THE_CLOCK = frozenset(ClockedParameters.model_fields)
+# What only the engine reads of a clock: each replica has its own scan instants. How long a scan
+# lasts, blocks read themselves.
+_OF_THE_CLOCK = frozenset({"offset_s", "rate_error_ppm", "jitter_s"})
 #: Takes a replica's number and what its blocks report (`Component.report`).
 TakeReport = Callable[[int, dict[str, Any]], None]
 
@@ -98,9 +99,6 @@ class Replicas(Timeline):
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
         self.together: dict[str, Runner] = {}
-        #: By block, which of its parameters are not the same in all replicas.
-        self._differing: dict[str, set[str]] = {}
-        self._watched: dict[str, WatchedParameters] = {}
         self._clocks: list[ReplicaClock] = []
         _check_alike(self._scenes)
         self._seeds = _seeds_of(self._scenes)
@@ -108,16 +106,6 @@ class Replicas(Timeline):
         self._opened = opened_loops(self.scene)
         self._delays: dict[Edge, int] = {}
         self.streams = ReplicaStreams(self._seeds)
-
-    def parameters(self, name: str) -> Any:
-        """Return those of the first replica, watched where clocks differ."""
-        parameters = super().parameters(name)
-        differing = self._differing[name] = self._find_differing(name)
-        of_the_clock = isinstance(parameters, ClockedParameters) and differing <= _OF_THE_CLOCK
-        if not differing or not of_the_clock:
-            return parameters
-        self._watched[name] = WatchedParameters(parameters, differing)
-        return self._watched[name].parameters
 
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Lay runs end to end, and split the blocks that cannot serve all of them."""
@@ -143,9 +131,6 @@ class Replicas(Timeline):
                     tuple(component.outputs), make, self._finished,
                     side_by_side=self.time.side_by_side,
                 )  # fmt: skip
-            elif name in self._watched:
-                reason = f"block {name} reads parameters of its clock, which differ"
-                self._watched[name].refuse(NotInLockStep(reason))
 
     def _shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
@@ -153,11 +138,13 @@ class Replicas(Timeline):
             return False
         if self.time.side_by_side and not component.goes_side_by_side():
             return False
-        if name in self._watched:
-            return not self._watched[name].read
-        return not self._differing[name]
+        differing = self._differing(name)
+        if isinstance(component.p, ClockedParameters):
+            differing -= _OF_THE_CLOCK
+        return not differing
 
-    def _find_differing(self, name: str) -> set[str]:
+    def _differing(self, name: str) -> set[str]:
+        """Return which of a block's parameters are not the same in all replicas."""
         if isinstance(self._scenes, ReplicaScenes):
             return self._scenes.differing(name)
         first = self._scenes[0].blocks[name].parameters
@@ -278,23 +265,21 @@ class Replicas(Timeline):
         found = self.together.get(component.name)
         return self.split.get(component.name, component) if found is None else found
 
-    def windows(
-        self, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder | None
-    ) -> Windows:
+    def windows(self, longest_ticks: int, rewinder: Rewinder | None) -> Windows:
         """Return windows that hold many whole replicas, or parts of one."""
         if not self.time.side_by_side:
-            return ReplicaWindows(self.time, longest_ticks, cuts)
+            return ReplicaWindows(self.time, longest_ticks)
         lookahead = lookahead_ticks(self._delays, self._opened)
         scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
         if self.time.run_ticks > lookahead * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
             said = f"{lookahead / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
-        return SideBySideWindows(self.time, longest_ticks, cuts, lookahead)
+        return SideBySideWindows(self.time, longest_ticks, lookahead)
 
-    def grain(self, window: int | None, check_rewinding: bool) -> Grain:
+    def grain(self, window: int | None) -> Grain:
         """Return the grain: in loops, all blocks run in windows that nothing comes back in."""
         if not self._opened:
-            return super().grain(window, check_rewinding)
+            return super().grain(window)
         return Grain(set(self.scene.blocks), False, self._opened, {})
 
     def channel(self, wire: Wire, delay_ticks: int) -> Channel:

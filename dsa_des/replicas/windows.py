@@ -1,7 +1,5 @@
 """Windows over replicas that lie end to end, or go side by side."""
 
-from collections.abc import Iterable
-
 from dsa_des.running.windows import EqualWindows, Window
 from dsa_des.time.timeline import ReplicaTime
 
@@ -12,16 +10,14 @@ class SideBySideWindows(EqualWindows):
     Parameters
     ----------
     time : ReplicaTime
-    longest_ticks, cuts
+    longest_ticks
         As for `EqualWindows`.
     lookahead_ticks : int
         Before so long, nothing that is sent comes back.
     """
 
-    def __init__(
-        self, time: ReplicaTime, longest_ticks: int, cuts: Iterable[int], lookahead_ticks: int
-    ) -> None:
-        super().__init__(time.run_ticks, min(longest_ticks, lookahead_ticks), cuts)
+    def __init__(self, time: ReplicaTime, longest_ticks: int, lookahead_ticks: int) -> None:
+        super().__init__(time.run_ticks, min(longest_ticks, lookahead_ticks))
 
 
 class ReplicaWindows(EqualWindows):
@@ -30,12 +26,12 @@ class ReplicaWindows(EqualWindows):
     Parameters
     ----------
     time : ReplicaTime
-    longest_ticks, cuts
+    longest_ticks
         As for `EqualWindows`; the time between replicas does not count.
     """
 
-    def __init__(self, time: ReplicaTime, longest_ticks: int, cuts: Iterable[int] = ()) -> None:
-        super().__init__(time.end_tick, longest_ticks, cuts)
+    def __init__(self, time: ReplicaTime, longest_ticks: int) -> None:
+        super().__init__(time.end_tick, longest_ticks)
         self._time = time
 
     def next(self) -> Window | None:

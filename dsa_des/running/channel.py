@@ -87,15 +87,6 @@ class Channel:
             self._pushed.append(int(arrivals[0]))
         return arrivals
 
-    def arrival(self, made: int, sent: int) -> int | None:
-        """Return when a row of the tick `made`, sent later, arrives; None if it is lost."""
-        if self._faults is None:
-            return sent + self.delay_ticks
-        row = np.array([made], dtype=np.int64)
-        if not self._faults.kept(row)[0]:
-            return None
-        return sent + self.delay_ticks + int(self._faults.lateness(row)[0])
-
     def forget(self, tick: int) -> None:
         """Drop what a reader who only asks what is held, at `tick` or later, can never see.
 

@@ -3,7 +3,6 @@
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from dsa_des.errors import SceneError
 from dsa_des.running.loops import before_loops, cannot_rewind, cut_loops
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
@@ -25,9 +24,6 @@ class Grain:
         Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
     queues : dict
         Shared processors that serve a window at once, and the blocks that line up at each.
-    rehearsed : bool
-        Whether what shared processors do is rehearsed before each window, which is undone where
-        that was wrong.
     ahead : set of str
         Blocks that no loop leads to: what comes back is nothing to them, and they run ahead in
         longer windows.
@@ -38,7 +34,6 @@ class Grain:
     cut_edges: set[tuple[str, str]]
     unwound: dict[str, str]
     queues: dict[str, list[str]] = field(default_factory=dict)
-    rehearsed: bool = False
     ahead: set[str] = field(default_factory=set)
 
     def order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
@@ -46,36 +41,16 @@ class Grain:
         return window_order(scene.graph, self.windowed, self.cut_edges, self.queues, first)
 
 
-def grain_of(scene: Scene, window: int | None, check_rewinding: bool) -> Grain:
-    """Return at which grain the blocks of a scene run; see `Simulation` for the parameters.
-
-    Raises
-    ------
-    SceneError
-        If rewinding is to be checked where nothing can be rewound.
-    """
+def grain_of(scene: Scene, window: int | None) -> Grain:
+    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`."""
     queued = {name for name, block in scene.blocks.items() if block.options.processor}
     unwound = cannot_rewind(scene.classes, queued)
-    if window != 1 and not unwound and (check_rewinding or in_cycles(scene.graph)):
+    if window == 1:
+        return Grain(set(), False, set(), unwound)
+    if not unwound and in_cycles(scene.graph):
         return Grain(
             set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound,
             ahead=before_loops(scene.graph),
         )  # fmt: skip
-    if check_rewinding:
-        raise _nothing_rewinds(scene, unwound)
-    if window == 1:
-        return Grain(set(), False, set(), unwound)
-    if scene.rehearsed:
-        return Grain(set(scene.blocks), False, set(), unwound, rehearsed=True)
     queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
     return Grain(scene.look_ahead_blocks(), False, set(), unwound, queues)
-
-
-def _nothing_rewinds(scene: Scene, unwound: dict[str, str]) -> SceneError:
-    said = "check_rewinding: nothing is rewound in this scene"
-    if not unwound:
-        return SceneError([scene.problem("blocks", f"{said} with a window of one scan")])
-    return SceneError(
-        scene.problem(f"blocks.{name}.type", f"{said}: {scene.classes[name].path()} {why}")
-        for name, why in unwound.items()
-    )

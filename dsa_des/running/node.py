@@ -26,7 +26,6 @@ from dsa_des.running.demand import Demand
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.running.inputs import Inputs
 from dsa_des.running.processors import Processor
-from dsa_des.running.rehearsed_lines import RehearsedLines
 from dsa_des.running.run_state import RunState
 from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
@@ -60,7 +59,7 @@ class Node:
     clock: ScanClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
-    processor: Processor | WindowedQueue | RehearsedLines | None = None
+    processor: Processor | WindowedQueue | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
@@ -162,20 +161,6 @@ class Node:
         """Return up to when it runs in a window."""
         return window.end if window.ahead is None or not self.ahead else window.ahead
 
-    def own_ticks(self, start: int, end: int) -> IntArray:
-        """Return the instants in [start, end) at which it runs without being sent anything."""
-        if self.clock is not None:
-            return self.clock.between(start, end)[1]
-        return self._demanded(start, end) if self.on_demand else np.empty(0, dtype=np.int64)
-
-    def triggers(self) -> list[Channel]:
-        """Return the wires whose messages wake the block."""
-        return [channel for port in self._trigger_ports for channel in self.channels.get(port, [])]
-
-    def is_woken_over(self, port: str) -> bool:
-        """Whether messages for an input wake it."""
-        return port in self._trigger_ports
-
     def _demanded(self, start: int, end: int) -> IntArray:
         ticks = [demand.between(start, end) for demand in self.demands]
         if len(ticks) == 1:
@@ -200,7 +185,11 @@ class Node:
         else:
             ticks = self._demanded(start, end) if self.on_demand else np.empty(0, np.int64)
             scans = np.full(len(ticks), -1, dtype=np.int64)
-        arrivals = [channel.next_arrivals(end) for channel in self.triggers()]
+        arrivals = [
+            channel.next_arrivals(end)
+            for port in self._trigger_ports
+            for channel in self.channels.get(port, [])
+        ]
         arrivals = [new for new in arrivals if len(new)]
         if arrivals:
             own = ticks
@@ -215,8 +204,6 @@ class Node:
                 scans = numbered
             else:
                 scans = np.full(len(ticks), -1, dtype=np.int64)
-        if self.processor is not None:
-            ticks, scans = self.processor.let_in(self.name, ticks, scans)
         ends = self.simulation.ends
         if ends.early:
             kept = ends.before(ticks)

@@ -12,8 +12,6 @@ from dsa_des.errors import SceneError
 from dsa_des.running.grain import Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Node
 from dsa_des.running.processors import Processor, Service
-from dsa_des.running.rehearsal import WaitingLine
-from dsa_des.running.rehearsed_lines import RehearsedLines
 from dsa_des.running.run_state import RunState
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windowed_queue import WindowedQueue
@@ -27,7 +25,7 @@ def build_nodes(
     timeline: Timeline,
     components: Mapping[str, Component],
     grain: Grain,
-    processors: Mapping[str, Processor | WindowedQueue | RehearsedLines],
+    processors: Mapping[str, Processor | WindowedQueue],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
     """Return the running blocks, which no wire connects yet.
@@ -70,10 +68,8 @@ def start_processors(
     end_tick: int,
     env: simpy.Environment,
     record: Callable[[str, Message], None],
-) -> dict[str, Processor | WindowedQueue | RehearsedLines]:
+) -> dict[str, Processor | WindowedQueue]:
     """Start the shared processors of a scene: message by message, or a window at once.
-
-    Those that are rehearsed are one for all.
 
     Raises
     ------
@@ -83,16 +79,12 @@ def start_processors(
     streams = Streams(scene.seed)
     order = grain.order(scene)
     ticks_per_s = scene.ticks_per_s
-    processors: dict[str, Processor | WindowedQueue | RehearsedLines] = {}
-    lines: dict[str, WaitingLine] = {}
+    processors: dict[str, Processor | WindowedQueue] = {}
     for name, p in scene.processors.items():
         try:
             service = Service(name, p, ticks_per_s, streams.stream(name, "service time"))
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
-        if grain.rehearsed:
-            lines[name] = WaitingLine(service, p.when_busy)
-            continue
         if name in grain.queues:
             processors[name] = WindowedQueue(
                 name,
@@ -107,10 +99,6 @@ def start_processors(
         else:
             processors[name] = Processor(name, p, service, env, ticks_per_s, record)
         processors[name].start()
-    if grain.rehearsed:
-        of = {block: name for name, blocks in scene.queues.items() for block in blocks}
-        together = RehearsedLines(lines, of, ticks_per_s, record)
-        processors = dict.fromkeys(lines, together)
     return processors
 
 

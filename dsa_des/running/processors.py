@@ -125,34 +125,8 @@ class Service:
         self._spread = float(parameters.service_spread_s * ticks_per_s)
         self._stream = stream
         self._ticks_per_s = ticks_per_s
-        self._known: dict[tuple[str, int], int] = {}
         if self._least < 1:
             raise ValueError(f"processors.{name}: service_s is shorter than one tick")
-
-    def foresee(self, block: str, entered: IntArray) -> None:
-        """Draw the times for messages that may be asked for one by one; many take less together."""
-        if self._spread:
-            jobs = [(block, tick) for tick in entered.tolist()]
-            times = self.ticks([block] * len(jobs), entered).tolist()
-            self._known.update(zip(jobs, times, strict=True))
-
-    def forget(self) -> None:
-        """Forget the times that were asked for: they are as quickly drawn again."""
-        self._known.clear()
-
-    def of(self, block: str, entered: int) -> int:
-        """Return the time for one message."""
-        if not self._spread:
-            return self._least
-        known = self._known.get((block, entered))
-        if known is None:
-            known = self._known[block, entered] = self._one(block, entered)
-        return known
-
-    def _one(self, block: str, entered: int) -> int:
-        tick = nanosecond_of(np.array([entered], dtype=np.int64), self._ticks_per_s).tolist()[0]
-        key = key_of("job", block, tick)
-        return self._least + round(self._stream.one_uniform(key, 0) * self._spread)
 
     def ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
         """Return the time for each message, by its block and the tick at which it entered."""
@@ -224,10 +198,6 @@ class Processor:
 
     def open_window(self, start: int, end: int) -> None:
         """Do nothing: it works message by message."""
-
-    def let_in(self, block: str, ticks: IntArray, scans: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the instants at which a block is to run: all."""
-        return ticks, scans
 
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
         """Hand in what `block` made at this instant; `deliver` is called when it is worked on."""

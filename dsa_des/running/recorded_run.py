@@ -37,7 +37,6 @@ def record_run(
     target: Path | OutputFolder,
     *,
     simulate_everything: bool = False,
-    check_rewinding: bool = False,
     silent: bool = True,
     warn: bool = False,
     pacer: Pacer | None = None,
@@ -54,8 +53,6 @@ def record_run(
     loaded : Scene
     target : Path or OutputFolder
     simulate_everything : bool
-    check_rewinding : bool
-        Whether every window runs twice, see `Simulation`.
     silent : bool
         Whether there is no progress bar.
     warn : bool
@@ -85,12 +82,7 @@ def record_run(
         target = OutputFolder(target)
     target.check()
     recorder = Recorder([])
-    simulation = Simulation(
-        loaded,
-        recorder=recorder,
-        simulate_everything=simulate_everything,
-        check_rewinding=check_rewinding,
-    )
+    simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     if prepare is not None:
         prepare(simulation)
     if told:

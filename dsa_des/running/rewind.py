@@ -9,7 +9,7 @@ nothing can.
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -93,15 +93,13 @@ class RewindingWindows(EqualWindows):
 
     Parameters
     ----------
-    end_tick, longest_ticks, cuts
+    end_tick, longest_ticks
         As for `EqualWindows`.
     rewinder : Rewinder
     """
 
-    def __init__(
-        self, end_tick: int, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder
-    ) -> None:
-        super().__init__(end_tick, longest_ticks, cuts)
+    def __init__(self, end_tick: int, longest_ticks: int, rewinder: Rewinder) -> None:
+        super().__init__(end_tick, longest_ticks)
         self._rewinder = rewinder
         self._length = 0
         self._least = rewinder.sure_ticks

@@ -7,7 +7,7 @@ whether one run goes through them or many of its timeline (`dsa_des.running.time
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -27,19 +27,17 @@ from dsa_des.running.connections import check_reach, connect
 from dsa_des.running.effect_plan import Planned
 from dsa_des.running.node import Abort
 from dsa_des.running.nodes import build_nodes, start_processors
-from dsa_des.running.pinpoint import pinpoint
 from dsa_des.running.processors import Processing
-from dsa_des.running.rehearsed_lines import RehearsedLines
-from dsa_des.running.rehearsed_windows import RehearsedWindows
 from dsa_des.running.rewind import Rewinder
-from dsa_des.running.rewind_check import WindowsRunTwice
 from dsa_des.running.run_state import RunningBlock
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.timing_effects import timing_plan
 from dsa_des.running.window_size import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.windows import Failure, Window, Windows
-from dsa_des.scene.graph import depths
 from dsa_des.scene.scene import Scene
+
+#: Up to so many scans a run that failed in a window is run again, to say at which of them.
+_MOST_SCANS_AGAIN = 20_000
 
 
 @dataclass
@@ -99,17 +97,11 @@ class Simulation:
         Build also the effects that the scene does not call for, where they can be neutral.
     wrap_effect : callable, optional
         Given each planned effect and what was built of it, returns what is used instead.
-    cuts : iterable of int
-        Ticks at which look-ahead windows are cut in two; results do not depend on them.
-    check_rewinding : bool
-        Run every window a second time from its saved state and compare all that blocks send and
-        remember; the first that did something else is the `BlockFailure` of the run.
 
     Raises
     ------
     SceneError
-        If the scene has no length, a block cannot be set up, or `check_rewinding` is asked for
-        where a block cannot be rewound.
+        If the scene has no length, or a block cannot be set up.
     """
 
     def __init__(
@@ -123,8 +115,6 @@ class Simulation:
         trace: list[tuple[int, str]] | None = None,
         simulate_everything: bool = False,
         wrap_effect: WrapEffect | None = None,
-        cuts: Iterable[int] = (),
-        check_rewinding: bool = False,
     ) -> None:
         if window is not None and window < 1:
             raise ValueError(f"window is {window}: it must be 1 or more scans")
@@ -140,10 +130,8 @@ class Simulation:
         self.window = Window(0, 0)
         #: What a block raised in the window that runs now.
         self.failure: Failure | None = None
-        self._window = window
-        self._cuts = sorted(cuts)
         self._has_run = False
-        grain = self.timeline.grain(window, check_rewinding)
+        grain = self.timeline.grain(window)
         #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
         self.unwound = grain.unwound
         assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
@@ -170,14 +158,7 @@ class Simulation:
             rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace, self.ends)
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
-        self.windows: Windows = self.timeline.windows(longest, self._cuts, rewinder)
-        for lines in processors.values():
-            if isinstance(lines, RehearsedLines) and not isinstance(self.windows, RehearsedWindows):
-                lines.cast(self.nodes, depths(scene.graph))
-                rewinder = Rewinder(self.nodes.values(), set(), recorder, trace, self.ends)
-                self.windows = RehearsedWindows(self.end_tick, longest, self._cuts, rewinder, lines)
-        if check_rewinding and rewinder is not None:
-            self.windows = WindowsRunTwice(self.windows, rewinder, self.nodes, self.ticks_per_s)
+        self.windows: Windows = self.timeline.windows(longest, rewinder)
 
     @property
     def timing_plan(self) -> list[Planned]:
@@ -322,15 +303,16 @@ class Simulation:
             raise Abort
 
     def _raise(self, failure: Failure) -> None:
-        """Raise what a block raised, with its exact instant where that can be found."""
-        if len(failure.ticks) > 1 and not self._cuts and self.time.replicas == 1:
-            exact = pinpoint(self._again, failure.ticks)
-            if exact is not None:
+        """Raise what a block raised; its exact instant is found by running scan by scan again."""
+        before = self.scans * int(failure.ticks[0]) / self.time.run_ticks
+        if len(failure.ticks) > 1 and self.time.replicas == 1 and before < _MOST_SCANS_AGAIN:
+            try:
+                Simulation(self.scene, window=1, simulate_everything=self._everything).run()
+            except SceneError:  # a block waits for what only `prepare` handed over
+                pass
+            except BlockFailure as exact:
                 raise exact from exact.__cause__
         raise failure.said from failure.cause
-
-    def _again(self, cuts: set[int]) -> "Simulation":
-        return Simulation(self.scene, window=self._window, cuts=cuts)
 
 
 def _failure(

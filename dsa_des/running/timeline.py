@@ -4,7 +4,7 @@ A simulation asks its timeline for all in which several runs of a scene differ f
 builds blocks, wires them and runs them knows no replicas.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -92,9 +92,9 @@ class Timeline:
         late, lost = (self.streams.stream(str(wire), f"wire {kind}") for kind in ("jitter", "loss"))
         return float(wire.jitter_s * ticks_per_s), wire.drop_probability, late, lost, ticks_per_s
 
-    def grain(self, window: int | None, check_rewinding: bool) -> Grain:
+    def grain(self, window: int | None) -> Grain:
         """Return at which grain the blocks run; see `Simulation` for the parameters."""
-        return grain_of(self.scene, window, check_rewinding)
+        return grain_of(self.scene, window)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""
@@ -108,22 +108,18 @@ class Timeline:
         """Return what handles the wakes of a block: itself, or what stands in for it."""
         return component
 
-    def windows(
-        self, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder | None
-    ) -> Windows:
+    def windows(self, longest_ticks: int, rewinder: Rewinder | None) -> Windows:
         """Return the windows of all runs.
 
         Parameters
         ----------
         longest_ticks : int
-        cuts : iterable of int
-            Ticks at which one ends early.
         rewinder : Rewinder, optional
             If feedback loops are run in windows.
         """
         if rewinder is None:
-            return EqualWindows(self.time.end_tick, longest_ticks, cuts)
-        return RewindingWindows(self.time.end_tick, longest_ticks, cuts, rewinder)
+            return EqualWindows(self.time.end_tick, longest_ticks)
+        return RewindingWindows(self.time.end_tick, longest_ticks, rewinder)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""

@@ -102,10 +102,6 @@ class WindowedQueue:
         wake_up = WakeUp(self._env, start - int(self._env.now), self._priority)
         wake_up.callbacks.append(lambda event: self._serve(end))
 
-    def let_in(self, block: str, ticks: IntArray, scans: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the instants at which a block is to run: all."""
-        return ticks, scans
-
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
         """Take what a block sent over one output in the window that is open."""
         tick = message.tick

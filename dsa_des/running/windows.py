@@ -2,11 +2,9 @@
 
 A run asks its windows which one comes next, runs it, and tells them what came of it. They decide
 whether it stands or is to be run otherwise; nothing that is recorded depends on them. Some wrap
-others: what waits for the wall clock (`dsa_des.running.pacing`) or has everything run twice
-(`dsa_des.running.rewind_check`) works with windows of any kind.
+others: what waits for the wall clock (`dsa_des.running.pacing`) works with windows of any kind.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -65,13 +63,10 @@ class EqualWindows:
     end_tick : int
         Where the last one ends.
     longest_ticks : int
-    cuts : iterable of int
-        Ticks at which one ends early.
     """
 
-    def __init__(self, end_tick: int, longest_ticks: int, cuts: Iterable[int] = ()) -> None:
+    def __init__(self, end_tick: int, longest_ticks: int) -> None:
         self.end_tick, self.longest_ticks = end_tick, longest_ticks
-        self._cuts = sorted(cuts)
         self.start = 0
 
     def limit(self, longest_ticks: int) -> None:
@@ -80,8 +75,7 @@ class EqualWindows:
 
     def end_after(self, length_ticks: int) -> int:
         """Return where a window of this length from `start` on ends."""
-        cut = next((cut for cut in self._cuts if cut > self.start), self.end_tick)
-        return min(self.start + length_ticks, self.end_tick, cut)
+        return min(self.start + length_ticks, self.end_tick)
 
     def next(self) -> Window | None:
         """Return the next window."""

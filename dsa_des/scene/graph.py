@@ -200,30 +200,6 @@ def with_queues(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.
     return wired
 
 
-def can_be_rehearsed(
-    graph: nx.DiGraph,
-    classes: Mapping[str, type[Component]],
-    queues: Mapping[str, Collection[str]],
-    skipping: Collection[str],
-) -> bool:
-    """Return whether windows can be rehearsed and undone (`dsa_des.running.rehearsal`).
-
-    All blocks must run in windows and let themselves be rewound, in no loop. What waits at a
-    processor has one output; at one of those `skipping` scans, nothing wakes it but its clock.
-    """
-    able = all(c.windowed and c.rewindable and c.process is None for c in classes.values())
-    queued = [block for blocks in queues.values() for block in blocks]
-    if not able or in_cycles(graph) or any(len(classes[b].outputs) != 1 for b in queued):
-        return False
-    return not any(
-        classes[block].inputs[wire.input].mode == "trigger"
-        for name in skipping
-        for block in queues[name]
-        for _, _, wires in graph.in_edges(block, data="wires")
-        for wire in wires
-    )
-
-
 def windowed_queues(
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],

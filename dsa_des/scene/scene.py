@@ -27,7 +27,6 @@ from dsa_des.scene.checks import (
 )
 from dsa_des.scene.graph import (
     build_graph,
-    can_be_rehearsed,
     check_graph,
     windowed_blocks,
     windowed_queues,
@@ -110,8 +109,6 @@ class Scene(Changeable):
 
     def look_ahead_blocks(self) -> set[str]:
         """Return the blocks that may run in look-ahead windows."""
-        if self.rehearsed:
-            return set(self.blocks)
         apart = set(self.queues) - self.windowed_queues()
         queued = [block for name in apart for block in self.queues[name]]
         return windowed_blocks(self.graph, self.classes, queued)
@@ -129,15 +126,6 @@ class Scene(Changeable):
         """Return the shared processors that serve a look-ahead window at once."""
         able = [name for name, p in self.processors.items() if p.when_busy != "skip"]
         return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
-
-    @property
-    def rehearsed(self) -> bool:
-        """Whether windows are rehearsed because a shared processor could not serve one at once."""
-        used = {name for name, blocks in self.queues.items() if blocks}
-        if not used or used <= self.windowed_queues():
-            return False
-        skipping = [name for name, p in self.processors.items() if p.when_busy == "skip"]
-        return can_be_rehearsed(self.graph, self.classes, self.queues, skipping)
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

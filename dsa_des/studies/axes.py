@@ -26,25 +26,16 @@ _FRACTION = re.compile(r"\d+/[1-9]\d*")
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a study.
+    """One axis of a study."""
 
-    Parameters
-    ----------
-    key : str
-        A dotted key of the scene, ``swap.BLOCK``, or a free name for linked values.
-    labels : tuple
-        What the axis is at each of its values: numbers or texts.
-    sets : tuple of tuple of (key, value)
-        What each value sets in the scene.
-    swaps : tuple of tuple of (block, type)
-    files : bool
-        Whether its values are files: encounters, of which the study is a sample.
-    """
-
+    #: A dotted key of the scene, ``swap.BLOCK``, or a free name for linked values.
     key: str
+    #: What the axis is at each of its values: numbers or texts.
     labels: tuple[Any, ...]
+    #: What each value sets in the scene.
     sets: tuple[tuple[tuple[str, Any], ...], ...]
     swaps: tuple[tuple[tuple[str, str], ...], ...]
+    #: Whether its values are files: encounters, of which the study is a sample.
     files: bool = False
 
     @property

@@ -19,16 +19,20 @@ from dsa_des.block.recorded_columns import Text
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
+from dsa_des.results.record import (
+    CRASHED,
+    DONE,
+    FAILED,
+    columns_of,
+    draw_column,
+)
+from dsa_des.results.sealed_files import parquet
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, RATIO, SHARE, TRIALS, Group, Metric, Result, wanted_by
-from dsa_des.studies.seal import parquet
+from dsa_des.studies.metric import Group, Metric, wanted_by
 from dsa_des.studies.study import Chunk, Study, set_text
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
 _MANY_RUNS = 64
-
-#: What became of a run: it has results; it failed, and will again; its process died.
-DONE, FAILED, CRASHED = "done", "failed", "crashed"
 
 
 @dataclass(frozen=True)
@@ -54,41 +58,6 @@ def schema_of(study: Study) -> pa.Schema:
         [(draw_column(draw.key), draw.numeric) for draw in study.draws],
         [result for metric in metrics for result in metric.results()],
     )
-
-
-def columns_of(
-    axes: Sequence[tuple[str, bool]],
-    draws: Sequence[tuple[str, bool]],
-    results: Sequence[Result],
-) -> pa.Schema:
-    """Return the columns of a part.
-
-    Parameters
-    ----------
-    axes, draws : sequence of (column, whether it holds numbers)
-    results : sequence of Result
-    """
-    fields = [("cell", pa.int64()), ("replica", pa.int64()), ("seed", pa.int64())]
-    fields += [
-        (name, pa.float64() if numeric else pa.string()) for name, numeric in [*axes, *draws]
-    ]
-    cut_off: set[str] = set()
-    for result in results:
-        if result.kind == RATIO:
-            continue
-        fields.append((result.name, pa.string() if result.kind == CLASS else pa.float64()))
-        if result.kind == SHARE:
-            fields.append((result.name + TRIALS, pa.float64()))
-        if result.cut_off is not None and result.cut_off not in cut_off:
-            cut_off.add(result.cut_off)
-            fields.append((result.cut_off, pa.string()))
-    fields += [("status", pa.string()), ("error", pa.string()), ("command", pa.string())]
-    return pa.schema(fields)
-
-
-def draw_column(key: str) -> str:
-    """Return the column of a drawn value."""
-    return f"draw.{key.removeprefix('blocks.')}"
 
 
 def run_chunk(study: Study, chunk: Chunk) -> Done:

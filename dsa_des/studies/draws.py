@@ -1,20 +1,25 @@
 """Random draws of a study: each value is a function of (seed, key, replica) and of nothing else.
 
 The same replica has the same draws in every cell of a study, so cells compare on common random
-numbers; members of a sample (`dsa_des.studies.sample`) have a seed each. Times (``_s``) are rounded
-to nanoseconds and rates (``_hz``) to millihertz: clocks stay exact.
+numbers. Members of a sample (`member_seed`) have a seed each: axes over which a study averages
+(`Study.over`) are a sample, and what chance does in one member must say nothing about another.
+Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millihertz: clocks stay exact.
 """
 
+import hashlib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.studies.axes import Axis
 from dsa_des.time.randomness import key_of
 
 #: No normal draw lies farther out: the smallest probability is 2^-54.
@@ -24,23 +29,15 @@ KINDS = ("uniform", "normal", "choice", "latin_hypercube", "sequence")
 
 @dataclass(frozen=True)
 class Draw:
-    """How one value of the scene is drawn.
+    """How one value of the scene is drawn."""
 
-    Parameters
-    ----------
-    key : str
-        Dotted key of the scene.
-    kind : {"uniform", "normal", "choice", "sequence"}
-    values : tuple
-        Lowest and highest; mean and standard deviation; what to choose from; or the value of the
-        first replica and the step to the next.
-    stratified : bool
-        Whether replicas share the range out among themselves (Latin hypercube).
-    """
-
+    #: Dotted key of the scene.
     key: str
     kind: str
+    #: Lowest and highest; mean and standard deviation; what to choose from; or the value of the
+    #: first replica and the step to the next.
     values: tuple[Any, ...]
+    #: Whether replicas share the range out among themselves (Latin hypercube).
     stratified: bool = False
 
     @property
@@ -51,13 +48,8 @@ class Draw:
     def value(self, seed: int, replica: int, batch: int) -> Any:
         """Return the value of one replica.
 
-        Parameters
-        ----------
-        seed : int
-            The study's, or that of a member of its sample.
-        replica : int
-        batch : int
-            How many consecutive replicas a Latin hypercube covers together.
+        `seed` is the study's, or that of a member of its sample; a Latin hypercube covers `batch`
+        consecutive replicas together.
         """
         if self.kind == "sequence":
             first, step = self.values
@@ -80,16 +72,6 @@ def exact(key: str, value: float) -> float | Fraction:
         if key.endswith(ending) and not key.endswith("deg_s"):
             return Fraction(round(value * unit), unit)
     return value
-
-
-def as_text(value: Any) -> str:
-    """Return a value the way ``--set`` takes it."""
-    if isinstance(value, Fraction):
-        decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")
-        return decimal if Fraction(decimal) == value else f'"{value}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value) if isinstance(value, float) else str(value)
 
 
 def replica_seed(seed: int, replica: int) -> int:
@@ -173,3 +155,58 @@ def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{kind} = {values}: must be finite")
     return low, high
+
+
+def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
+    """Return the seed of all runs of one member of a sample.
+
+    It depends on the values alone: not on their places, nor on what other values there are.
+
+    Members are values, by their index, of axes that are a sample, in any order; without any the
+    study's seed stays.
+    """
+    parts = sorted((axis.key, *identity(axis, index)) for axis, index in members)
+    return (
+        key_of(seed, "study sample", *(text for part in parts for text in part)) if parts else seed
+    )
+
+
+def identity(axis: Axis, index: int) -> tuple[str, ...]:
+    """Return what tells one value of an axis from all others.
+
+    A file is told by its name, without its folder, and its content: it keeps its draws wherever
+    it lies, copies under other names are other encounters, and so are files of the same name in
+    other folders, unless they hold the same. Other values are told by themselves; 1 and 1.0 are
+    the same.
+    """
+    if not axis.files:
+        return (_label_text(axis.labels[index]),)
+    path = Path(axis.sets[index][0][1])
+    try:
+        return path.name, file_digest(path)
+    except OSError:  # its runs say what is wrong with it
+        return path.name, ""
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file's content; a file that stays as it is is read once.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    state = path.stat()
+    return _digest(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
+
+
+@lru_cache(maxsize=1 << 17)
+def _digest(path: str, *state: int) -> str:
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _label_text(label: Any) -> str:
+    if isinstance(label, float) and label.is_integer():
+        label = int(label)
+    return repr(label) if isinstance(label, int | float) else f"text {label}"

@@ -1,26 +1,30 @@
-"""The digest of all that fixes a study's results, and the ``study.json`` that holds it."""
+"""The content of ``study.json``: the digest of all that fixes a study's results, and its record."""
 
 import contextlib
 import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
+from dsa_des.block.mark import Mark, marks_of
 from dsa_des.block.source_file import file_of, is_file, path_of, split_name
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.files.input_files import resolve_home
 from dsa_des.files.output_folder import RUN_JSON
 from dsa_des.record.version import __version__
+from dsa_des.results.record import Result, StudyRecord, draw_column
+from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.studies.record import StudyRecord, record_text
-from dsa_des.studies.sample import file_digest
-from dsa_des.studies.study import Study
+from dsa_des.studies.axes import Axis
+from dsa_des.studies.draws import file_digest
+from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_tables import json_safe
 
 #: Texts for people, which name no file.
-_SAID = ("title", "description", "labels")
+_PROSE = ("title", "description", "labels")
 
 
 def description_text(study: Study) -> str:
@@ -52,12 +56,6 @@ def description_text(study: Study) -> str:
     return record_text(study, hashlib.sha256(text.encode()).hexdigest())
 
 
-def description(study: Study) -> dict[str, Any]:
-    """Return the content of ``study.json`` as a table."""
-    content: dict[str, Any] = json.loads(description_text(study))
-    return content
-
-
 def record_of(study: Study) -> StudyRecord:
     """Return the record of a study as its folder will hold it."""
     return StudyRecord.model_validate_json(description_text(study))
@@ -68,16 +66,9 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
 
     Their content fixes results as much as the values do. A relative name counts from the folder of
     the file that holds it; whichever way a file is named, its content is what counts.
-
-    Parameters
-    ----------
-    value : object
-        Tables, lists and texts.
-    beside : sequence of Path
-        Folders in which modules are looked for.
     """
     if isinstance(value, Mapping):
-        return _files_in([item for key, item in value.items() if key not in _SAID], beside)
+        return _files_in([item for key, item in value.items() if key not in _PROSE], beside)
     if isinstance(value, list | tuple):
         return set().union(*(_files_in(item, beside) for item in value))
     if not isinstance(value, str):
@@ -126,3 +117,89 @@ def _extended_by(files: set[Path]) -> set[Path]:
                 found |= {Path(os.path.abspath(source)) for source in scene.sources.values()}
                 found |= _files_in(scene.data, ())
     return found
+
+
+def results_of(study: Study) -> list[Result]:
+    """Return the results that a study's metrics give."""
+    scene = study.scene(0)
+    found = [result for spec in study.metrics for result in spec.build(scene).results()]
+    marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
+    return [_marked(result, scene, marks) for result in found]
+
+
+def _marked(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
+    """Return a result with the mark of its block, if that block's class has one."""
+    name = result.block or result.name.partition(".")[2]
+    if name not in scene.blocks or getattr(scene.blocks[name].cls, "mark", None) is None:
+        return result
+    return replace(result, mark=(marks[name].colour, marks[name].marker))
+
+
+def is_category(axis: Axis, scene: Scene) -> bool:
+    """Return whether an axis sets what is one of a few names: a type, a flag, a model's number."""
+    for key, _ in axis.sets[0] if axis.sets else ():
+        parts = key.split(".")
+        if len(parts) != 3 or parts[0] != "blocks" or parts[1] not in scene.blocks:
+            return False
+        known = scene.blocks[parts[1]].cls.Parameters.model_fields.get(parts[2])
+        if known is None or not _of_names(known.annotation):
+            return False
+    return bool(axis.swaps and axis.swaps[0]) or bool(axis.sets and axis.sets[0])
+
+
+def _of_names(annotation: Any) -> bool:
+    if get_origin(annotation) is Literal or annotation is bool:
+        return True
+    parts = [part for part in get_args(annotation) if part is not type(None)]
+    return bool(parts) and all(_of_names(part) for part in parts)
+
+
+def record_text(study: Study, digest: str) -> str:
+    """Return the content of ``study.json``, given the SHA-256 of all that fixes its results."""
+    content = {
+        "study": str(study.path.resolve()),
+        "study_sha256": digest,
+        "title": study.title,
+        "scene": str(study.scene_path.resolve()),
+        "seed": study.seed,
+        "cells": len(study.cells),
+        "replicas": study.replicas,
+        "axes": [
+            {
+                "column": axis.column,
+                "values": axis.labels,
+                "over": axis.column in study.over,
+                "numeric": axis.numeric,
+                "category": is_category(axis, study.scene(0)),
+                "sets": [[(key, set_text(value)) for key, value in one] for one in axis.sets],
+                "swaps": axis.swaps,
+            }
+            for axis in study.axes
+        ],
+        "draws": [
+            {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.numeric}
+            for draw in study.draws
+        ],
+        "results": [
+            vars(result) | {"ratio": None if result.ratio is None else vars(result.ratio)}
+            for result in results_of(study)
+        ],
+        "sets": [(key, set_text(value)) for key, value in study.sets],
+        "swaps": study.swaps,
+        "compare": study.baseline,
+        "compare_weight": study.compare_weight,
+        "stop_when": None if study.stop_when is None else vars(study.stop_when),
+        "confidence": study.confidence,
+        "interval": study.interval,
+        "figures": [
+            {
+                k: v if isinstance(v, int | float | list) else str(v)
+                for k, v in figure.model_dump(exclude_unset=True, warnings=False).items()
+            }
+            for figure in study.figures
+        ],
+        "requirements": [vars(requirement) for requirement in study.requirements],
+        "version": __version__,
+        "tables": study.tables,
+    }
+    return json.dumps(json_safe(content), indent=2, allow_nan=False) + "\n"

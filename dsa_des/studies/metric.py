@@ -6,7 +6,6 @@ so ten thousand replicas cost little more than one.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -23,104 +22,29 @@ from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import scenes_of
 from dsa_des.replicas.replicas import Recorded
+from dsa_des.results.record import (
+    CLASS,
+    EVENT,
+    FRACTION,
+    NUMBER,
+    RATIO,
+    SHARE,
+    TRIALS,
+    RatioOf,
+    Result,
+    Told,
+)
 from dsa_des.scene.scene import Scene
 
+#: What authors of metrics import from here.
+__all__ = [
+    "CLASS", "EVENT", "FRACTION", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
+    "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "find_metric",
+    "recorded_by", "wanted_by",
+]  # fmt: skip
+
 METRICS = "dsa_des.metrics"
-
 _T = TypeVar("_T")
-
-#: Kinds of results: a number with a mean; a number from 0 to 1 with a mean, such as a share of the
-#: time; an event that happens or not; a share of trials; the ratio of two events over all units of
-#: a cell; the name of a class.
-NUMBER, FRACTION, EVENT, SHARE = "number", "fraction", "event", "share"
-RATIO, CLASS = "ratio", "class"
-#: What is put behind the name of a share for the column of its trials.
-TRIALS = ".trials"
-
-
-@dataclass(frozen=True)
-class Told:
-    """How a change of a result is told: ``radar``, ``sees a target earlier``, ``... later``.
-
-    Parameters
-    ----------
-    who : str
-    less, more : str
-        What it does where the result is smaller, or larger; of an event, where it no longer
-        happens, or now does.
-    """
-
-    who: str
-    less: str
-    more: str
-
-
-@dataclass(frozen=True)
-class RatioOf:
-    """Which columns a ratio is made of.
-
-    Parameters
-    ----------
-    below, above : str
-        Events under and over the line (nominal and mitigated), of the same units.
-    weight : str, optional
-        A number: how often a unit happens.
-    cluster : str, optional
-        A number that runs share which hang together; they count as one unit.
-    only : (column, class), optional
-        Of which runs: those of this class.
-    """
-
-    below: str
-    above: str
-    weight: str | None = None
-    cluster: str | None = None
-    only: tuple[str, str] | None = None
-
-    def reads(self) -> tuple[str, ...]:
-        """Return the names of all columns it reads."""
-        names = (self.below, self.above, self.weight, self.cluster, self.only and self.only[0])
-        return tuple(name for name in names if name)
-
-
-@dataclass(frozen=True)
-class Result:
-    """One column of a study's results.
-
-    Parameters
-    ----------
-    name : str
-        With its unit, for example ``declaration_time_s.radar``.
-    kind : {"number", "fraction", "event", "share", "ratio", "class"}
-        A number may be NaN (no value in this run), and so may a fraction, which lies between 0 and
-        1, as does the interval of its mean; an event is 0 or 1; a share has a second
-        column ``NAME.trials``, and is NaN without trials. A class is a text or None, and stands in
-        no summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
-    meaning : str
-    cut_off : str, optional
-        Name of a further column, a text: where the run's start or end cut this value off (``at the
-        start``, ``never``), nothing where it did not. Results may share one.
-    told : Told, optional
-        How comparisons tell a change of it.
-    block : str, optional
-        The block it is of, if that is not what stands behind the dot of its name.
-    mark : (colour, marker), optional
-        How figures mark that block; a study fills it in.
-    """
-
-    name: str
-    kind: str
-    meaning: str
-    cut_off: str | None = None
-    told: Told | None = None
-    block: str | None = None
-    mark: tuple[str, str] | None = None
-    ratio: RatioOf | None = None
-
-    @property
-    def is_number(self) -> bool:
-        """Whether each run has a number of its own for it."""
-        return self.kind not in (RATIO, CLASS)
 
 
 class Group:

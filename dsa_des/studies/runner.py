@@ -3,21 +3,25 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from dsa_des.errors import SceneError
+from dsa_des.errors import SceneError, UsageError
+from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.replicas.replicas import why_apart
-from dsa_des.studies.chunk import CRASHED, Done, done_of, joined
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.record import CRASHED
+from dsa_des.results.rows import Rows, StoredRows
+from dsa_des.results.tables import Expected, Tables
+from dsa_des.studies.chunk import Done, done_of, joined
 from dsa_des.studies.executors import Executor
-from dsa_des.studies.explained import keep_explained
-from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.record import results_of
-from dsa_des.studies.stored_rows import StoredRows
+from dsa_des.studies.identity import record_of, results_of
+from dsa_des.studies.models import keep_explained
 from dsa_des.studies.study import Chunk, Study
-from dsa_des.studies.summary import Rows
 
 
 @dataclass
@@ -56,16 +60,7 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run what is missing of a study into its folder.
-
-    Parameters
-    ----------
-    study : Study
-    folder : StudyFolder
-        Open.
-    executor : Executor
-    report : callable
-        Told of every chunk that is done.
+    """Run what is missing of a study into its open folder; `report` is called after every chunk.
 
     Raises
     ------
@@ -180,6 +175,55 @@ def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:
         if not np.isnan(estimate.half_width) and estimate.half_width <= stop.half_width:
             found.add(int(cell))
     return found
+
+
+#: Replicas whose random draws an analytic answer is averaged over.
+_EXPECTED_OVER = 64
+
+
+def tables_of(study: Study, folder: StudyFolder) -> Tables:
+    """Return the tables of a study's results, with the analytic answers of its scenes."""
+    return Tables(record_of(study), folder, _expected(study))
+
+
+def _expected(study: Study) -> Expected:
+    """Return the analytic answers at every place, averaged over draws and encounters."""
+    sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
+    many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
+    for cell in range(len(study.cells)):
+        labels = study.labels(cell)
+        at = tuple(
+            float(labels[axis.column]) if axis.numeric else str(labels[axis.column])
+            for axis in study.axes
+            if axis.column not in study.over
+        )
+        try:
+            scene = study.scene(cell)
+            metrics = [spec.build(scene) for spec in study.metrics]
+            for number in range(many):
+                own = scene_of(scene, study.replica(number, cell))
+                for metric in metrics:
+                    for name, value in metric.expected(own).items():
+                        sums.setdefault((name, at), []).append(value)
+        except (SceneError, ValueError):
+            continue
+        if not sums:  # no metric of this study knows any
+            return {}
+    return {key: sum(values) / len(values) for key, values in sums.items()}
+
+
+def draw_run(study: Study, folder: StudyFolder, cell: int, replica: int) -> list[Path]:
+    """Run one replica of a cell again and draw it as ``dsa-des run`` does."""
+    from dsa_des.running.recorded_run import record_run
+
+    if cell >= len(study.cells) or replica >= study.replicas:
+        return []
+    scene = scene_of(study.scene(cell), study.replica(replica, cell))
+    target = folder.path / f"run-cell-{cell}-replica-{replica}"
+    if target.is_symlink():
+        raise UsageError(f"{target}: is a link; the figures of a run are in a folder")
+    record_run(scene, target)
+    return sorted(target.glob("*.png"))
 
 
 class Clock:

@@ -6,7 +6,6 @@ gives never depends on who ran it.
 """
 
 import math
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -17,14 +16,13 @@ from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.errors import Problem
 from dsa_des.replicas.changed_scene import Replica
+from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
 from dsa_des.scene.overrides import set_value, swap_type
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.draws import Draw, as_text, replica_seed
+from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
-from dsa_des.studies.requirements import Requirement
-from dsa_des.studies.sample import member_seed
 from dsa_des.studies.study_tables import existing_file
 
 
@@ -57,15 +55,6 @@ class MetricSpec:
 
 
 @dataclass(frozen=True)
-class StopWhen:
-    """When a cell has enough replicas: half-width of a result's confidence interval."""
-
-    metric: str
-    half_width: float
-    batch: int
-
-
-@dataclass(frozen=True)
 class Chunk:
     """Some consecutive runs: for each cell, a range of replicas."""
 
@@ -77,13 +66,7 @@ class Chunk:
 
 
 class StudyCells(Sequence[tuple[int, ...]]):
-    """The cells of a study, each made when it is asked for; the last axis runs fastest.
-
-    Parameters
-    ----------
-    sizes : iterable of int
-        How many values each axis has.
-    """
+    """The cells of a study, each made when it is asked for; the last axis runs fastest."""
 
     def __init__(self, sizes: Iterable[int]) -> None:
         self._sizes = tuple(sizes)
@@ -118,59 +101,37 @@ class StudyCells(Sequence[tuple[int, ...]]):
 
 @dataclass
 class Study:
-    """A study that can be run.
-
-    Parameters
-    ----------
-    path, scene_path : Path
-    title : str
-    seed : int
-    replicas : int
-        Per cell; with `stop_when` the most.
-    axes, draws, metrics : tuple
-    sets : tuple of (key, value)
-        Set in every cell.
-    swaps : tuple of (block, type)
-        Made in every cell.
-    over : tuple of str
-        Columns of axes that are a sample (of encounters): statistics are taken over them, and each
-        member has seeds and draws of its own.
-    baseline : (column, label) or None
-        With which value of which axis the others are compared.
-    stop_when : StopWhen or None
-    confidence : float
-    interval : {"t", "bootstrap"}
-    figures : tuple of dict
-    requirements : tuple of Requirement
-    compare_weight : str, optional
-        The result that weighs units where events are compared.
-    runs_per_chunk : int
-    base : SceneFile
-        The scene's tables.
-    tables : dict
-        The study's own tables, with paths that do not depend on where it stands.
-    """
+    """A study that can be run."""
 
     path: Path
     scene_path: Path
     title: str
     seed: int
+    #: Per cell; with `stop_when` the most.
     replicas: int
     axes: tuple[Axis, ...]
     draws: tuple[Draw, ...]
     metrics: tuple[MetricSpec, ...]
+    #: Set in every cell.
     sets: tuple[tuple[str, Any], ...]
+    #: Made in every cell.
     swaps: tuple[tuple[str, str], ...]
+    #: Columns of axes that are a sample (of encounters): statistics are taken over them, and each
+    #: member has seeds and draws of its own.
     over: tuple[str, ...]
+    #: With which value of which axis the others are compared.
     baseline: tuple[str, Any] | None
     stop_when: StopWhen | None
     confidence: float
     interval: str
-    figures: tuple[dict[str, Any], ...]
+    figures: tuple[FigureRecord, ...]
     runs_per_chunk: int
+    #: The scene's tables.
     base: SceneFile
+    #: The study's own tables, with paths that do not depend on where it stands.
     tables: dict[str, Any]
     requirements: tuple[Requirement, ...] = ()
+    #: The result that weighs units where events are compared.
     compare_weight: str | None = None
 
     @property
@@ -250,21 +211,6 @@ class Study:
                     runs, room, number = [], self.runs_per_chunk, number + 1
         if runs:
             yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
-
-
-def run_command(
-    scene: str,
-    seed: int,
-    swaps: Iterable[tuple[str, str]],
-    sets: Iterable[tuple[str, str]],
-) -> str:
-    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
-    words = ["dsa-des", "run", scene, "--seed", str(seed)]
-    for block, name in swaps:
-        words += ["--swap", f"{block}={name}"]
-    for key, value in sets:
-        words += ["--set", f"{key}={value}"]
-    return shlex.join(words)
 
 
 def set_text(value: Any) -> str:

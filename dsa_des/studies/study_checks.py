@@ -9,22 +9,14 @@ from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.results.record import CLASS, FRACTION, NUMBER, SHARE, TRIALS, Result
+from dsa_des.results.summary import of_series
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.metric import (
-    CLASS,
-    FRACTION,
-    NUMBER,
-    SHARE,
-    TRIALS,
-    Metric,
-    Result,
-    check_recorded,
-)
-from dsa_des.studies.series_figure import of_series
+from dsa_des.studies.metric import Metric, check_recorded
 from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -36,21 +28,8 @@ _MOST_SCENES = 64
 def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    Parameters
-    ----------
-    study : Study
-        What could be read of it.
-    file : SceneFile
-        The study file, for messages.
-    scene : Scene
-        Without axes: what else is wrong is said of it where no cell has a scene that fits.
-    whole : bool
-        Whether all of it could be read; names of results are checked only then.
-
-    Returns
-    -------
-    list of Problem
-        Everything that is wrong.
+    What is wrong is said of `file`, the study's, and of the `scene` without axes where no cell has
+    one that fits. Names of results are checked only where the `whole` study could be read.
     """
     problems: list[Problem] = []
 
@@ -178,23 +157,23 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
             message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
             add(("requirements", number, "metric"), message, wanted.metric)
     for number, figure in enumerate(study.figures):
-        if figure["kind"] == "series":
-            if not of_series(str(figure["metric"]), results):
+        if figure.kind == "series":
+            if not of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
-                add(("figures", number, "metric"), message, str(figure["metric"]))
-        elif figure["kind"] != "run" and figure["metric"] not in names:
+                add(("figures", number, "metric"), message, str(figure.metric))
+        elif figure.kind != "run" and figure.metric not in names:
             message = "no metric of the study gives it"
-            message += did_you_mean(str(figure["metric"]), names)
-            add(("figures", number, "metric"), message, str(figure["metric"]))
-        elif figure["kind"] in ("histogram", "cdf") and (
-            results[figure["metric"]].kind not in (NUMBER, FRACTION, SHARE)
+            message += did_you_mean(str(figure.metric), names)
+            add(("figures", number, "metric"), message, str(figure.metric))
+        elif figure.kind in ("histogram", "cdf") and (
+            results[str(figure.metric)].kind not in (NUMBER, FRACTION, SHARE)
         ):
             spread = (NUMBER, FRACTION, SHARE)
             numbers = [name for name in names if results[name].kind in spread]
-            what = {"event": "an event, 0 or 1"}.get(results[figure["metric"]].kind, "a ratio")
-            message = f"is {what}: a {figure['kind']} shows how numbers are spread"
+            what = {"event": "an event, 0 or 1"}.get(results[str(figure.metric)].kind, "a ratio")
+            message = f"is {what}: a {figure.kind} shows how numbers are spread"
             message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""
-            add(("figures", number, "metric"), message, str(figure["metric"]))
+            add(("figures", number, "metric"), message, str(figure.metric))
 
 
 def _check_axes(study: Study, add: Callable[..., None]) -> None:

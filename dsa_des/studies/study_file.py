@@ -14,6 +14,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
+from dsa_des.results.record import StopWhen
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key
 from dsa_des.scene.overrides import apply_set
@@ -22,12 +23,16 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
-from dsa_des.studies.figure_tables import read_figures
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.requirements import read_requirements
-from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
+from dsa_des.studies.study import MetricSpec, Study, changed_scene
 from dsa_des.studies.study_checks import cell_problems
-from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
+from dsa_des.studies.study_tables import (
+    flat_draws,
+    flat_values,
+    read_figures,
+    read_requirements,
+    resolved,
+)
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
@@ -43,13 +48,7 @@ def read_study(
 ) -> Study:
     """Read and check a study.
 
-    Parameters
-    ----------
-    path : path of the TOML file
-    swaps : iterable of (block, types)
-        Further swap axes.
-    sets : iterable of str
-        Changes of the study itself, as ``key=value``.
+    `swaps` are further swap axes; `sets` change the study itself, as ``key=value``.
 
     Raises
     ------
@@ -83,26 +82,28 @@ def study_of_tables(
 ) -> Study:
     """Return a study of a scene that was read already.
 
-    Parameters
-    ----------
-    tables : dict
-        As a study file would hold them, without ``scene``, ``set`` and ``swap``.
-    base : SceneFile
-        The scene's tables.
-    swaps : sequence of (block, type)
-    sets : sequence of (key, value)
-        Made and set in every cell.
+    `tables` are as a study file would hold them, without ``scene``, ``set`` and ``swap``; `swaps`
+    and `sets` are made in every cell.
 
     Raises
     ------
     SceneError
         With every problem found.
     """
-    return _GivenReader(tables, base, swaps, sets).study(())
+    return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 
 
 class _StudyReader:
-    def __init__(self, file: SceneFile) -> None:
+    """Reads a study; its scene, and changes of every cell, may be given beside its tables."""
+
+    def __init__(
+        self,
+        file: SceneFile,
+        base: SceneFile | None = None,
+        swaps: Sequence[tuple[str, str]] = (),
+        sets: Sequence[tuple[str, Any]] = (),
+    ) -> None:
+        self._base, self._swaps, self._sets = base, swaps, sets
         self.file = file
         self.data = file.data
         self.problems: list[Problem] = []
@@ -194,18 +195,20 @@ class _StudyReader:
         return value
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        flat = flat_values(self.table("set"))
-        return tuple(flat.items())
+        return (*self._sets, *flat_values(self.table("set")).items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
-        return tuple(
+        named = [
             (block, str(absolute(name)) if isinstance(name, str) else str(name))
             for block, name in self.table("swap").items()
-        )
+        ]
+        return (*self._swaps, *named)
 
     # -- the base scene --------------------------------------------------------------------
 
     def scene(self) -> tuple[SceneFile | None, Scene | None]:
+        if self._base is not None:
+            return self.checked(self._base)
         name = self.data.get("scene")
         if not isinstance(name, str):
             self.add(("scene",), "is required: the TOML file of the scene that is studied")
@@ -360,26 +363,3 @@ class _StudyReader:
             self.add(("stop_when", "batch"), "must be a whole number of 2 or more", batch)
             return None
         return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
-
-
-class _GivenReader(_StudyReader):
-    """Reads a study whose scene, and what is changed in it, are not in its tables."""
-
-    def __init__(
-        self,
-        tables: dict[str, Any],
-        base: SceneFile,
-        swaps: Sequence[tuple[str, str]],
-        sets: Sequence[tuple[str, Any]],
-    ) -> None:
-        super().__init__(SceneFile(Path("study"), tables))
-        self._base, self._swaps, self._sets = base, tuple(swaps), tuple(sets)
-
-    def scene(self) -> tuple[SceneFile | None, Scene | None]:
-        return self.checked(self._base)
-
-    def swaps(self) -> tuple[tuple[str, str], ...]:
-        return self._swaps
-
-    def sets(self) -> tuple[tuple[str, Any], ...]:
-        return self._sets

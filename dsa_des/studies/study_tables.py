@@ -1,12 +1,16 @@
-"""Tables of a study file, flattened to dotted keys or made independent of where they stand."""
+"""Tables of a study file: figures, requirements, draws, and paths seen from anywhere."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from dsa_des.block.component import SourcedText
-from dsa_des.studies.draws import KINDS, as_text
+from dsa_des.errors import did_you_mean
+from dsa_des.results.record import FigureRecord, Requirement, as_text
+from dsa_des.scene.scene_file import Key
+from dsa_des.studies.axes import Axis
+from dsa_des.studies.draws import KINDS
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
@@ -93,3 +97,148 @@ def flat_draws(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             found[key] = value
     return found
+
+
+FIGURES = {
+    "axis": ("metric", "axis", "lines"),
+    "heat": ("metric", "x", "y"),
+    "map": ("metric", "x", "y", "limit"),
+    "polar": ("metric", "axis"),
+    "histogram": ("metric", "axis"),
+    "cdf": ("metric", "axis"),
+    "series": ("metric", "freedom"),
+    "run": ("cell", "replica"),
+}
+_MOST_FREEDOM = 1e6
+_AXES = ("axis", "lines", "x", "y")
+
+
+def read_figures(
+    items: Any,
+    axes: tuple[Axis, ...],
+    replicas: int,
+    column: Callable[[Key, Any, tuple[Axis, ...]], str | None],
+    add: Callable[..., None],
+) -> tuple[FigureRecord, ...]:
+    """Return the figures of a study.
+
+    `column` gives the column of the axis that a name means, or reports that there is none; `add`
+    takes the key, the message and the value of a problem.
+    """
+    if not isinstance(items, list):
+        add(("figures",), "must be a list of tables ([[figures]])")
+        return ()
+    most = {"cell": math.prod(len(axis.labels) for axis in axes), "replica": replicas}
+    found: list[FigureRecord] = []
+    for number, item in enumerate(items):
+        key: Key = ("figures", number)
+        if not isinstance(item, dict):
+            add(key, "must be a table ([[figures]])", item)
+            continue
+        kind = item.get("kind", "axis")
+        if not isinstance(kind, str) or kind not in FIGURES:
+            add((*key, "kind"), f"there is no such figure{did_you_mean(str(kind), FIGURES)}", kind)
+            continue
+        figure: dict[str, Any] = {"kind": str(kind)}
+        for name, value in item.items():
+            allowed = ("kind", "title", *FIGURES[kind])
+            if name not in allowed:
+                hint = did_you_mean(name, allowed)
+                add((*key, name), f"unknown key of a {kind} figure{hint}")
+            elif name in _AXES:
+                figure[name] = column((*key, name), value, axes) or ""
+            elif name in most:
+                whole = isinstance(value, int) and not isinstance(value, bool)
+                if not whole or not 0 <= value < most[name]:
+                    message = f"must be the number of a {name} of this study: 0 to {most[name] - 1}"
+                    add((*key, name), message, value)
+                figure[name] = value
+            elif name == "freedom":
+                degrees = number_of(value)
+                if degrees is None or not 0.0 < degrees <= _MOST_FREEDOM:
+                    message = "must be degrees of freedom: above 0, at most "
+                    add((*key, name), f"{message}{_MOST_FREEDOM:g}", value)
+                figure[name] = degrees
+            elif name == "limit":
+                figure["limits"] = _limits(value)
+                if not figure["limits"]:
+                    add((*key, name), "must be a finite number, or a list of them", value)
+            elif name != "kind":
+                figure[name] = value
+        if kind != "run" and "metric" not in figure:
+            add(key, "needs a metric: the name of a result")
+            figure["metric"] = ""
+        if kind in ("heat", "map") and len(axes) < 2:
+            what = "heat map" if kind == "heat" else "map"
+            add(key, f"a {what} needs two axes; the study has {len(axes)}")
+        chosen = [axis for axis in axes if figure.get("axis", axes[0].column) == axis.column]
+        if kind == "polar" and chosen and not chosen[0].numeric:
+            add(key, f"a polar figure needs an axis in degrees; {chosen[0].column} is no number")
+        # What is wrong with it is reported, and then no study is made.
+        found.append(FigureRecord.model_construct(**figure))
+    return tuple(found)
+
+
+def _limits(value: Any) -> list[float]:
+    """Return the limits that a figure draws contours of; none where one is no finite number."""
+    numbers = [number_of(item) for item in (value if isinstance(value, list) else [value])]
+    found = [number for number in numbers if number is not None]
+    return found if len(found) == len(numbers) else []
+
+
+_KEYS = ("metric", "axis", "most", "least", "cheaper")
+
+
+def read_requirements(
+    items: Any,
+    axes: tuple[Axis, ...],
+    column: Callable[[Key, Any, tuple[Axis, ...]], str | None],
+    add: Callable[..., None],
+) -> tuple[Requirement, ...]:
+    """Return the requirements of a study file.
+
+    `column` and `add` are those of `read_figures`.
+    """
+    if not isinstance(items, list):
+        add(("requirements",), "must be a list of tables ([[requirements]])")
+        return ()
+    found = []
+    for number, item in enumerate(items):
+        key: Key = ("requirements", number)
+        if not isinstance(item, dict):
+            add(key, "must be a table ([[requirements]])", item)
+            continue
+        for name in item:
+            if name not in _KEYS:
+                add((*key, name), f"unknown key of a requirement{did_you_mean(name, _KEYS)}")
+        limits = [name for name in ("most", "least") if name in item]
+        if len(limits) != 1:
+            add(key, "needs one limit: most = NUMBER, or least = NUMBER")
+            continue
+        limit = number_of(item[limits[0]])
+        if limit is None:
+            add((*key, limits[0]), "must be a finite number", item[limits[0]])
+        said = {
+            "metric": "the name of a result", "axis": "along which the cheapest is looked for",
+        }  # fmt: skip
+        for name, what in said.items():
+            if not isinstance(item.get(name), str):
+                add((*key, name), f"is required: {what}")
+        cheaper = item.get("cheaper", "first")
+        if cheaper not in ("first", "last"):
+            message = "must be 'first' or 'last': which end of the axis is the cheap one"
+            add((*key, "cheaper"), message, cheaper)
+        if not isinstance(item.get("axis"), str) or not isinstance(item.get("metric"), str):
+            continue
+        along = column((*key, "axis"), item["axis"], axes)
+        if along is not None and limit is not None:
+            below, last = limits[0] == "most", cheaper == "last"
+            found.append(Requirement(str(item["metric"]), along, limit, below, last))
+    return tuple(found)
+
+
+def number_of(value: Any) -> float | None:
+    """Return a finite number of a file, or None."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)

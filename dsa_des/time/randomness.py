@@ -162,14 +162,6 @@ class Stream:
         high, low = (w0, w1) if draw % 2 == 0 else (w2, w3)
         return ((high >> np.uint64(5)) * 67108864.0 + (low >> np.uint64(6))) * 2.0**-53
 
-    def one_uniform(self, target: int, scan: int) -> float:
-        """Return the first draw of `uniform` for one target and scan, with plain integers."""
-        w0, w1, _, _ = _ten_rounds(
-            ((scan >> 32) & 0xFFFF) << 16, scan & _LOW, target & _LOW, target >> 32,
-            self._round_keys,
-        )  # fmt: skip
-        return float(((w0 >> 5) * 67108864.0 + (w1 >> 6)) * 2.0**-53)
-
     def normal(self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0) -> FloatArray:
         """Return standard normal draws (Box-Muller), keyed as in `uniform`."""
         w0, w1, w2, w3 = self._words(targets, scans, draw)

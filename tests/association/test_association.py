@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.association.assignment import global_nearest, nearest
-from components.association.gates import gate_threshold
+from components.association.assignment import gate_threshold, global_nearest, nearest
 from components.association.jpda import exact, marginals, propagated
 
 

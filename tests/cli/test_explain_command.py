@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.cli import main
-from dsa_des.commands.explain import measured_shares
+from dsa_des.commands.scene import measured_shares
 from dsa_des.scene.scene import load_scene
 
 SCENE = Path(__file__).parent.parent.parent / "configs" / "first_light.toml"

@@ -129,18 +129,18 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("dsa_des.commands.run.load", ["run", "{scene}"]),
+        ("dsa_des.commands.scene.load", ["run", "{scene}"]),
         ("dsa_des.running.recorded_run.to_toml", ["run", "{scene}", "--duration", "1"]),
-        ("dsa_des.commands.check.load", ["check", "{scene}"]),
+        ("dsa_des.commands.scene.load", ["check", "{scene}"]),
         ("dsa_des.commands.graph._layout", ["graph", "{scene}", "--png"]),
-        ("dsa_des.commands.explain.load", ["explain", "{scene}"]),
+        ("dsa_des.commands.scene.load", ["explain", "{scene}"]),
         ("dsa_des.commands.cost.climb", ["cost", "{scene}", "--block", "transform"]),
-        ("dsa_des.commands.components.show_components", ["components"]),
+        ("dsa_des.commands.catalogue.show_components", ["components"]),
         ("dsa_des.commands.study.read_study", ["study", "study.toml"]),
         ("dsa_des.commands.compare.run_into", ["compare", "{scene}", "{scene}"]),
         ("components.thesis.reproduce.make", ["reproduce", "table-4.1"]),
         ("components.benchmark.run_benchmark.fresh", ["benchmark", "--quick"]),
-        ("dsa_des.commands.plugins.registered", ["--help"]),
+        ("dsa_des.commands.group.registered", ["--help"]),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )

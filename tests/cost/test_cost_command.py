@@ -16,8 +16,8 @@ from components.radar.ladder import DETECTION
 from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
 from dsa_des.commands.cost import ladders_to_climb
+from dsa_des.costs.climb import climb
 from dsa_des.costs.replay import run_rung
-from dsa_des.costs.study import climb
 from dsa_des.costs.variants import Choice, Variants
 
 SCENE = Path(__file__).parents[2] / "configs" / "first_light.toml"

@@ -7,7 +7,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.registry import find
 from dsa_des.cli import main
-from dsa_des.costs.front import on_front, parse_budgets
+from dsa_des.costs.climb import on_front, parse_budgets
 from dsa_des.errors import UsageError
 
 LADDERS = [

@@ -81,6 +81,40 @@ def test_the_tracker_smooths_and_with_gain_1_holds_what_was_measured(configs: Pa
     assert np.abs(np.diff(smooth["elevation_rad"][own])).sum() < steps
 
 
+def tracked(configs: Path, tracker: str, *sets: str) -> dict[str, Any]:
+    scene = configs / "first_light.toml"
+    swaps = [f"tracker={tracker}", "fusion=fusion.pass_through"]
+    return recorded(scene, sets=[*SHORT, "duration_s=8", *sets], swaps=swaps)["state_tracks"]
+
+
+def test_the_filter_that_fades_is_less_sure_and_without_fading_the_extended_kalman(
+    configs: Path,
+) -> None:
+    plain = tracked(configs, "tracking.ekf")
+    same = tracked(configs, f"{MODULE}:MyFilter", "blocks.tracker.fading_per_s=0")
+    fading = tracked(configs, f"{MODULE}:MyFilter")
+    assert len(plain["tick"]) > 50
+    for column in ("tick", "north_m", "covariance_00_m2"):
+        np.testing.assert_array_equal(same[column], plain[column])
+    sure, unsure = (np.nanmedian(one["covariance_33_m2_s2"]) for one in (plain, fading))
+    assert unsure > 1.05 * sure
+
+
+def test_the_association_takes_only_what_is_beyond_doubt(configs: Path) -> None:
+    clutter = ["blocks.eo.false_alarms_per_frame=100"]
+    plain = tracked(configs, "tracking.ekf", *clutter)
+    cautious = tracked(configs, f"{MODULE}:MyAssociation", *clutter)
+    hits = {}
+    for name, found in (("plain", plain), ("cautious", cautious)):
+        held = np.isin(found["track_status"], ("confirmed", "coasted"))
+        hits[name] = np.mean((found["updated_s"] == found["state_s"])[held])
+    assert 0 < hits["cautious"] < hits["plain"]
+    alone = tracked(configs, f"{MODULE}:MyAssociation", "blocks.traffic.intruders[1].north_m=90000")
+    known = tracked(configs, "tracking.ekf", "blocks.traffic.intruders[1].north_m=90000")
+    assert len(known["tick"]) > 50
+    np.testing.assert_array_equal(alone["north_m"], known["north_m"])
+
+
 def test_the_avoidance_turns_once_when_a_track_is_near(configs: Path) -> None:
     found = recorded(
         configs / "benchmark/manoeuvres.toml",

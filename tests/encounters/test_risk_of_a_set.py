@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from dsa_des.cli import main
-from dsa_des.studies.ratio import paired_ratio
+from dsa_des.results.ratio import paired_ratio
 from tests.encounters.test_closed_loop_risk import SCENE
 
 STUDY = """\

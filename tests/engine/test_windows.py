@@ -2,9 +2,12 @@
 
 import random
 
+import engine_blocks
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from dsa_des.cli import main
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.windows import ReplicaWindows
@@ -16,6 +19,7 @@ from dsa_des.scene.scene import load_scene
 from dsa_des.time.timeline import ReplicaTime
 
 LOOP = "configs/benchmark/manoeuvres.toml"
+FEEDBACK = '{ from = "end", to = "cue.cue", delay = "1 scan", holds = "nothing" }'
 
 
 def all_of(windows):
@@ -27,40 +31,49 @@ def all_of(windows):
 
 
 @pytest.mark.parametrize(
-    ("longest", "cuts", "expected"),
-    [
-        (4, (), [(0, 4), (4, 8), (8, 10)]),
-        (10, (), [(0, 10)]),
-        (99, (3, 7), [(0, 3), (3, 7), (7, 10)]),
-        (99, (0, 10, 12), [(0, 10)]),
-    ],
+    ("longest", "expected"), [(4, [(0, 4), (4, 8), (8, 10)]), (10, [(0, 10)]), (99, [(0, 10)])]
 )
-def test_equal_windows_cover_a_run_once(longest, cuts, expected):
-    assert all_of(EqualWindows(10, longest, cuts)) == expected
-    windows = EqualWindows(10, longest, cuts)
+def test_equal_windows_cover_a_run_once(longest, expected):
+    assert all_of(EqualWindows(10, longest)) == expected
+    windows = EqualWindows(10, longest)
     windows.limit(0)  # no window is shorter than a tick
     assert all_of(windows) == [(k, k + 1) for k in range(10)]
 
 
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
-@pytest.mark.parametrize("cuts", [(), (3, 15, 40, 71)])
-def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest, cuts):
+def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
     time = ReplicaTime.of_replicas(4, 10)
-    found = all_of(ReplicaWindows(time, longest, cuts))
+    found = all_of(ReplicaWindows(time, longest))
     ticks = np.concatenate([np.arange(*window) for window in found])
     ran = ticks[ticks % time.span_ticks < time.run_ticks]
     starts = np.arange(4)[:, None] * time.span_ticks
     assert ran.tolist() == (starts + np.arange(10)).ravel().tolist()
     assert all(start % time.span_ticks < time.run_ticks for start, _ in found)
-    if not cuts:
-        assert len(found) == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
+    assert len(found) == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
+
+
+@pytest.mark.parametrize("able", [True, False])
+@pytest.mark.parametrize("back", ['"end -> sink"', FEEDBACK])
+def test_check_says_which_block_slows_a_loop(lab, monkeypatch, able, back):
+    for cls in (engine_blocks.Pulse, engine_blocks.Cued):
+        monkeypatch.setattr(cls, "rewindable", True)
+    monkeypatch.setattr(engine_blocks.Relay, "rewindable", able)
+    path = lab.write(
+        {"src": "Pulse; scan_rate_hz = 20", "cue": "Cued; scan_rate_hz = 10", "end": "Relay",
+         "sink": "Relay"},
+        ['"src -> cue.in"', '"cue -> end"', '"cue -> sink"', back][: 3 if "sink" in back else 4],
+    )  # fmt: skip
+    said = CliRunner().invoke(main, ["check", str(path)]).output
+    slowed = back == FEEDBACK and not able
+    assert ("feedback loop of cue, end runs scan by scan" in said) == slowed
+    assert ("end (" in said and "rewindable is False" in said) == slowed
 
 
 class Wilful(Timeline):
     """One run in windows of lengths that a die throws."""
 
-    def windows(self, longest_ticks, cuts, rewinder):
-        inner = super().windows(longest_ticks, cuts, rewinder)
+    def windows(self, longest_ticks, rewinder):
+        inner = super().windows(longest_ticks, rewinder)
         self.made = WilfulWindows(inner)
         return self.made
 

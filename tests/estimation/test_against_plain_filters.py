@@ -7,22 +7,35 @@ import plain_filters as plain
 import pytest
 
 from components.association.jpda import exact, marginals
-from components.estimation import modes
-from components.estimation.frame import Place
+from components.estimation.estimator import (
+    Estimates,
+    combined,
+    innovation_squared,
+    log_mixture,
+    pair_measurement,
+)
+from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind
 from components.estimation.motion import predict
-from components.tracking.filter_bank import innovation_squared, log_mixture
-from components.tracking.imm import InteractingModels, InteractingParameters
-from components.tracking.ukf import Unscented, UnscentedParameters
+from components.tracking.filters import (
+    InteractingModels,
+    InteractingParameters,
+    Unscented,
+    UnscentedParameters,
+)
 
 COUNT = 4
 KINDS = [Kind(False), Kind(True), Kind(False, True), Kind(True, True)]
 
 
-def bank_of(kind, parameters):
+def estimator_of(kind, parameters):
     block = object.__new__(kind)
     block.p = parameters
-    return block.bank()
+    return block.estimator()
+
+
+def sizes_of(estimator):
+    return [model.size for model in estimator.models]
 
 
 def cases(sizes, seed):
@@ -38,7 +51,7 @@ def cases(sizes, seed):
         xs.append(x)
         ps.append(np.einsum("ikn,jkn->ijn", root, root) / size)
     turn = np.stack([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(COUNT)], axis=-1)
-    place = Place(rng.normal(0, 300, (3, COUNT)), turn, rng.normal(0, 50, (3, COUNT)))
+    place = SensorPose(rng.normal(0, 300, (3, COUNT)), turn, rng.normal(0, 50, (3, COUNT)))
     weights = rng.dirichlet(np.ones(len(sizes)), COUNT).T
     return rng, xs, ps, weights, rng.uniform(0.05, 3.0, COUNT), place
 
@@ -71,17 +84,17 @@ DEGREE = math.pi / 180
 
 @pytest.mark.parametrize("kind", KINDS, ids=str)
 def test_interacting_filters(kind):
-    bank = bank_of(InteractingModels, PARAMETERS)
-    rng, xs, ps, mu, dt, place = cases(bank.sizes, KINDS.index(kind))
-    ahead = bank.predict(xs, ps, mu, dt)
+    estimator = estimator_of(InteractingModels, PARAMETERS)
+    rng, xs, ps, mu, dt, place = cases(sizes_of(estimator), KINDS.index(kind))
+    ahead = estimator.predict(Estimates(xs, ps, mu), dt)
     z, r, h = looks(rng, kind, ahead[0][0], place)
     every = np.arange(COUNT)
-    moments = bank.moments(kind, ahead[0], ahead[1], place)
-    said = bank.measure(moments, every, z, r, None, ahead[2])
-    after = bank.update(*ahead, every, said, every)
+    moments = estimator.expect(kind, ahead, place)
+    said = pair_measurement(moments, every, z, r, None, ahead[2])
+    after = estimator.update(ahead, every, said, every)
     nis = innovation_squared(said, ahead[2], every)
     mixture = log_mixture(ahead[2], said.log_likelihoods)
-    whole = modes.combined(after[0], after[1], after[2])
+    whole = combined(after)
     fresh = [0.0, (4.0 * DEGREE) ** 2, 4.0]
     q = [(0.7, 0.0), (0.3, 0.8 * DEGREE**2), (0.4, 0.0)]
     for n in range(COUNT):
@@ -119,9 +132,9 @@ def test_interacting_filters(kind):
 
 def test_rates_by_default_leave_straight_flight_every_minute():
     for models in (("velocity", "turn"), ("turn", "velocity", "acceleration")):
-        bank = bank_of(InteractingModels, InteractingParameters(models=models))
+        estimator = estimator_of(InteractingModels, InteractingParameters(models=models))
         for i, name in enumerate(models):
-            leaves = sum(bank.rates_per_s[i][j] for j in range(len(models)) if j != i)
+            leaves = sum(estimator.rates_per_s[i][j] for j in range(len(models)) if j != i)
             assert leaves == pytest.approx(1 / 60 if name == "velocity" else 1 / 100)
 
 
@@ -129,13 +142,15 @@ def test_rates_by_default_leave_straight_flight_every_minute():
 @pytest.mark.parametrize("kind", KINDS, ids=str)
 def test_unscented_filter(kind, shape):
     keys = dict(zip(("alpha", "beta", "kappa"), shape, strict=True))
-    bank = bank_of(Unscented, UnscentedParameters(acceleration_intensity_m2_s3=0.7, **keys))
+    estimator = estimator_of(
+        Unscented, UnscentedParameters(acceleration_intensity_m2_s3=0.7, **keys)
+    )
     rng, xs, ps, mu, dt, place = cases([6], 7)
-    ahead = bank.predict(xs, ps, mu, dt)
+    ahead = estimator.predict(Estimates(xs, ps, mu), dt)
     z, r, h = looks(rng, kind, ahead[0][0], place)
     every = np.arange(COUNT)
-    said = bank.measure(bank.moments(kind, *ahead[:2], place), every, z, r, None, mu)
-    after = bank.update(*ahead, every, said, every)
+    said = pair_measurement(estimator.expect(kind, ahead, place), every, z, r, None, mu)
+    after = estimator.update(ahead, every, said, every)
     for n in range(COUNT):
         f = plain.slope(lambda s, t=dt[n]: plain.move(s, t), xs[0][:, n])
         x, p = plain.move(xs[0][:, n], dt[n]), f @ ps[0][:, :, n] @ f.T
@@ -159,9 +174,9 @@ def test_shares_of_detections_by_all_joint_events():
 
 
 def test_models_move_alone_as_they_do_together():
-    bank = bank_of(InteractingModels, PARAMETERS)
-    _, xs, ps, _, dt, _ = cases(bank.sizes, 11)
-    for model, x, p in zip(bank.models, xs, ps, strict=True):
+    estimator = estimator_of(InteractingModels, PARAMETERS)
+    _, xs, ps, _, dt, _ = cases(sizes_of(estimator), 11)
+    for model, x, p in zip(estimator.models, xs, ps, strict=True):
         moved, _ = predict(model, x, p, dt)
         for n in range(COUNT):
             assert np.allclose(moved[:, n], plain.move(x[:, n], dt[n]), rtol=1e-10, atol=1e-8)

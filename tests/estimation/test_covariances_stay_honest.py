@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.estimation.frame import Place
+from components.estimation.frame import SensorPose
 from components.estimation.kalman import distance_squared, innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.motion import ConstantVelocity, predict
@@ -14,7 +14,7 @@ SIGMA = SigmaPoints()
 
 
 def level_place(count):
-    return Place(np.zeros((3, count)), np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2))
+    return SensorPose(np.zeros((3, count)), np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2))
 
 
 def step(name, model, state, covariance, dt, kind, place, variance):

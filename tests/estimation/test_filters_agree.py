@@ -3,14 +3,16 @@
 import json
 from pathlib import Path
 
+import crooked
 import mpmath
 import numpy as np
 import pymap3d
 import pytest
 from scipy.linalg import expm
 
-from components.estimation import modes
-from components.estimation.frame import Place, place_in_frame
+from components.estimation.estimator import reweighted
+from components.estimation.frame import SensorPose, pose_in_frame
+from components.estimation.interacting_models import mixed, transition_probabilities
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import (
     Kind,
@@ -26,7 +28,6 @@ from components.estimation.motion import (
     predict,
 )
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
-from tests.wiring import crooked
 
 FLIP = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])  # their up is our down
 VECTORS = json.loads(Path(__file__).with_name("stone_soup_vectors.json").read_text())
@@ -42,7 +43,7 @@ def test_every_update_agrees_with_stone_soup(name):
         kind = Kind(measured[-1] is not None)
         values = np.array([v for v in measured if v is not None])[:, np.newaxis]
         variance = np.array(VECTORS["variances"][: kind.size])[:, np.newaxis]
-        place = Place(
+        place = SensorPose(
             (np.array(sensor, dtype=float) * FLIP[:3])[:, np.newaxis], np.eye(3)[:, :, np.newaxis]
         )
         dt = np.array([time_s - last_s])
@@ -68,7 +69,7 @@ def crooked_place(count=1):
     here = (own["lat_deg"], own["lon_deg"], own["alt_m"])
     columns = [np.repeat(float(v), count) for v in (*origin, *here)]
     attitude = np.radians([own["yaw_deg"], own["pitch_deg"], own["roll_deg"]])
-    place = place_in_frame(
+    place = pose_in_frame(
         tuple(columns[:3]), tuple(columns[3:]), tuple(np.repeat(v, count) for v in attitude)
     )
     return place, origin, here
@@ -92,7 +93,7 @@ def test_places_in_the_frame_are_those_of_ecef_and_rotation_matrices():
 def test_derivatives_of_measurements_are_exact():
     place, _, _ = crooked_place()
     velocity = np.array([31.0, -44.0, 3.0])
-    place = Place(place.position_m, place.to_body, velocity[:, np.newaxis])
+    place = SensorPose(place.position_m, place.to_body, velocity[:, np.newaxis])
     state = np.concatenate([place.position_m[:, 0] + [-2100.0, 900.0, -340.0], [20.0, 61.0, -8.0]])
     turn, sensor = place.to_body[:, :, 0], place.position_m[:, 0]
 
@@ -183,10 +184,10 @@ def test_interacting_models_follow_the_textbook(fresh):
     for dt in (0.05, 3.0, 400.0):
         generator = rates - np.diag(rates.sum(axis=1))
         steps = expm(generator * dt)
-        got = modes.transition_probabilities(rates, np.array([0.0, dt]))
+        got = transition_probabilities(rates, np.array([0.0, dt]))
         np.testing.assert_allclose(got[:, :, 1], steps, rtol=1e-12)
         np.testing.assert_allclose(got[:, :, 0], np.eye(3), atol=1e-15)
-        new_states, new_covariances, predicted = modes.mixed(
+        new_states, new_covariances, predicted = mixed(
             [s[:, np.newaxis] for s in states],
             [c[:, :, np.newaxis] for c in covariances],
             probabilities[:, np.newaxis],
@@ -218,6 +219,6 @@ def test_interacting_models_follow_the_textbook(fresh):
     logs = np.array([[-1.0], [-3.0], [-900.0]])
     weights = probabilities * np.exp(logs[:, 0])
     np.testing.assert_allclose(
-        modes.reweighted(probabilities[:, np.newaxis], logs)[:, 0], weights / weights.sum(),
+        reweighted(probabilities[:, np.newaxis], logs)[:, 0], weights / weights.sum(),
         atol=1e-300,
     )  # fmt: skip

@@ -5,11 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from components.estimation import modes
-from components.estimation.frame import Place
+from components.estimation.estimator import (
+    Estimates,
+    ExtendedKalmanFilter,
+    combined,
+    pair_measurement,
+)
+from components.estimation.frame import SensorPose
+from components.estimation.interacting_models import InteractingMultipleModels
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn
-from components.tracking.filter_bank import FilterBank
 
 VECTORS = json.loads(Path(__file__).with_name("imm_vectors.json").read_text())
 
@@ -22,8 +27,9 @@ def apart(covariance, known):
 
 def test_every_update_of_three_models_agrees_with_40_digits():
     velocity, turn, rate, jerk = VECTORS["intensities"]
-    bank = FilterBank(
-        (ConstantVelocity(velocity), CoordinatedTurn(turn, rate), ConstantAcceleration(jerk)),
+    models = ConstantVelocity(velocity), CoordinatedTurn(turn, rate), ConstantAcceleration(jerk)
+    imm = InteractingMultipleModels(
+        tuple(ExtendedKalmanFilter(model) for model in models),
         np.array(VECTORS["rates"]),
     )
     own = [[], [VECTORS["turn"]], [VECTORS["acceleration"]] * 3]
@@ -33,19 +39,20 @@ def test_every_update_of_three_models_agrees_with_40_digits():
     one, last_s = np.zeros(1, dtype=np.int64), 0.0
     for (time_s, *values, sensor), known in zip(VECTORS["looks"], VECTORS["after"], strict=True):
         kind = Kind(values[-1] is not None)
-        place = Place(np.array(sensor, dtype=float)[:, None], np.eye(3)[:, :, None])
+        place = SensorPose(np.array(sensor, dtype=float)[:, None], np.eye(3)[:, :, None])
         measured = np.array([v for v in values if v is not None])[:, None]
         variance = np.array(VECTORS["variances"][: kind.size])[:, None]
-        before = bank.predict(states, covariances, weights, np.array([time_s - last_s]))
+        tracks = Estimates(states, covariances, weights)
+        before = imm.predict(tracks, np.array([time_s - last_s]))
         last_s = time_s
-        moments = bank.moments(kind, *before[:2], place)
-        pairs = bank.measure(moments, one, measured, variance, None, before[2])
-        states, covariances, weights = bank.update(*before, one, pairs, one)
+        moments = imm.expect(kind, before, place)
+        pairs = pair_measurement(moments, one, measured, variance, None, before.weights)
+        states, covariances, weights = after = imm.update(before, one, pairs, one)
         np.testing.assert_allclose(weights[:, 0], known["probabilities"], rtol=1e-9)
         for m in range(3):
             np.testing.assert_allclose(states[m][:, 0], known["states"][m], rtol=1e-9)
             assert apart(covariances[m][:, :, 0], np.array(known["covariances"][m])) < 1e-9
-        mean, spread = modes.combined(states, covariances, weights)
+        mean, spread = combined(after)
         np.testing.assert_allclose(mean[:, 0], known["state"], rtol=1e-9)
         assert apart(spread[:, :, 0], np.array(known["covariance"])) < 1e-9
 

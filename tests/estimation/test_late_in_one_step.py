@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from components.estimation.kalman import innovation, updated
-from components.estimation.late import state_then
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, predict
+from components.estimation.out_of_sequence import retrodiction
 
 RNG = np.random.default_rng(3)
 H = RNG.normal(size=(2, 6))[:, :, np.newaxis]
@@ -37,7 +37,7 @@ def both(model, late, times=(1.0, 1.7, 2.2, 3.0)):
     known = in_order(model, start, [one for k, one in enumerate(given) if k != late])
     then_s, measured = given[late]
     before, now = known[late], known[-1]
-    then = state_then(
+    then = retrodiction(
         model, before[1:], now[1:], np.array([then_s - before[0]]), np.array([now[0] - then_s])
     )
     found = then.carried_over(*now[1:], *corrected(then.state, then.covariance, measured))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.estimation.frame import Place
+from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.modified_polar import moved_in_polar
@@ -77,7 +77,7 @@ def test_ranges_are_not_made_up_from_directions():
     for way in ("polar", "cartesian"):
         rng, target, own = np.random.default_rng(3), truth, np.zeros((3, count))
         for k in range(30 * hz + 1):
-            place = Place(own, axes)
+            place = SensorPose(own, axes)
             seen = expected(kind, target, place) + rng.normal(size=(2, count)) * deviation
             if k == 0:
                 line = np.stack([np.cos(seen[1]) * np.cos(seen[0]),

@@ -152,13 +152,13 @@ def _simulate(argv: list[str]) -> None:
     import click
 
     from dsa_des.cli import _scene_options
-    from dsa_des.commands.plain_errors import plain_errors
+    from dsa_des.commands.group import plain_errors
 
     @click.command()
     @_scene_options
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
-        from dsa_des.commands.loading import load
+        from dsa_des.commands.scene import load
         from dsa_des.files.toml_files import to_toml
         from dsa_des.record.recording import Recorder
         from dsa_des.record.sinks import MemorySink, ObserverSink
@@ -186,10 +186,10 @@ def import_everything() -> None:
     """Import what cases need, once, before any is forked."""
     import importlib
 
-    for module in ("run", "check", "graph", "explain", "study"):
+    for module in ("scene", "graph", "study"):
         importlib.import_module(f"dsa_des.commands.{module}")
     for module in (
-        "dsa_des.record.arrow", "dsa_des.studies.output", "dsa_des.studies.figures", "rich.console",
+        "dsa_des.record.arrow", "dsa_des.results.tables", "dsa_des.results.figures", "rich.console",
         "rich.table", "rich.progress", "matplotlib.figure", "matplotlib.backends.backend_agg",
         "scipy.special", "scipy.stats", "components.display.plan", "trimesh",
         "components.thesis.silhouette_comparison", "components.optical.mesh",

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from components.radar.threshold_radar import ThresholdRadar
-from dsa_des.studies.metric import NUMBER, Metric, Result
+from dsa_des.results.record import NUMBER, Result
+from dsa_des.studies.metric import Metric
 
 
 class OwnRadar(ThresholdRadar):

@@ -15,7 +15,7 @@ from components.metrics.track_scores import (
     innovation_results,
     set_distance,
 )
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 
 def enumerated(distance, cutoff, order):

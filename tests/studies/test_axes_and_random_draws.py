@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.axes import beat_period_s, flatten_axes, parse_axis
 from dsa_des.studies.draws import exact, parse_draw, replica_seed
@@ -125,3 +126,36 @@ def test_an_axis_whose_name_holds_dots_and_brackets_can_be_changed(
     assert study.axes[1].labels == (0, 0.3)
     added = read_study(name, sets=["axes.wires[4].jitter_s=[0, 0.01]"])
     assert added.axes[2].key == "wires[4].jitter_s"
+
+
+STUDY = """
+scene = "first_light"
+replicas = 1
+metrics = ["first_detection"]
+compare = {{ axis = "{key}", baseline = {baseline} }}
+axes.{key} = {values}
+"""
+
+
+def baseline(folder: Path, key: str, values: str, wanted: str) -> object:
+    path = folder / "study.toml"
+    path.write_text(STUDY.format(key=key, values=values, baseline=wanted))
+    return read_study(path).baseline
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "wanted", "label"),
+    [
+        ("blocks.radar.enabled", "[true, false]", "false", "false"),
+        ("blocks.radar.scan_rate_hz", "['7/2', 1]", "'7/2'", 3.5),
+        ("blocks.radar.azimuth_deg", "[[-110, 110], [-60, 60]]", "[-60, 60]", "[-60, 60]"),
+        ("blocks.radar.scan_rate_hz", "[2, 1]", "1.0", 1),
+    ],
+)
+def test_it_is_found(tmp_path: Path, key: str, values: str, wanted: str, label: object) -> None:
+    assert baseline(tmp_path, key, values, wanted) == (key.removeprefix("blocks."), label)
+
+
+def test_a_flag_is_no_number(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="is no value of that axis; allowed: 2, 1"):
+        baseline(tmp_path, "blocks.radar.scan_rate_hz", "[2, 1]", "true")

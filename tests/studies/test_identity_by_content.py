@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.studies.identity import description
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.study_file import read_study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -81,7 +81,7 @@ def changed(path, more):
 
 
 def digest(study="study.toml"):
-    return description(read_study(study))["study_sha256"]
+    return record_of(read_study(study)).study_sha256
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from dsa_des.studies.identity import description
-from dsa_des.studies.sample import identity, member_seed
+from dsa_des.studies.draws import identity, member_seed
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.study_file import read_study
 from tests.studies.encounter_folder import rows_of, write_encounter, write_scene, write_study
 
@@ -78,7 +78,7 @@ def test_a_study_without_a_sample_keeps_its_seed_in_every_cell(folder: Path) -> 
     rows = rows_of(study).to_pylist()
     assert len({row["seed"] for row in rows}) == 3
     sampled = read_study(write_study(folder, '"*.xyz"'))
-    assert description(study)["study_sha256"] != description(sampled)["study_sha256"]
+    assert record_of(study).study_sha256 != record_of(sampled).study_sha256
 
 
 def test_any_axis_can_be_a_sample_and_its_values_are_told_by_themselves(folder: Path) -> None:

@@ -13,10 +13,11 @@ import pytest
 
 from dsa_des.commands.study import finish, run_into
 from dsa_des.errors import UsageError
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.statistics import wilson
 from dsa_des.studies.executors import Dask
-from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Stopped, run_study
-from dsa_des.studies.statistics import wilson
 from dsa_des.studies.study_file import read_study
 from tests import warm_process
 
@@ -189,7 +190,7 @@ def test_no_results_of_another_study_are_mixed_in(small: Path) -> None:
     Path("study.toml").write_text(text)
     folder = StudyFolder(Path("alone"))
     with pytest.raises(Exception, match="another study"):
-        folder.open(read_study("study.toml"), resume=True)
+        folder.open(description_text(read_study("study.toml")), resume=True)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -202,7 +203,7 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
     flag.unlink()
     study = read_study("study.toml")
     folder = StudyFolder(Path("dask"))
-    folder.open(study, resume=False)
+    folder.open(description_text(study), resume=False)
     old = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = str(small)
     try:
@@ -224,12 +225,12 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
 def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = read_study("study.toml")
     folder = StudyFolder(Path("broken"))
-    folder.open(study, resume=False)
+    folder.open(description_text(study), resume=False)
 
     def full(path: object, content: bytes, **how: bool) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("dsa_des.studies.folder.write_file", full)
+    monkeypatch.setattr("dsa_des.results.folder.write_file", full)
     from dsa_des.studies.executors import Serial
 
     with pytest.raises(Stopped, match="No space left"):

@@ -9,10 +9,10 @@ import pyarrow as pa
 import pytest
 
 import dsa_des
-from dsa_des.studies import measured_errors, runner
-from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.ratio import paired_ratio
-from tests.studies.test_ratios import ratio
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.ratio import paired_ratio
+from dsa_des.studies import models, runner
+from tests.results.test_ratios import ratio
 
 ROOT = Path(__file__).parents[2]
 
@@ -80,9 +80,9 @@ blocks.eo.offset_s = {{ uniform = [0.03, 0.04] }}
     (row,) = folder.results().to_pylist()
     command = folder.record.command(row)
     seen: list[object] = []
-    monkeypatch.setattr(measured_errors, "scene_errors", lambda variants: seen.append(variants)
+    monkeypatch.setattr(models, "scene_errors", lambda variants: seen.append(variants)
                         or ([], []))  # fmt: skip
-    measured_errors.measure_errors(folder)
+    models.measure_errors(folder)
     (variants,) = seen
     scene = variants.scene  # type: ignore[attr-defined]
     assert scene.seed == row["seed"] and float(scene.duration_s) == 2.0

@@ -8,10 +8,10 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
 from components.estimation.covariance_intersection import combined, inverse
-from components.estimation.frame_change import frame_change
+from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.matching import MatchRules, without_strays
+from components.track_fusion.track_association import MatchRules, without_strays
 
 
 def covariances(seed, count):

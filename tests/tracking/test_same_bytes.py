@@ -63,7 +63,7 @@ def test_windows_and_company_change_no_byte(kind):
 
 def test_tracks_know_nothing_of_the_roster(monkeypatch):
     """Targets are renumbered, and all that is true is replaced, before the tracker sees it."""
-    from components.tracking.ekf import ExtendedKalman
+    from components.tracking.filters import ExtendedKalman
 
     scene = scene_with("ekf")
     known = tracks_of(Simulation, scene)

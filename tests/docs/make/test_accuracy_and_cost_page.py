@@ -9,7 +9,7 @@ from components.line_of_sight.transform import EARTH
 from components.optical.sensors import VISIBLE
 from docs.make.accuracy_and_cost import DOCS, error_map_section, main
 from dsa_des.commands.cost import comparison
-from dsa_des.costs.study import climb
+from dsa_des.costs.climb import climb
 from dsa_des.costs.variants import Variants
 
 PAGE = (DOCS / "accuracy-and-cost.md").read_text(encoding="utf-8")

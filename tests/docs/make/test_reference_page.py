@@ -9,7 +9,7 @@ from docs.make.reference import page, recorded_tables
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import section_models
 from dsa_des.cli import main
-from dsa_des.commands.scene_tables import scene_tables
+from dsa_des.commands.parameters import scene_tables
 from dsa_des.scene import scene, wiring
 
 ROOT = Path(__file__).parents[3]

@@ -1,0 +1,315 @@
+"""Estimators: what a tracker needs of a filter, over many tracks at once.
+
+A filter is a class that says how tracks go on (`predict`) and what it expects to be measured of
+them (`expect`); how a measurement corrects them (`update`) and how several possible pasts become
+one track again (`merge`) is the same for all that are Gaussian.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from components.estimation.batched import (
+    cholesky,
+    is_everything,
+    product_transposed,
+    selected,
+    solve_lower,
+    squared_length,
+    symmetric,
+)
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import (
+    Innovation,
+    Moments,
+    distance_squared,
+    linear_moments,
+    log_likelihood,
+    updated,
+    variance_of_what_is_new,
+)
+from components.estimation.measurement import Kind, linearised, residual
+from components.estimation.motion import Motion, predict
+from dsa_des.arrays.types import FloatArray, IntArray
+
+States = list[FloatArray]
+
+#: No model is less likely than this before a look, or underflow would lose its chance to return.
+LEAST = 1e-250
+
+
+class Estimates(NamedTuple):
+    """What is known of many tracks: a Gaussian for each motion model, and the models' odds.
+
+    States are (d, n), covariances (d, d, n), position and velocity first; weights, the models'
+    probabilities, (models, n).
+    """
+
+    states: States
+    covariances: States
+    weights: FloatArray
+
+    def take(self, which: IntArray) -> "Estimates":
+        """Return those of some tracks."""
+        if is_everything(which, self.weights.shape[1]):
+            return self
+        return Estimates(
+            [selected(x, which) for x in self.states],
+            [selected(p, which) for p in self.covariances],
+            selected(self.weights, which),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence["Estimates"]) -> "Estimates":
+        """Return the tracks of all parts, one after the other."""
+        states, covariances, weights = zip(*parts, strict=True)
+        return cls(
+            [np.concatenate(one, axis=-1) for one in zip(*states, strict=True)],
+            [np.concatenate(one, axis=-1) for one in zip(*covariances, strict=True)],
+            np.concatenate(weights, axis=-1),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PairMeasurement:
+    """What each model says of pairs of a track and a detection."""
+
+    innovations: list[Innovation]  # Of the pairs, for every model
+    residuals: list[FloatArray]  # list of (m, pairs)
+    distance: FloatArray  # (pairs,), least squared Mahalanobis distance of any model
+    # (models, pairs), of the detection, were it the track's and the model right
+    log_likelihoods: FloatArray
+    # Those by which tracks and models' odds are updated, where errors are not all new
+    learning: list[Innovation] | None = None
+    log_odds: FloatArray | None = None  # (models, pairs) or None: The likelihoods by these
+
+    def take(self, which: IntArray) -> "PairMeasurement":
+        """Return some of the pairs."""
+        if len(which) == len(self.distance):
+            return self
+        return PairMeasurement(
+            [one.take(which) for one in self.innovations],
+            [selected(apart, which) for apart in self.residuals],
+            self.distance[which],
+            selected(self.log_likelihoods, which),
+            self.learning and [one.take(which) for one in self.learning],
+            None if self.log_odds is None else selected(self.log_odds, which),
+        )
+
+
+class Estimator(Protocol):
+    """A filter over many tracks; a subclass gives `models`, `predict` and `expect`.
+
+    Every operation is an elementwise one over tracks, so that a track's result is the same to the
+    bit however many others are computed with it (`components.estimation.batched`).
+    """
+
+    @property
+    def models(self) -> tuple[Motion, ...]:
+        """Motion models, one for each state that a track has."""
+        ...
+
+    def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
+        """Return tracks after times (n,), not negative."""
+        ...
+
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+        """Return what every model expects to be measured of predicted tracks."""
+        ...
+
+    def update(
+        self, tracks: Estimates, track: IntArray, pairs: "PairMeasurement", which: IntArray
+    ) -> Estimates:
+        """Return tracks `track` (k,) of the predicted ones after the pairs `which` (k,)."""
+        before = tracks.take(track)
+        whole = is_everything(which, pairs.residuals[0].shape[1])
+        moved = [
+            updated(
+                x, p, innovation if whole else innovation.take(which),
+                apart if whole else selected(apart, which),
+            )
+            for x, p, innovation, apart in zip(
+                before.states, before.covariances, pairs.learning or pairs.innovations,
+                pairs.residuals, strict=True,
+            )
+        ]  # fmt: skip
+        weights = before.weights
+        if len(self.models) > 1:
+            odds = pairs.log_likelihoods if pairs.log_odds is None else pairs.log_odds
+            weights = reweighted(weights, selected(odds, which))
+        return Estimates([x for x, _ in moved], [p for _, p in moved], weights)
+
+    def merge(
+        self,
+        tracks: Estimates,
+        missed: FloatArray,
+        track: IntArray,
+        share: FloatArray,
+        updates: Estimates,
+    ) -> Estimates:
+        """Return each track as the mixture of itself, if it was missed, and of its updates.
+
+        `missed` (n,) and the `share` of each update (k,), of the track `track` (k,), are
+        probabilities and sum to 1 for each track. A track without updates stays as it is, to the
+        bit.
+        """
+        count = len(missed)
+        paired = np.bincount(track, minlength=count) > 0
+        every = np.concatenate([np.arange(count), track])
+        by_model, states, covariances = [], [], []
+        for m in range(len(tracks.weights)):
+            chance = np.concatenate([missed * tracks.weights[m], share * updates.weights[m]])
+            total = np.asarray(np.bincount(every, chance, count), dtype=np.float64)
+            by_model.append(total)
+            safe = np.maximum(total, LEAST)
+            state = np.concatenate([tracks.states[m], updates.states[m]], axis=1)
+            within = np.concatenate([tracks.covariances[m], updates.covariances[m]], axis=2)
+            mean, spread = mixture_by_track(every, count, chance / safe[every], state, within)
+            moved = paired & (total > LEAST)  # an impossible model stays as predicted
+            states.append(np.where(moved, mean, tracks.states[m]))
+            covariances.append(np.where(moved, spread, tracks.covariances[m]))
+        weights = np.stack(by_model)
+        weights = np.where(paired, weights / weights.sum(axis=0), tracks.weights)
+        return Estimates(states, covariances, weights)
+
+    def models_then(
+        self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
+    ) -> FloatArray:
+        """Return how likely each model was at a past instant, for each of now, (then, now, n).
+
+        `weights` are those before that instant; `until_s` and `since_s` the times from there to it
+        and from it to now.
+        """
+        return np.ones((1, 1, len(until_s)))
+
+
+@dataclass(frozen=True)
+class ExtendedKalmanFilter(Estimator):
+    """Linearises motion and measurement at the state."""
+
+    model: Motion
+
+    @property
+    def models(self) -> tuple[Motion, ...]:
+        """The one model."""
+        return (self.model,)
+
+    def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
+        """Return tracks after times (n,)."""
+        state, covariance = predict(self.model, tracks.states[0], tracks.covariances[0], dt_s)
+        return Estimates([state], [covariance], tracks.weights)
+
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+        """Return what is expected to be measured."""
+        seen, jacobian = linearised(kind, tracks.states[0], pose)
+        return [linear_moments(seen, jacobian, tracks.covariances[0])]
+
+
+def pair_measurement(
+    moments: Sequence[Moments],
+    track: IntArray,
+    measured: FloatArray,
+    variance: FloatArray,
+    common: FloatArray | None,
+    weights: FloatArray,
+) -> PairMeasurement:
+    """Return what every model says of pairs."""
+    innovations = [found.innovation(variance, track) for found in moments]
+    residuals = [residual(measured, found.expected) for found in innovations]
+    distances = [distance_squared(i, r) for i, r in zip(innovations, residuals, strict=True)]
+    likelihoods = np.empty((len(innovations), len(track)))
+    for i, (found, apart) in enumerate(zip(innovations, distances, strict=True)):
+        likelihoods[i] = log_likelihood(found, apart)
+    distance = distances[0]
+    for other in distances[1:]:
+        distance = np.minimum(distance, other)
+    if common is None:
+        return PairMeasurement(innovations, residuals, distance, likelihoods)
+    spread = np.zeros(variance.shape)
+    for weight, expected in zip(weights, moments, strict=True):
+        for i in range(len(spread)):
+            spread[i] += selected(weight * expected.total[i, i], track)
+    new = variance_of_what_is_new(variance, common, spread)
+    learning = [found.innovation(new, track) for found in moments]
+    odds = np.empty_like(likelihoods)
+    for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
+        odds[i] = log_likelihood(found, distance_squared(found, apart))
+    return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
+
+
+def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntArray) -> FloatArray:
+    """Return the normalised innovations squared of pairs, of the mixture of their models."""
+    if len(weights) == 1:
+        return pairs.distance[which]
+    residuals = [selected(apart, which) for apart in pairs.residuals]
+    mean = residuals[0] * weights[0]
+    for weight, apart in zip(weights[1:], residuals[1:], strict=True):
+        mean = mean + weight * apart
+    spread = np.zeros((len(mean), *mean.shape))
+    for weight, apart, found in zip(weights, residuals, pairs.innovations, strict=True):
+        root, off = selected(found.root, which), apart - mean
+        spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
+    return squared_length(solve_lower(cholesky(spread), mean))
+
+
+def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
+    """Return the logarithm of the mean likelihood over models, (models, n) → (n,)."""
+    if len(weights) == 1:
+        return log_likelihoods[0]
+    most = log_likelihoods.max(axis=0)
+    total = weights[0] * np.exp(log_likelihoods[0] - most)
+    for weight, value in zip(weights[1:], log_likelihoods[1:], strict=True):
+        total = total + weight * np.exp(value - most)
+    with np.errstate(divide="ignore"):
+        return np.asarray(most + np.log(total))
+
+
+def mixture_by_track(
+    track: IntArray, count: int, share: FloatArray, states: FloatArray, covariances: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and covariance of what belongs to each track, with shares that sum to 1."""
+
+    def summed(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(track, weights=values, minlength=count), dtype=float)
+
+    size = len(states)
+    mean = np.stack([summed(share * states[i]) for i in range(size)])
+    apart = states - selected(mean, track)
+    spread = np.empty((size, size, count))
+    for i in range(size):
+        for j in range(i, size):
+            value = summed(share * (covariances[i, j] + apart[i] * apart[j]))
+            spread[i, j] = spread[j, i] = value
+    return mean, symmetric(spread)
+
+
+def reweighted(probabilities: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
+    """Return the models' probabilities after a look, (models, n), from those before it."""
+    with np.errstate(divide="ignore"):
+        logs = np.log(probabilities) + log_likelihoods
+    weights = np.exp(logs - logs.max(axis=0))
+    return weights / sum_of(list(weights))
+
+
+def combined(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
+    """Return mean (6, n) and covariance (6, 6, n) of position and velocity over the models."""
+    states, covariances, probabilities = tracks
+    many = len(states)
+    state = sum_of([probabilities[i] * states[i][:6] for i in range(many)])
+    covariance = np.zeros((6, 6, state.shape[1]))
+    for i in range(many):
+        apart = states[i][:6] - state
+        covariance += probabilities[i] * (
+            covariances[i][:6, :6] + apart[:, np.newaxis] * apart[np.newaxis]
+        )
+    return state, symmetric(covariance)
+
+
+def sum_of(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the sum of arrays, in their order."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total

@@ -1,0 +1,177 @@
+"""Several motion models at once: interacting multiple models (IMM) over many tracks.
+
+Between looks a target may change its model, as a Markov chain in continuous time: rates per second,
+so that the mixing follows the time between looks whatever the sensors' scan rates.
+
+Sources: Blom, Bar-Shalom, IEEE Trans. AC 33 (1988); Bar-Shalom, Li, Kirubarajan (2001), §11.6.6.
+Models of different states are mixed by the components they share. What a target that enters a model
+has not had before, a turn rate or an acceleration, is what the model's own filter thinks of it
+(Granström, Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal dimension states*,
+IEEE Trans. AES 51 (2015), the unbiased choice), or 0 with a stated spread: the filter of a model
+that is not true is sure that there is no turn, and would learn of one late.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from components.estimation.batched import symmetric
+from components.estimation.estimator import LEAST, Estimates, Estimator, sum_of
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import Moments
+from components.estimation.measurement import Kind
+from components.estimation.motion import Motion
+from dsa_des.arrays.types import FloatArray
+
+# Terms of the exponential's series, exact to a double for |rate · time| of at most 1/8.
+_TERMS = 12
+
+
+@dataclass(frozen=True)
+class InteractingMultipleModels(Estimator):
+    """Several filters of one model each that share what they know by the models' odds."""
+
+    filters: tuple[Estimator, ...]
+    #: From the row's model to the column's, 1/s; the diagonal is not read.
+    rates_per_s: FloatArray = field(compare=False)
+    # Variance of what each has besides position and velocity, in a target that enters it; empty
+    # where that is what the model's own filter thinks.
+    fresh: tuple[float, ...] = ()
+
+    @property
+    def models(self) -> tuple[Motion, ...]:
+        """The model of each filter."""
+        return tuple(one.models[0] for one in self.filters)
+
+    def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
+        """Return tracks after times (n,): the models are mixed, then each goes on."""
+        steps = transition_probabilities(self.rates_per_s, dt_s)
+        states, covariances, weights = mixed(*tracks, steps, self.fresh)
+        moved = [
+            one.predict(Estimates([x], [p], weights), dt_s)
+            for one, x, p in zip(self.filters, states, covariances, strict=True)
+        ]
+        return Estimates([e.states[0] for e in moved], [e.covariances[0] for e in moved], weights)
+
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+        """Return what every model expects to be measured."""
+        return [
+            one.expect(kind, Estimates([x], [p], tracks.weights), pose)[0]
+            for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
+        ]
+
+    def models_then(
+        self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
+    ) -> FloatArray:
+        """Return how likely each model was at a past instant, for each of now, (then, now, n)."""
+        return before(self.rates_per_s, weights, until_s, since_s)
+
+
+def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
+    """Return the probabilities to go from one model to another within a time."""
+    generator = np.array(rates_per_s, dtype=float)
+    np.fill_diagonal(generator, 0.0)
+    np.fill_diagonal(generator, -generator.sum(axis=1))
+    size = len(generator)
+    fastest = float(np.max(-np.diag(generator), initial=0.0))
+    most = fastest * float(np.max(dt_s, initial=0.0))
+    # The number of squarings must not depend on who else is in the batch: one for each octave.
+    with np.errstate(divide="ignore"):
+        octave = np.ceil(np.log2(np.maximum(8.0 * fastest * dt_s, 1.0)))
+    squarings = octave.astype(np.int64) if most > 0 else np.zeros(len(dt_s), dtype=np.int64)
+    # Uniformised: exp(A) = exp(-u) exp(A + u I), every term positive, so that nothing cancels.
+    short = dt_s / np.exp2(squarings)
+    positive = (generator + fastest * np.eye(size))[:, :, np.newaxis] * short
+    identity = np.repeat(np.eye(size)[:, :, np.newaxis], len(dt_s), axis=2)
+    total = identity.copy()
+    for term in range(_TERMS, 0, -1):
+        total = identity + _product(positive, total) / term
+    total = total * np.exp(-fastest * short)
+    for done in range(int(squarings.max(initial=0))):
+        total = np.where(squarings > done, _product(total, total), total)
+    sums = total.sum(axis=1, keepdims=True)
+    return total / sums
+
+
+def mixed(
+    states: Sequence[FloatArray],
+    covariances: Sequence[FloatArray],
+    probabilities: FloatArray,
+    transitions: FloatArray,
+    fresh: Sequence[float] = (),
+) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+    """Return what each model starts from, and the models' probabilities before the look."""
+    many = len(states)
+    predicted = np.stack(
+        [sum_of([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+    )
+    predicted = np.maximum(predicted, LEAST)
+    new_states, new_covariances = [], []
+    for j in range(many):
+        weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
+        sizes = [_shared(states[i], states[j]) for i in range(many)]
+        given = [_filled(states[i], states[j], sizes[i], bool(fresh)) for i in range(many)]
+        state = sum_of([w * x for w, x in zip(weights, given, strict=True)])
+        covariance = np.zeros_like(covariances[j])
+        for i in range(many):
+            apart = given[i] - state
+            whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
+            if fresh and sizes[i] < len(whole):
+                _freshen(whole, fresh[j])
+            covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
+        new_states.append(state)
+        new_covariances.append(symmetric(covariance))
+    return new_states, new_covariances, predicted
+
+
+def before(
+    rates_per_s: FloatArray, probabilities: FloatArray, until_s: FloatArray, since_s: FloatArray
+) -> FloatArray:
+    """Return how likely each model was at an instant that is past, for each model of now."""
+    many = len(probabilities)
+    steps = transition_probabilities(rates_per_s, until_s)
+    then = np.stack(
+        [sum_of([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+    )
+    joint = np.maximum(then, LEAST)[:, np.newaxis] * transition_probabilities(rates_per_s, since_s)
+    return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
+
+
+def _shared(one: FloatArray, other: FloatArray) -> int:
+    return len(one) if len(one) == len(other) else 6
+
+
+def _filled(given: FloatArray, own: FloatArray, shared: int, fresh: bool) -> FloatArray:
+    if shared == len(own):
+        return given[:shared]
+    return np.concatenate([given[:6], np.zeros_like(own[6:]) if fresh else own[6:]])
+
+
+def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
+    if shared == len(own):
+        return given[:shared, :shared]
+    whole = np.zeros_like(own)
+    whole[:6, :6] = given[:6, :6]
+    whole[6:, 6:] = own[6:, 6:]
+    return whole
+
+
+def _freshen(covariance: FloatArray, variance: float) -> None:
+    covariance[6:, 6:] = 0.0
+    for i in range(6, len(covariance)):
+        covariance[i, i] = variance
+
+
+def _product(left: FloatArray, right: FloatArray) -> FloatArray:
+    return np.stack(
+        [
+            np.stack(
+                [
+                    sum_of([left[i, k] * right[k, j] for k in range(len(left))])
+                    for j in range(len(left))
+                ]
+            )
+            for i in range(len(left))
+        ]
+    )

@@ -1,0 +1,93 @@
+"""A measurement that comes late, in one step: what the state now has to do with the state then.
+
+With the state before the measurement's own instant and the state now, the measurements between the
+two stand for one of the state now. So the state then follows by one step of smoothing, is corrected
+as any state is, and what the correction tells of the state now follows from their covariance.
+
+Sources: Bar-Shalom, *Update with out-of-sequence measurements in tracking: exact solution*, IEEE
+Trans. AES 38 (2002), algorithm A1, for a measurement that only one came before: exact for linear
+models; Bar-Shalom, Chen, Mallick, *One-step solution for the multistep out-of-sequence-measurement
+problem in tracking*, IEEE Trans. AES 40 (2004), algorithm Al1, for more of them: exact without
+noise of the process, and an approximation with it. Written as smoothing (Rauch, Tung, Striebel
+1965), which needs no inverse of the motion and keeps covariances positive.
+"""
+
+from dataclasses import dataclass
+
+from components.estimation.batched import (
+    cholesky,
+    product,
+    product_transposed,
+    solve_lower,
+    solve_upper,
+    symmetric,
+    times,
+)
+from components.estimation.motion import Motion, predict
+from dsa_des.arrays.types import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Retrodiction:
+    """The state at an instant that is past, given all that is known now."""
+
+    state: FloatArray  # (d, n)
+    covariance: FloatArray  # (d, d, n)
+    # (d, d, n), how much of a correction of the state then is one of the state now
+    gain: FloatArray
+
+    def carried_over(
+        self,
+        state: FloatArray,
+        covariance: FloatArray,
+        corrected: FloatArray,
+        corrected_covariance: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the state now after the state then was corrected."""
+        less = product_transposed(
+            product(self.gain, corrected_covariance - self.covariance), self.gain
+        )
+        moved = state + times(self.gain, corrected - self.state)
+        return moved, symmetric(covariance + less)
+
+
+def retrodiction(
+    model: Motion,
+    before: tuple[FloatArray, FloatArray],
+    now: tuple[FloatArray, FloatArray],
+    until_then_s: FloatArray,
+    since_then_s: FloatArray,
+) -> Retrodiction:
+    """Return the state at an instant between one before and now."""
+    then, spread = predict(model, *before, until_then_s)
+    step, noise = model.jacobian(then, since_then_s), model.noise(since_then_s)
+    ahead, spread_ahead = predict(model, then, spread, since_then_s)
+    back = _divided(product(step, spread), spread_ahead)  # spread · stepᵀ / spread ahead
+    rest = -product(back, step)
+    for i in range(model.size):
+        rest[i, i] += 1.0
+    total = product_transposed(product(rest, spread), rest)
+    total += product_transposed(product(back, noise + now[1]), back)
+    covariance = symmetric(total)
+    across = product_transposed(back, now[1])  # of the state then with the state now
+    return Retrodiction(
+        then + times(back, now[0] - ahead), covariance, _divided(across, covariance)
+    )
+
+
+def retrodiction_by_motion(
+    model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray
+) -> Retrodiction:
+    """Return the state at an instant before anything was known of it, by what it is now."""
+    state, spread = now
+    step = model.jacobian(state, -since_s)
+    covariance = symmetric(product_transposed(product(step, spread + model.noise(since_s)), step))
+    return Retrodiction(
+        model.move(state, -since_s), covariance, _divided(product(step, spread), covariance)
+    )
+
+
+def _divided(left: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return leftᵀ · matrix⁻¹ for symmetric matrices (d, d, n)."""
+    root = cholesky(matrix)
+    return solve_upper(root, solve_lower(root, left)).swapaxes(0, 1)

@@ -1,0 +1,391 @@
+"""A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from itertools import groupby
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from components.estimation.frame import SensorPose, pose_in_frame
+from components.estimation.measurement import Kind, linearised
+from components.messages.detections import SensorOffer
+from components.messages.fused import FusedDetections
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
+from components.sensor.marks import TRACKER
+from components.stone_soup.library import Repeatable, needs_stone_soup
+from components.tracking.out_of_sequence import LookCount, latest_s
+from components.tracking.scans import Scans, scans_of, when_made
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.source_file import absolute
+from dsa_des.block.wake import Wake
+from dsa_des.time.randomness import key_of
+
+
+@dataclass
+class Followed:
+    """A track as it is reported."""
+
+    number: int  # Its own, from 1, in the order of appearance
+    status: int = CONFIRMED
+    state: FloatArray | None = None  # (6,), position and velocity along north, east, down
+    covariance: FloatArray | None = None  # (6, 6)
+    state_s: float = 0.0
+    updated_s: float = 0.0
+    age_s: float = 0.0
+    contributors: int = 0  # Masks of sensors
+    updated_by: int = 0  # Masks of sensors
+    # Whether a range was measured; true of a tracker that does not say what it measured
+    ranged: bool = True
+    seen: int = 0  # How many of its states were looked at
+
+
+class Follower:
+    """Turns the tracks of a tracker into what is reported of them."""
+
+    def __init__(self, position: "tuple[int, ...]", velocity: "tuple[int, ...]") -> None:
+        east, north, up = range(3)
+        order = (north, east, up)
+        self._rows = [position[i] for i in order] + [velocity[i] for i in order]
+        self._signs = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
+        self._tracks: dict[str, Followed] = {}
+        self._next = 1
+
+    def after(
+        self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
+    ) -> list[Followed]:
+        """Return all tracks after a look, by number; those that are gone a last time."""
+        from components.stone_soup.objects import START
+
+        def seconds(instant: datetime) -> float:
+            return time_s if instant == when else (instant - START).total_seconds()
+
+        alive = {track.id: track for track in tracks}
+        gone = [self._tracks.pop(name) for name in list(self._tracks) if name not in alive]
+        for one in gone:
+            one.status = DELETED
+        fresh = [track for name, track in alive.items() if name not in self._tracks]
+        for track in sorted(fresh, key=self._place):
+            self._tracks[track.id] = Followed(self._next)
+            self._next += 1
+        for name, one in self._tracks.items():
+            self._follow(one, alive[name], seconds, mask_of)
+        return sorted([*gone, *self._tracks.values()], key=lambda one: one.number)
+
+    def _place(self, track: Any) -> tuple[float, ...]:
+        """Return what orders tracks that appear at the same time: where they are."""
+        state, _ = self._moments(track)
+        return tuple(state.tolist())
+
+    def _moments(self, track: Any) -> tuple[FloatArray, FloatArray]:
+        try:
+            mean = np.array(track.state.mean, dtype=float).reshape(-1)
+            spread = np.array(track.state.covar, dtype=float)
+        except AttributeError as error:
+            raise ValueError(
+                f"its states ({type(track.state).__name__}) have no mean and covariance: {error}"
+            ) from error
+        if max(self._rows) >= len(mean):
+            raise ValueError(
+                f"its states have {len(mean)} components, and position_mapping or "
+                f"velocity_mapping names component {max(self._rows)}: they count from 0"
+            )
+        state = mean[self._rows] * self._signs
+        covariance = spread[np.ix_(self._rows, self._rows)] * np.outer(self._signs, self._signs)
+        if not (np.isfinite(state).all() and np.isfinite(covariance).all()):
+            raise ValueError("a state or covariance of its is not finite")
+        return state, covariance
+
+    def _follow(
+        self,
+        one: Followed,
+        track: Any,
+        seconds: Callable[[datetime], float],
+        mask_of: Mapping[str, int],
+    ) -> None:
+        one.state, one.covariance = self._moments(track)
+        one.state_s = seconds(track.timestamp)
+        one.age_s = one.state_s - seconds(track.states[0].timestamp)
+        if one.seen > len(track.states):  # a tracker may shorten the past
+            one.seen = 0
+        last = track.states[-1]
+        for state in track.states[one.seen :]:
+            measured = _measurements(state)
+            if not measured:
+                continue
+            one.updated_s = seconds(state.timestamp)
+            one.updated_by = 0
+            # Only angles so far, unless one of these has a range.
+            one.ranged = one.ranged and one.contributors != 0
+            for detection in measured:
+                one.updated_by |= mask_of.get(detection.metadata.get("sensor", ""), 0)
+                one.ranged |= len(detection.state_vector) > 2
+            one.contributors |= one.updated_by
+        one.seen = len(track.states)
+        one.status = CONFIRMED if _measurements(last) else COASTED
+
+
+def _measurements(state: Any) -> list[Any]:
+    """Return the detections that a state was updated with."""
+    hypothesis = getattr(state, "hypothesis", None)
+    if hypothesis is None:
+        return []
+    single = getattr(hypothesis, "single_hypotheses", None)
+    hypotheses = [hypothesis] if single is None else single
+    return [one.measurement for one in hypotheses if one]
+
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+
+
+def _builder(value: Any) -> Any:
+    """Return a name with the file written out; a bare ``file.py`` lies beside the scene."""
+    if not isinstance(value, str):
+        return value
+    file = value.rpartition(":")[0]
+    if file.endswith(".py") and "/" not in file:
+        folder = getattr(value, "folder", None)
+        value = f"./{value}" if folder is None else f"{folder}/{value}"
+    return absolute(value)
+
+
+class StoneSoupParameters(Parameters):
+    """What is built, and how its states are laid out."""
+
+    builder: Annotated[str, BeforeValidator(_builder)] = Field(
+        description="The function that builds the tracker: my_tracker.py:build, beside the scene, "
+        "or module:build. It is called without arguments.",
+    )
+    position_mapping: tuple[int, int, int] = Field(
+        default=(0, 2, 4), description="Where x, y, z (east, north, up) stand in a state, from 0."
+    )
+    velocity_mapping: tuple[int, int, int] = Field(
+        default=(1, 3, 5), description="Where their rates stand in it."
+    )
+    state_size: int = Field(default=6, ge=6, le=100, description="Components of a state.")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Any:
+        places = (*self.position_mapping, *self.velocity_mapping)
+        if len(set(places)) != 6 or min(places) < 0 or max(places) >= self.state_size:
+            raise ValueError(
+                f"position_mapping = {list(self.position_mapping)} and velocity_mapping = "
+                f"{list(self.velocity_mapping)} must name six components of a state, each once, "
+                f"from 0 to {self.state_size - 1} (state_size = {self.state_size})"
+            )
+        return self
+
+
+class StoneSoupTracker(Component):
+    """Hands every look to a tracker of Stone Soup's, and reports its tracks.
+
+    The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
+    Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
+    `fusion.pass_through` also those in vain. A look waits for as long as a scene says that an older
+    one may still come; one that comes later all the same is left out and counted. Tracks that a
+    tracker shows count as confirmed, after a look in vain as coasted.
+    """
+
+    mark = TRACKER
+    inputs = {"fused": Input(FusedDetections, "trigger", "What was measured.")}
+    outputs = {"tracks": Output(StateTracks, "The tracker's tracks.")}
+    Parameters = StoneSoupParameters
+    windowed = True
+
+    def setup(self) -> None:
+        """Build the tracker."""
+        needs_stone_soup("tracking.stonesoup")
+        from components.stone_soup.tracker import Follower
+
+        self._ahead: Scans | None = None
+        self._origin: FloatArray | None = None
+        self._newest = -1
+        self._count = LookCount()
+        self._wait_ticks = int(
+            latest_s(self._offers(), self.context.producers) * self.context.ticks_per_s
+        )
+        self._masks: dict[str, int] = {}
+        self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
+        self._repeatable = Repeatable(
+            key_of(getattr(self.context.streams, "seed", 0), self.name, "stone soup")
+        )
+        self._tracker = self._built()
+
+    def warnings(self) -> list[str]:
+        """Say whose errors last from look to look, which Stone Soup takes for new ones."""
+        said = []
+        for name, offer in sorted(self._offers().items()):
+            lasting = offer.lasting if isinstance(offer, SensorOffer) else None
+            if lasting is None or lasting:
+                what = (
+                    "what lasts of its errors is not said"
+                    if lasting is None
+                    else (f"errors of its {', '.join(sorted(lasting))} last from look to look")
+                )
+                said.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
+                             "too sure where errors are the same again")  # fmt: skip
+        return super().warnings() + said
+
+    def _offers(self) -> dict[str, Any]:
+        offers: dict[str, Any] = {}
+        for producer in self.context.producers:
+            if isinstance(producer.offer, dict):
+                offers |= producer.offer
+        return offers
+
+    def _built(self) -> Any:
+        name = self.p.builder
+        try:
+            build = load_named(name, f"blocks.{self.name}.builder")
+        except NotAllowed:
+            return None  # `check --no-import` runs nothing
+        except NotImportable as error:
+            raise ValueError(f"builder = {name}: {error}") from error
+        if not callable(build):
+            raise ValueError(f"builder = {name}: is no function that builds a tracker")
+        try:
+            with foreign_code(), self._repeatable.working():
+                tracker = build()
+        except ForeignFailure as error:
+            raise ValueError(f"builder = {name}: failed with {error}") from error.__cause__
+        if not callable(getattr(tracker, "update_tracker", None)):
+            raise ValueError(
+                f"builder = {name}: returned {type(tracker).__name__}, which has no "
+                "update_tracker(time, detections) as Stone Soup's trackers have"
+            )
+        return tracker
+
+    def run(self, wake: Wake) -> StateTracks | None:
+        """Hand over what came, look by look, and report all tracks."""
+        fused = wake["fused"]
+        if fused is None:
+            return None
+        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake, self._wait_ticks)
+        if len(scans) == 0:
+            return None
+        if self._origin is None:
+            self._origin = scans.pose[:3, 0].copy()
+        lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
+        pose = scans.pose
+        poses = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+                                (pose[3], pose[4], pose[5]))  # fmt: skip
+        followed: list[tuple[int, int, Followed]] = []
+        rows: list[int] = []
+        for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):
+            here: dict[int, Followed] = {}
+            for look in looks:
+                here |= {one.number: one for one in self._looked(fused, scans, look, poses, wake)}
+            rows.append(row)
+            followed += [(row, looks[-1], replace(one)) for one in here.values()]
+        if not rows:
+            return None
+        return self._message(wake, fused.sensors, rows, followed, poses)
+
+    def _in_time(self, scans: Scans, sensors: tuple[str, ...]) -> list[int]:
+        """Return the looks that come after no later one; the others are counted."""
+        newest = np.maximum.accumulate(np.append(self._newest, scans.tick))
+        in_time = scans.tick >= newest[:-1]
+        self._newest = int(newest[-1])
+        self._count = self._count.of(sensors, scans.sensors, scans.sensors[~in_time])
+        return np.flatnonzero(in_time).tolist()
+
+    def _looked(
+        self, fused: FusedDetections, scans: Scans, look: int, poses: SensorPose, wake: Wake
+    ) -> "list[Followed]":
+        """Hand one look over, and return the tracks after it."""
+        from components.stone_soup.objects import Poses, detections, instant
+
+        begin = int(wake.replica[scans.row[look]]) * wake.span_ticks
+        time_s = (int(scans.tick[look]) - begin) / wake.ticks_per_s
+        when = instant(time_s)
+        which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
+        masks = [int(mask) for mask in scans.contributors[which]]
+        names = ["+".join(n for i, n in enumerate(fused.sensors) if m >> i & 1) for m in masks]
+        models = Poses(
+            poses.take(np.array([look])), self.p.position_mapping, self.p.state_size
+        )  # fmt: skip
+        found = detections(
+            models, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
+            [{"sensor": name} for name in names],
+        )  # fmt: skip
+        with self._repeatable.working():
+            _, tracks = self._tracker.update_tracker(when, found)
+            self._masks.update(zip(names, masks, strict=True))
+            return self._follower.after(tracks, time_s, when, self._masks)
+
+    def _message(
+        self,
+        wake: Wake,
+        sensors: tuple[str, ...],
+        rows: list[int],
+        entries: "list[tuple[int, int, Followed]]",
+        poses: SensorPose,
+    ) -> StateTracks:
+        """Return tracks as a message: of each its row, the last look and its report."""
+        tracks = [one for _, _, one in entries]
+        count = len(tracks)
+        look = np.array([last for _, last, _ in entries], dtype=np.int64)
+        of_row = np.searchsorted(rows, np.array([row for row, _, _ in entries], dtype=np.int64))
+        state = np.array([one.state for one in tracks], dtype=float).reshape(count, 6).T
+        spread = np.array([one.covariance for one in tracks], dtype=float).reshape(count, 6, 6)
+        spread = np.moveaxis(spread, 0, -1)
+        at = SensorPose(
+            poses.position_m[:, look],
+            np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
+        )
+        seen, by_state = linearised(Kind(False), state, at)
+        angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
+        ranged = np.array([one.ranged for one in tracks], dtype=bool)
+
+        def known(values: FloatArray) -> FloatArray:
+            return np.where(ranged, values, np.nan)
+
+        def column(name: str, kind: type = float) -> Any:
+            return np.array([getattr(one, name) for one in tracks], dtype=kind)
+
+        moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(_STATE)}
+        assert self._origin is not None
+        lat, lon, alt = (np.full(count, value) for value in self._origin)
+        return StateTracks(
+            tick=wake.ticks[rows],
+            offsets=offsets_of(of_row, len(rows)),
+            track=column("number", np.int64),
+            track_status=column("status", np.int64),
+            existence=np.full(count, np.nan),
+            azimuth_rad=seen[0] % (2.0 * np.pi),
+            elevation_rad=seen[1],
+            azimuth_variance_rad2=angular[0],
+            elevation_variance_rad2=angular[1],
+            has_range=ranged,
+            age_s=column("age_s"),
+            state_s=column("state_s"),
+            updated_s=column("updated_s"),
+            contributors=column("contributors", np.int64),
+            updated_by=column("updated_by", np.int64),
+            own_north_m=at.position_m[0],
+            own_east_m=at.position_m[1],
+            own_down_m=at.position_m[2],
+            origin_lat_deg=lat,
+            origin_lon_deg=lon,
+            origin_alt_m=alt,
+            covariance={name: known(spread[place]) for place, name in COVARIANCE.items()},
+            extras={},
+            sensors=sensors,
+            **moments,
+        )  # fmt: skip
+
+    def report(self) -> dict[str, Any]:
+        """Return whose looks came too late."""
+        return {"late_looks": {self.name: self._count.late()}}
+
+
+def _by_row(looks: list[int], row: IntArray) -> list[tuple[int, list[int]]]:
+    """Return looks by the row of the wake that brings them, in their order."""
+    return [(key, list(mine)) for key, mine in groupby(looks, key=lambda look: int(row[look]))]

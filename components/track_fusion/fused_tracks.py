@@ -1,0 +1,230 @@
+"""Fused tracks: their states, from those of their members, and the message that reports them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.estimation.batched import product, product_transposed, times
+from components.estimation.covariance_intersection import Rule, combined, inverse
+from components.estimation.frame import SensorPose
+from components.estimation.measurement import Kind, linearised
+from components.estimation.motion import ConstantVelocity
+from components.messages.state_tracks import (
+    COASTED,
+    CONFIRMED,
+    COVARIANCE,
+    DELETED,
+    TENTATIVE,
+    StateTracks,
+)
+from components.track_fusion.local_tracks import LocalTracks
+from components.track_fusion.track_association import bearing, leaders
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.message import offsets_of
+
+
+@dataclass(frozen=True, eq=False)
+class FusedStates:
+    """Fused tracks by replica and number."""
+
+    replica: IntArray
+    number: IntArray
+    status: IntArray
+    # (n,), the largest of any member: as much is sure whatever they have in common
+    existence: FloatArray
+    ranged: BoolArray
+    state: FloatArray  # (6, n), of angle-only tracks meaningless
+    covariance: FloatArray  # (6, 6, n)
+    newest: IntArray  # (n,): index of the member that gives the direction where there is no range
+    time_s: FloatArray
+    updated_s: FloatArray
+    updated_by: IntArray
+    contributors: IntArray
+
+
+def fused_states(
+    tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
+) -> FusedStates:
+    """Return the fused tracks to which tracks belong.
+
+    Members with a range come first, then those without, each group by tracker; each is combined
+    with what those before it gave.
+    """
+    leader, of = leaders(tracks)
+    count = len(leader)
+    rank = _ranks(tracks, of)
+    state, covariance = tracks.at(time_s, motion)
+    x, p = state[:, leader].copy(), covariance[:, :, leader].copy()
+    for turn in range(1, int(rank.max(initial=0)) + 1):
+        member = np.flatnonzero((rank == turn) & tracks.ranged[leader[of]])
+        for ranged in (True, False):
+            mine = member[tracks.ranged[member] == ranged]
+            if len(mine) == 0:
+                continue
+            into = of[mine]
+            if ranged:
+                information = inverse(covariance[:, :, mine])
+                pull = times(information, state[:, mine] - x[:, into])
+            else:
+                angles = bearing(tracks.take(mine), x[:, into], time_s[mine])
+                weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
+                information = product(weighed, angles.jacobian)
+                pull = times(weighed, angles.residual)
+            shift, found, _ = combined(p[:, :, into], information, pull, rule)
+            x[:, into] += shift
+            p[:, :, into] = found
+    status = np.full(count, TENTATIVE)
+    for held in (COASTED, CONFIRMED):
+        status[of[tracks.status == held]] = held
+    existence, updated_s = np.zeros(count), np.full(count, -np.inf)
+    np.maximum.at(existence, of, tracks.existence)
+    np.maximum.at(updated_s, of, tracks.updated_s)
+    contributors, updated_by = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    np.bitwise_or.at(contributors, of, tracks.contributors)
+    last = tracks.updated_s == updated_s[of]
+    np.bitwise_or.at(updated_by, of[last], tracks.updated_by[last])
+    return FusedStates(
+        replica=tracks.replica[leader],
+        number=tracks.system[leader],
+        status=status,
+        existence=existence,
+        ranged=tracks.ranged[leader],
+        state=x,
+        covariance=p,
+        newest=_newest(tracks, of, count),
+        time_s=time_s[leader],
+        updated_s=updated_s,
+        updated_by=updated_by,
+        contributors=contributors,
+    )
+
+
+def _ranks(tracks: LocalTracks, of: IntArray) -> IntArray:
+    """Return the place of each member in its fused track: by range, then by tracker."""
+    order = np.lexsort((tracks.tracker, ~tracks.ranged, of))
+    counts = np.bincount(of)
+    rank = np.empty(len(of), dtype=np.int64)
+    rank[order] = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return rank
+
+
+def _newest(tracks: LocalTracks, of: IntArray, count: int) -> IntArray:
+    order = np.lexsort((-tracks.tracker, tracks.time_s, of))
+    return order[np.cumsum(np.bincount(of, minlength=count)) - 1]
+
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_OWN = ("own_north_m", "own_east_m", "own_down_m")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+#: Columns over fused tracks, the tracks on their last axis.
+FusedColumns = dict[str, AnyArray]
+
+_WHOLE = ("replica", "row", "track", "track_status", "contributors", "updated_by")
+_NUMBERS = (
+    "born_s", "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
+    "elevation_variance_rad2", "age_s", "state_s", "updated_s",
+)  # fmt: skip
+
+
+def no_fused_tracks() -> FusedColumns:
+    """Return the columns of no track."""
+    found: FusedColumns = {name: np.empty(0, dtype=np.int64) for name in _WHOLE}
+    found |= {name: np.empty(0) for name in _NUMBERS}
+    found |= {"state": np.empty((6, 0)), "covariance": np.empty((6, 6, 0))}
+    found |= {"own": np.empty((3, 0)), "origin": np.empty((3, 0))}
+    return {**found, "has_range": np.empty(0, dtype=bool)}
+
+
+def taken(reported: FusedColumns, which: AnyArray) -> FusedColumns:
+    """Return some of the tracks."""
+    return {name: values[..., which] for name, values in reported.items()}
+
+
+def joined(parts: Sequence[FusedColumns]) -> FusedColumns:
+    """Return the tracks of all parts, one after the other."""
+    return {n: np.concatenate([part[n] for part in parts], axis=-1) for n in parts[0]}
+
+
+def reported_after(
+    before: FusedColumns,
+    found: FusedStates,
+    members: LocalTracks,
+    origin_deg_m: FloatArray,
+    own_m: FloatArray,
+    replica: IntArray,
+    row_of_replica: IntArray,
+) -> FusedColumns:
+    """Return what is reported of fused tracks, and once of those that are no more."""
+    row = row_of_replica[np.searchsorted(replica, found.replica)]
+    count = len(found.replica)
+    held = {
+        key: place
+        for place, key in enumerate(
+            zip(before["replica"].tolist(), before["track"].tolist(), strict=True)
+        )
+    }
+    keys = list(zip(found.replica.tolist(), found.number.tolist(), strict=True))
+    old = np.array([held.get(key, -1) for key in keys], dtype=np.int64)
+    known = old >= 0
+    born_s, contributors = found.time_s.copy(), found.contributors.copy()
+    born_s[known] = before["born_s"][old[known]]
+    contributors[known] |= before["contributors"][old[known]]
+    axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
+    seen, by_state = linearised(Kind(False), found.state, SensorPose(own_m, axes))
+    spread = product_transposed(product(by_state, found.covariance[:3, :3]), by_state)
+    newest = members.take(found.newest)
+    azimuth, elevation = newest.direction()
+    ranged = found.ranged
+    new: FusedColumns = {
+        "replica": found.replica,
+        "row": row,
+        "track": found.number,
+        "track_status": found.status,
+        "existence": found.existence,
+        "born_s": born_s,
+        "contributors": contributors,
+        "updated_by": found.updated_by,
+        "has_range": ranged,
+        "state": np.where(ranged, found.state, np.nan),
+        "covariance": np.where(ranged, found.covariance, np.nan),
+        "azimuth_rad": np.where(ranged, seen[0], azimuth) % (2.0 * np.pi),
+        "elevation_rad": np.where(ranged, seen[1], elevation),
+        "azimuth_variance_rad2": np.where(ranged, spread[0, 0], newest.azimuth_variance_rad2),
+        "elevation_variance_rad2": np.where(ranged, spread[1, 1], newest.elevation_variance_rad2),
+        "own": np.where(ranged, own_m, newest.own_m),
+        "origin": origin_deg_m,
+        "state_s": np.where(ranged, found.time_s, newest.time_s),
+        "updated_s": found.updated_s,
+    }
+    new["age_s"] = np.maximum(new["state_s"] - born_s, 0.0)
+    alive = set(keys)
+    ended = np.array([key not in alive for key in held], dtype=bool)
+    if not ended.any():
+        return new
+    last = taken(before, ended)
+    last["row"] = row_of_replica[np.searchsorted(replica, last["replica"])]
+    last["track_status"] = np.full(int(ended.sum()), DELETED)
+    return joined([last, new])
+
+
+def state_tracks(
+    reported: FusedColumns, rows: IntArray, ticks: IntArray, sensors: tuple[str, ...]
+) -> StateTracks:
+    """Return the message of what is reported at some rows."""
+    order = np.lexsort((reported["track"], reported["row"]))
+    reported = taken(reported, order)
+    names = [name for name in (*_WHOLE, *_NUMBERS) if name not in ("replica", "row", "born_s")]
+    return StateTracks(
+        tick=ticks,
+        offsets=offsets_of(np.searchsorted(rows, reported["row"]), len(rows)),
+        has_range=reported["has_range"],
+        covariance={name: reported["covariance"][place] for place, name in COVARIANCE.items()},
+        extras={},
+        sensors=sensors,
+        **{name: reported[name] for name in names},
+        **dict(zip(_STATE, reported["state"], strict=True)),
+        **dict(zip(_OWN, reported["own"], strict=True)),
+        **dict(zip(_ORIGIN, reported["origin"], strict=True)),
+    )

@@ -1,0 +1,211 @@
+"""Track-to-track association: which tracks of different trackers are of one target.
+
+They are associated by their estimates, never by truth. A fused track has a leader: the first of its
+members that has a range, or else the first. A track belongs to it if it lies in the gate around the
+leader, and a fused track has at most one member of every tracker. Distances take the errors of two
+trackers as independent: they share the motion's noise, which makes the true differences smaller, so
+that the gate errs on the wide side.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from components.association.assignment import gate_threshold, global_nearest
+from components.estimation.batched import product, product_transposed
+from components.estimation.covariance_intersection import distance_squared
+from components.estimation.measurement import Kind, linearised, residual
+from components.estimation.motion import ConstantVelocity
+from components.track_fusion.local_tracks import LocalTracks
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+_DIRECTION = Kind(has_range=False)
+
+
+@dataclass(frozen=True)
+class MatchRules:
+    """When tracks are of one target."""
+
+    gate_probability: float  # That two tracks of one target lie in each other's gate
+    motion: ConstantVelocity  # How targets move from the instant of one track to that of another
+    # Standard deviation of the rate at which a line of sight turns that has no range
+    bearing_rate_rad_s: float
+    # How many times as far as the gate a member may drift from its leader before it leaves
+    stay_factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Bearing:
+    """What a direction says of states at another instant."""
+
+    # (2, n), azimuth and elevation as reported, less those of the state carried back to their
+    # instant
+    residual: FloatArray
+    jacobian: FloatArray  # (2, 6, n), of the direction by the state
+    variance: FloatArray  # (2, n)
+
+
+def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
+    """Return what the directions of tracks say of states (6, n) at instants (n,)."""
+    back_s = tracks.time_s - time_s
+    then = state.copy()
+    then[:3] += back_s * state[3:]
+    seen, by_place = linearised(_DIRECTION, then, tracks.place())
+    measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
+    return Bearing(
+        residual(measured, seen),
+        np.concatenate([by_place, back_s * by_place], axis=1),
+        np.stack([tracks.azimuth_variance_rad2, tracks.elevation_variance_rad2]),
+    )
+
+
+def gate_share(
+    rules: MatchRules, leader: LocalTracks, other: LocalTracks, time_s: FloatArray
+) -> FloatArray:
+    """Return the squared distances of pairs over those of their gates."""
+    share = np.empty(len(leader))
+    both, one = leader.ranged & other.ranged, leader.ranged ^ other.ranged
+    none = ~(leader.ranged | other.ranged)
+    if both.any():
+        mine, theirs = leader.take(both), other.take(both)
+        x, p = mine.at(time_s[both], rules.motion)
+        y, q = theirs.at(time_s[both], rules.motion)
+        share[both] = distance_squared(x - y, p + q) / gate_threshold(rules.gate_probability, 6)
+    two = gate_threshold(rules.gate_probability, 2)
+    if one.any():
+        swap = other.ranged & one
+        mine = LocalTracks.joined([leader.take(one & ~swap), other.take(swap)])
+        theirs = LocalTracks.joined([other.take(one & ~swap), leader.take(swap)])
+        when = np.concatenate([time_s[one & ~swap], time_s[swap]])
+        x, p = mine.at(when, rules.motion)
+        angles = bearing(theirs, x, when)
+        spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
+        for i in range(2):
+            spread[i, i] += angles.variance[i]
+        found = distance_squared(angles.residual, spread) / two
+        where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
+        share[where] = found
+    if none.any():
+        share[none] = _between_bearings(rules, leader.take(none), other.take(none)) / two
+    return share
+
+
+def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
+    apart = residual(np.stack(one.direction()), np.stack(other.direction()))
+    turned = (rules.bearing_rate_rad_s * (one.time_s - other.time_s)) ** 2
+    level = np.maximum(np.cos(one.elevation_rad) ** 2, 1e-12)
+    spread = np.stack(
+        [
+            one.azimuth_variance_rad2 + other.azimuth_variance_rad2 + turned / level,
+            one.elevation_variance_rad2 + other.elevation_variance_rad2 + turned,
+        ]
+    )
+    square = apart * apart / spread
+    return np.asarray(square[0] + square[1])
+
+
+def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
+    """Return the leader of every fused track, and of every track the place of its leader."""
+    order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
+    replica, system = tracks.replica[order], tracks.system[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (replica[1:] != replica[:-1]) | (system[1:] != system[:-1])
+    of = np.empty(len(order), dtype=np.int64)
+    of[order] = np.cumsum(first) - 1
+    return order[first], of
+
+
+def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
+    """Return tracks, of which those no longer belong that are too far from their leader."""
+    member = np.flatnonzero(tracks.system > 0)
+    if len(member) == 0:
+        return tracks
+    leader, of = leaders(tracks.take(member))
+    lead = member[leader[of]]
+    pair = np.flatnonzero(lead != member)
+    if len(pair) == 0:
+        return tracks
+    share = gate_share(
+        rules, tracks.take(lead[pair]), tracks.take(member[pair]), time_s[member[pair]]
+    )
+    system = tracks.system.copy()
+    system[member[pair[share > rules.stay_factor**2]]] = 0
+    return replace(tracks, system=system)
+
+
+def matched(
+    rules: MatchRules,
+    tracks: LocalTracks,
+    time_s: FloatArray,
+    trackers: int,
+    next_number: IntArray,
+    replica: IntArray,
+) -> tuple[LocalTracks, IntArray]:
+    """Return tracks that all belong to a fused one, and the next number of each replica.
+
+    Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
+    tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
+    alone goes to older ones only. What is left starts fused tracks of its own.
+    """
+    system = tracks.system.copy()
+    next_number = next_number.copy()
+    for tracker in range(trackers):
+        now = replace(tracks, system=system)
+        mine = tracks.tracker == tracker
+        alone = _alone(now)
+        free = np.flatnonzero(mine & ((system == 0) | alone))
+        if len(free) == 0:
+            continue
+        _join(rules, now, free, time_s, system)
+        new = free[system[free] == 0]
+        new = new[np.lexsort((tracks.number[new], tracks.replica[new]))]
+        place = np.searchsorted(replica, tracks.replica[new])
+        counts = np.bincount(place, minlength=len(replica))
+        within = np.arange(len(new)) - (np.cumsum(counts) - counts)[place]
+        system[new] = next_number[place] + within
+        next_number += counts
+    return replace(tracks, system=system), next_number
+
+
+def _alone(tracks: LocalTracks) -> BoolArray:
+    """Return which tracks are the only member of their fused track."""
+    found = np.zeros(len(tracks), dtype=bool)
+    member = np.flatnonzero(tracks.system > 0)
+    if len(member):
+        leader, of = leaders(tracks.take(member))
+        found[member] = (np.bincount(of, minlength=len(leader)) == 1)[of]
+    return found
+
+
+def _join(
+    rules: MatchRules,
+    tracks: LocalTracks,
+    free: IntArray,
+    time_s: FloatArray,
+    system: IntArray,
+) -> None:
+    """Write into `system` which fused tracks some tracks of one tracker now belong to."""
+    member = np.flatnonzero(tracks.system > 0)
+    if len(member) == 0:
+        return
+    leader, of = leaders(tracks.take(member))
+    tracker = tracks.tracker[free[0]]
+    taken = np.bincount(of, weights=tracks.tracker[member] == tracker, minlength=len(leader)) > 0
+    lead = member[leader[~taken]]
+    begin = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="left")
+    many = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="right") - begin
+    candidate = np.repeat(np.arange(len(free)), many)
+    start = np.cumsum(many) - many
+    which = np.arange(len(candidate)) - np.repeat(start - begin, many)
+    home = tracks.system[free[candidate]]
+    older = (home == 0) | (tracks.system[lead[which]] < home)
+    candidate, which = candidate[older], which[older]
+    if len(candidate) == 0:
+        return
+    share = gate_share(
+        rules, tracks.take(lead[which]), tracks.take(free[candidate]), time_s[free[candidate]]
+    )
+    inside = share <= 1.0
+    candidate, which, share = candidate[inside], which[inside], share[inside]
+    won = global_nearest(which, candidate, share, 1.0)
+    system[free[candidate[won]]] = tracks.system[lead[which[won]]]

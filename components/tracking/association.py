@@ -1,0 +1,276 @@
+"""Data association in a tracker: which detections belong to which tracks, and correct them.
+
+An association is a class with `update`; one that gives every track at most one detection is an
+`OneToOne` that says which pairs are taken. Pairs come kind by kind, as angle-only detections and
+those with a range are gated by different quantities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from components.association.assignment import alone, gate_threshold, global_nearest, nearest
+from components.association.jpda import marginals
+from components.estimation.batched import is_everything, log_determinant, selected
+from components.estimation.estimator import Estimates, innovation_squared
+from components.estimation.frame import SensorPose
+from components.estimation.modified_polar import moved_in_polar, ranged_in_polar
+from components.tracking.gating import GatedPairs, log_density, log_gain
+from components.tracking.rules import TrackerRules
+from components.tracking.track_store import TrackStore, estimate_columns
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+_LOG_2_PI = float(np.log(2.0 * np.pi))
+# Weights of JPDA are kept below this power of e: products of some of them still are numbers.
+_LARGEST_LOG = 200.0
+
+#: Tracks after a look, which of them were hit, and of these ln(Pd N(z) / λ).
+Associated = tuple[TrackStore, BoolArray, FloatArray]
+
+
+class Association(Protocol):
+    """Decides which detections belong to which tracks."""
+
+    def update(
+        self,
+        rules: TrackerRules,
+        part: TrackStore,
+        kinds: list[GatedPairs],
+        sensors: IntArray,
+        pose: SensorPose,
+    ) -> Associated:
+        """Return predicted tracks after the detections in their gates.
+
+        `sensors` is the mask of the sensors of each detection, `pose` that of each track's look.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """All pairs of a track and a detection in its gate, whatever their kind."""
+
+    rules: TrackerRules
+    kinds: list[GatedPairs]
+    sensors: IntArray
+
+    @cached_property
+    def track(self) -> IntArray:
+        """Index of each pair's track."""
+        return joined([one.track for one in self.kinds])
+
+    @cached_property
+    def detection(self) -> IntArray:
+        """Index of each pair's detection."""
+        return joined([one.detection for one in self.kinds])
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Squared Mahalanobis distance of each pair."""
+        return joined([one.measured.distance for one in self.kinds])
+
+    @cached_property
+    def volume(self) -> FloatArray:
+        """What makes distances of several kinds comparable: false alarms in the volume of |S|."""
+        return np.concatenate(
+            [
+                _log_volume(one)
+                + 2.0 * log_density(self.rules, one, self.sensors)
+                + one.kind.size * _LOG_2_PI
+                for one in self.kinds
+            ]
+        )
+
+    @cached_property
+    def price(self) -> FloatArray:
+        """Of each pair, what it costs its track to go without: the widest gate that it has."""
+        sizes = np.concatenate([np.full(len(one.track), one.kind.size) for one in self.kinds])
+        limits = np.zeros(5)
+        for many in range(2, 5):
+            limits[many] = gate_threshold(self.rules.p.gate_probability, many)
+        price = np.full(int(self.track.max()) + 1, -np.inf)
+        np.maximum.at(price, self.track, limits[sizes] + self.volume)
+        return price[self.track]
+
+
+class OneToOne(Association, Protocol):
+    """Gives every track at most one detection, and every detection to at most one track."""
+
+    def taken(self, pairs: Candidates) -> IntArray:
+        """Return the pairs that are taken, ascending; no track and no detection is in two."""
+        ...
+
+    def update(
+        self,
+        rules: TrackerRules,
+        part: TrackStore,
+        kinds: list[GatedPairs],
+        sensors: IntArray,
+        pose: SensorPose,
+    ) -> Associated:
+        """Return tracks, each updated by at most one detection."""
+        hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
+        if not kinds:
+            return part, hit, gain
+        pairs = Candidates(rules, kinds, sensors)
+        if bool(alone(pairs.track, pairs.detection).all()):
+            taken = np.arange(len(pairs.track))
+        else:
+            taken = self.taken(pairs)
+        first = 0
+        for one in kinds:
+            last = first + len(one.track)
+            mine = taken if len(kinds) == 1 else taken[(taken >= first) & (taken < last)] - first
+            first = last
+            if len(mine) == 0:
+                continue
+            which = one.track[mine]
+            if not bool((which[1:] > which[:-1]).all()):
+                mine = mine[np.argsort(which)]
+                which = one.track[mine]
+            estimates = rules.estimator.update(part.estimates(), which, one.measured, mine)
+            correct_angle_only(part, which, one, mine, pose, estimates)
+            mask = sensors[one.detection[mine]]
+            gain[which] = log_gain(rules, part, one, sensors)[mine]
+            hit[which] = True
+            before: dict[str, Any] = part.columns if is_everything(which, len(part)) else {
+                name: selected(part.columns[name], which)
+                for name in ("contributors", "ranged", "nis", "freedom", "weights")
+            }  # fmt: skip
+            nis = innovation_squared(one.measured, before["weights"], mine)
+            new = {
+                **estimate_columns(estimates),
+                "contributors": before["contributors"] | mask,
+                "updated_by": mask,
+                "ranged": before["ranged"] | one.measures_range,
+                "nis": before["nis"] + nis,
+                "freedom": before["freedom"] + one.kind.size,
+            }
+            part = part.put(which, new)
+        return part, hit, gain
+
+
+class Nearest(OneToOne):
+    """Takes the nearest pair first."""
+
+    def taken(self, pairs: Candidates) -> IntArray:
+        """Return the pairs that are taken."""
+        return nearest(pairs.track, pairs.detection, pairs.distance)
+
+
+class GlobalNearest(OneToOne):
+    """Takes the pairs of the least sum over all (global nearest neighbour)."""
+
+    def taken(self, pairs: Candidates) -> IntArray:
+        """Return the pairs that are taken."""
+        cost = pairs.distance + pairs.volume
+        return global_nearest(pairs.track, pairs.detection, cost, pairs.price)
+
+
+class JointProbabilistic(Association):
+    """Updates tracks by all detections in their gates, weighed (JPDA).
+
+    Every pair updates its track; what the track is then is the mixture of all that may be, with the
+    miss among them (Bar-Shalom, Li, *Multitarget-Multisensor Tracking* (1995), §3.4, in a form that
+    lets detections differ in their variances and kinds). A track is hit where it is likelier than
+    not that one of its detections is its own.
+    """
+
+    def update(
+        self,
+        rules: TrackerRules,
+        part: TrackStore,
+        kinds: list[GatedPairs],
+        sensors: IntArray,
+        pose: SensorPose,
+    ) -> Associated:
+        """Return tracks updated by all detections in their gates."""
+        count = len(part)
+        if not any(len(one.track) for one in kinds):
+            return part, np.zeros(count, dtype=bool), np.zeros(count)
+        track = np.concatenate([one.track for one in kinds])
+        entry = np.concatenate([one.detection for one in kinds])
+        logs = np.concatenate([log_gain(rules, part, one, sensors) for one in kinds])
+        missing = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
+        weight = np.exp(np.minimum(logs - missing, _LARGEST_LOG))
+        share = marginals(track, entry, weight, rules.p.jpda_exact_detections)
+        taken = np.bincount(track, weights=share, minlength=count)
+        missed = np.maximum(1.0 - taken, 0.0)
+        gain = missing + np.log1p(np.bincount(track, weights=weight, minlength=count))
+        updates = []
+        for one in kinds:
+            which = np.arange(len(one.track))
+            updated = rules.estimator.update(part.estimates(), one.track, one.measured, which)
+            correct_angle_only(part, one.track, one, which, pose, updated)
+            updates.append(updated)
+        merged = rules.estimator.merge(
+            part.estimates(), missed, track, share, Estimates.joined(updates)
+        )
+        hit = taken > 0.5
+        order = np.lexsort((share, track))
+        last = np.flatnonzero(np.append(track[order][1:] != track[order][:-1], True))
+        likeliest = np.zeros(count, dtype=np.int64)
+        likeliest[track[order][last]] = sensors[entry[order][last]]
+        mask = np.where(hit, likeliest, 0)
+        ranged = np.zeros(count, dtype=bool)
+        for one in kinds:
+            if one.measures_range:
+                ranged[one.track] = True
+        changed = part.with_estimates(
+            merged,
+            contributors=part.contributors | mask,
+            updated_by=np.where(hit, mask, part.updated_by),
+            ranged=part.ranged | (ranged & hit),
+        )
+        return changed, hit, gain
+
+
+#: By the parameter `association` of trackers.
+ASSOCIATIONS: dict[str, Association] = {
+    "nearest": Nearest(), "gnn": GlobalNearest(), "jpda": JointProbabilistic(),
+}  # fmt: skip
+
+
+def correct_angle_only(
+    part: TrackStore,
+    track: IntArray,
+    one: GatedPairs,
+    pair: IntArray,
+    pose: SensorPose,
+    estimates: Estimates,
+) -> None:
+    """Bring corrections of angle-only tracks into modified polar coordinates, in place.
+
+    `estimates` are those of the tracks `track` of the predicted `part` after the pairs `pair`.
+    """
+    angle_only = (~part.ranged[track]).nonzero()[0]
+    if one.kind.has_range or len(angle_only) == 0:
+        return
+    which = track[angle_only]
+    sensor_m = selected(pose.position_m, which)
+    after = zip(estimates.states, estimates.covariances, strict=True)
+    for before, (state, covariance) in zip(part.states(), after, strict=True):
+        moved = moved_in_polar(
+            selected(before, which), selected(state, angle_only),
+            selected(covariance, angle_only), sensor_m,
+        )  # fmt: skip
+        if one.ranges is not None:
+            range_m, variance_m2 = (values[pair[angle_only]] for values in one.ranges)
+            moved = ranged_in_polar(*moved, range_m, variance_m2, sensor_m)
+        state[:, angle_only], covariance[:, :, angle_only] = moved
+
+
+def joined(parts: Sequence[Any]) -> Any:
+    """Return arrays end to end; a single one as it is."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _log_volume(one: GatedPairs) -> FloatArray:
+    """Return ln |S| of every pair; of several models the least, whose gate is the tightest."""
+    found = log_determinant(one.measured.innovations[0].root)
+    for other in one.measured.innovations[1:]:
+        found = np.minimum(found, log_determinant(other.root))
+    return found

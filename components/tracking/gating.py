@@ -1,0 +1,267 @@
+"""Pairs of a track and a detection in its gate."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from components.association.assignment import gate_threshold
+from components.estimation.batched import selected
+from components.estimation.estimator import PairMeasurement, log_mixture, pair_measurement
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import Moments
+from components.estimation.measurement import Kind, expected
+from components.geometry.angles import wrap_pi_unchecked
+from components.messages.state_tracks import COASTED, CONFIRMED
+from components.tracking.rules import TrackerRules
+from components.tracking.scans import LookBatch, Scans, kind_of
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+# So many pairs are looked at together.
+_MOST_PAIRS = 1 << 20
+# The square of a box's width by that of the gate in it: who is in the gate must not depend on it.
+_WIDER = 1.1
+# Nearer to the vertical azimuths say nothing.
+_LEAST_COS = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class GatedPairs:
+    """The pairs of one kind of measurement, by index among all tracks and detections of a step."""
+
+    kind: Kind
+    track: IntArray
+    detection: IntArray
+    measured: PairMeasurement
+    #: What else was measured, of tracks without a range: ranges and their variances.
+    ranges: tuple[FloatArray, FloatArray] | None = None
+
+    @property
+    def measures_range(self) -> bool:
+        """Whether the detections have a range."""
+        return self.kind.has_range or self.ranges is not None
+
+
+def gated_pairs(
+    rules: TrackerRules, part: TrackStore, of: IntArray, pose: SensorPose, batch: LookBatch
+) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
+    """Return the pairs of predicted tracks and of detections in their gates, kind by kind.
+
+    `of` is the look of each track, ascending, and `pose` that look's. Also returned are the
+    direction that the first model expects of every track, (2, tracks) in body axes, where it was
+    needed and is that of the state; and which detections are held: in the gate of a track, or in
+    the wider one of a track that is confirmed.
+    """
+    kinds: list[GatedPairs] = []
+    scans = batch.scans
+    held = np.zeros(len(batch.detection), dtype=bool)
+    direction = None
+    some_angle_only = bool((~part.ranged).any())
+    spread = _PairVariance(rules, part, pose, scans)
+    for code in np.flatnonzero(np.bincount(batch.code, minlength=4)).tolist():
+        mine = np.flatnonzero(batch.code == code)
+        # What an angle-only track expects of a range says nothing: there the direction decides.
+        for ranged in (True, False) if some_angle_only and code & 1 else (None,):
+            kind, rows = kind_of(0 if ranged is False else code)
+            moments = rules.estimator.expect(kind, part.estimates(), pose)
+            # Moments of sigma points are means over them: not where the state itself is seen.
+            direction = moments[0].expected[:2] if moments[0].left_over is None else None
+            track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread)
+            if ranged is not None:
+                chosen = part.ranged[track] == ranged
+                track, entry = track[chosen], entry[chosen]
+            if len(track) == 0:
+                continue
+            cells = batch.detection[entry]
+            variance = spread(track, cells, rows)
+            pairs = pair_measurement(
+                moments,
+                track,
+                _picked(scans.measured, rows, cells),
+                variance,
+                common_errors(
+                    rules, part, track, scans, rows, cells, moments[0].expected, variance
+                ),
+                part.weights,
+            )
+            gated = pairs.distance <= gate_threshold(rules.p.gate_probability, kind.size)
+            held[entry[gated]] = True
+            if not gated.all():
+                settled = (part.status == CONFIRMED) | (part.status == COASTED)
+                near = pairs.distance <= gate_threshold(rules.widest_gate, kind.size)
+                held[entry[near & settled[track]]] = True
+            (inside,) = gated.nonzero()
+            cells = cells[inside]
+            ranges = (scans.measured[2][cells], scans.variance[2][cells])
+            kinds.append(
+                GatedPairs(
+                    kind, track[inside], entry[inside], pairs.take(inside),
+                    ranges if ranged is False else None,
+                )
+            )  # fmt: skip
+    return kinds, direction, held
+
+
+def _near(
+    rules: TrackerRules,
+    kind: Kind,
+    rows: list[int],
+    moments: list[Moments],
+    of: IntArray,
+    batch: LookBatch,
+    mine: IntArray,
+    spread: "_PairVariance",
+) -> tuple[IntArray, IntArray]:
+    """Return pairs of one look whose angles and range lie in a box about the gate."""
+    counts = np.bincount(of, minlength=len(batch.look))
+    first = np.cumsum(counts) - counts
+    many = counts[batch.of[mine]]
+    threshold = gate_threshold(rules.widest_gate, kind.size)
+    cells = batch.detection[mine]
+    measured = _picked(batch.scans.measured, rows[:3], cells)
+    variance = _picked(batch.scans.variance, rows[:3], cells)
+    boxes = [_box(one, variance, threshold, spread.most) for one in moments]
+    tracks, entries = [], []
+    # In clutter there are more pairs than fit into memory at once.
+    part = np.cumsum(many) // _MOST_PAIRS
+    for begin, end in _parts(part):
+        size = many[begin:end]
+        entry = np.repeat(np.arange(begin, end), size)
+        start = np.cumsum(size) - size
+        track = np.arange(len(entry)) - np.repeat(start - first[batch.of[mine[begin:end]]], size)
+        kept = [_inside(*box, measured, entry, track) for box in boxes]
+        near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
+        tracks.append(track[near])
+        entries.append(mine[entry[near]])
+    if len(tracks) == 1:
+        return tracks[0], entries[0]
+    return np.concatenate(tracks), np.concatenate(entries)
+
+
+class _PairVariance:
+    """Variances of pairs: as reported, and of the ownship's place as far as the track is."""
+
+    def __init__(
+        self, rules: TrackerRules, part: TrackStore, pose: SensorPose, scans: Scans
+    ) -> None:
+        self._scans, self._untold = scans, rules.untold_across_m2
+        #: What is added at most to each track's azimuth and elevation.
+        self.most: FloatArray | None = None
+        if self._untold is not None:
+            _, elevation, range_m = expected(Kind(True), part.state0, pose)
+            range2 = np.maximum(range_m, 1.0) ** 2
+            level2 = np.maximum(np.cos(elevation), _LEAST_COS) ** 2
+            self._by_m2 = np.stack([1.0 / (range2 * level2), 1.0 / range2])
+            self.most = self._untold.max() * self._by_m2
+
+    def __call__(self, track: IntArray, cells: IntArray, rows: list[int]) -> FloatArray:
+        variance = _picked(self._scans.variance, rows, cells)
+        if self._untold is not None:
+            source = self._scans.source[:2][:, cells]
+            across_m2 = np.where(source < 0, 0.0, self._untold[source])
+            variance[:2] += across_m2 * selected(self._by_m2, track)
+        return variance
+
+
+def _box(
+    found: Moments, variance: FloatArray, threshold: float, more: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return where one model expects angles and range, and half the widths of boxes about gates.
+
+    They are wide enough for the worst detection of all, and for rounding.
+    """
+    expected = found.expected[: len(variance)]
+    half = np.empty_like(expected)
+    for i, worst in enumerate(variance.max(axis=1).tolist()):
+        spread = found.total[i, i] + worst
+        if more is not None and i < 2:
+            spread = spread + more[i]
+        half[i] = np.sqrt((threshold * _WIDER) * spread)
+    return expected, half
+
+
+def _inside(
+    expected: FloatArray, half: FloatArray, measured: FloatArray, entry: IntArray, track: IntArray
+) -> IntArray:
+    """Return which pairs lie in the boxes about the gates of one model."""
+    left: IntArray | None = None
+    for i in range(len(expected)):
+        apart = measured[i].take(entry)
+        apart -= expected[i].take(track)
+        np.abs(apart, out=apart)
+        width = half[i].take(track)
+        inside = apart <= width
+        if i == 0:  # azimuths may be a turn apart
+            apart += width
+            inside |= apart >= 2.0 * np.pi
+        (some,) = inside.nonzero()
+        left = some if left is None else left[some]
+        entry, track = entry[some], track[some]
+    assert left is not None
+    return left
+
+
+def _picked(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
+    """Return some rows of values at some detections."""
+    found = np.empty((len(rows), len(cells)))
+    for i, row in enumerate(rows):
+        values[row].take(cells, out=found[i], mode="clip")
+    return found
+
+
+def _parts(part: IntArray) -> list[tuple[int, int]]:
+    """Return where runs of equal numbers, ascending from 0, begin and end."""
+    if len(part) == 0 or part[-1] == 0:
+        return [(0, len(part))]
+    cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(part)]
+    return list(pairwise(cuts))
+
+
+def common_errors(
+    rules: TrackerRules,
+    part: TrackStore,
+    track: IntArray,
+    scans: Scans,
+    rows: list[int],
+    cells: IntArray,
+    foreseen: FloatArray,
+    variance: FloatArray,
+) -> FloatArray | None:
+    """Return what the errors of pairs' measurements have in common with their sensors' last ones.
+
+    None where all errors are new at every look.
+    """
+    if rules.lasting is None:
+        return None
+    source = scans.source[rows][:, cells]
+    there = np.maximum(source, 0)
+    when = part.seen_tick[there, track]
+    apart_s = np.abs(part.tick[track] - when) / rules.ticks_per_s
+    since_s = np.where((when < 0) | (source < 0), np.inf, apart_s)
+    moved = np.zeros(source.shape)
+    for i, row in enumerate(rows):
+        if row < 3:
+            moved[i] = selected(foreseen[i], track) - part.seen[row, there[i], track]
+    moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
+    moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
+    range_m = np.where(np.isfinite(since_s), part.seen[2, there, track], np.inf)
+    return rules.lasting.common(rows, there, variance, moved, since_s, range_m)
+
+
+def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
+    """Return the logarithm of the density of false alarms at every pair's detection."""
+    mine = sensors[one.detection]
+    lowest = mine & -mine
+    sensor = np.frexp(lowest.astype(float))[1] - 1
+    code = one.kind.has_range + 2 * one.kind.has_range_rate
+    return np.asarray(rules.log_density[code].take(sensor))
+
+
+def log_gain(
+    rules: TrackerRules, part: TrackStore, one: GatedPairs, sensors: IntArray
+) -> FloatArray:
+    """Return ln(Pd N(z) / λ) of every pair."""
+    density = log_density(rules, one, sensors)
+    mixed = log_mixture(selected(part.weights, one.track), one.measured.log_likelihoods)
+    return np.asarray(np.log(rules.p.detection_probability) + mixed - density)

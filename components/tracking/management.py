@@ -1,0 +1,297 @@
+"""Track management: initiation, confirmation (M of N, likelihood ratio), coasting, deletion.
+
+Two rules confirm: m hits among the last n expected looks, or the sequential likelihood ratio of
+Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): the logarithm of the
+odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every look in
+vain by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the sensor,
+and only of sensors that see it: one that never hit it, or that has looked in vain for a while where
+another one hits, may be too far away, and says nothing.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from components.estimation.batched import product, product_transposed, selected, squared_length
+from components.estimation.estimator import Estimates
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import innovation, updated
+from components.estimation.measurement import Kind, expected, linearised, position_of
+from components.messages.reach import EVALUATE
+from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
+from components.tracking.rules import LONGEST_WINDOW, TrackerRules
+from components.tracking.scans import LookBatch, Scans, kind_of
+from components.tracking.track_store import NEVER, TrackStore, estimate_columns
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+#: Odds are kept within this: a track of an hour must not take an hour to be doubted.
+LARGEST_SCORE = 20.0
+#: After so many looks in vain a sensor is taken not to see a track that another one sees.
+BLIND_AFTER = 5
+
+
+def judged(
+    rules: TrackerRules,
+    status: IntArray,
+    history: IntArray,
+    looks: IntArray,
+    misses: IntArray,
+    score: FloatArray,
+) -> IntArray:
+    """Return the status of tracks after a look: confirmed, coasted, deleted, or as it was."""
+    p = rules.p
+    if p.initiation == "m_of_n":
+        window = np.minimum(looks, p.confirm_n)
+        hits = bits_set(history & ((np.int64(1) << np.int64(p.confirm_n)) - 1))
+        confirm = hits >= p.confirm_m
+        # What cannot come to m hits any more within its first n looks is dropped.
+        hopeless = hits + (p.confirm_n - window) < p.confirm_m
+    else:
+        gained = score - rules.start_score
+        low = np.log(p.missed_confirmation / (1.0 - p.false_confirmation))
+        confirm = gained >= np.log((1.0 - p.missed_confirmation) / p.false_confirmation)
+        hopeless = gained <= low
+    tentative = status == TENTATIVE
+    new = np.where(tentative & confirm, CONFIRMED, status)
+    new = np.where(tentative & ~confirm & hopeless, DELETED, new)
+    held = (new == CONFIRMED) | (new == COASTED)
+    new = np.where(held, np.where(misses > 0, COASTED, CONFIRMED), new)
+    return np.where(held & (misses >= p.delete_misses), DELETED, new)
+
+
+def seeing(vain: IntArray) -> BoolArray:
+    """Return which sensors see which tracks, (sensors, n), from their looks in vain."""
+    return np.asarray((vain < BLIND_AFTER) | ((vain == vain.min(axis=0)) & (vain < NEVER)))
+
+
+def bits_set(values: IntArray) -> IntArray:
+    """Return how many bits are 1 in numbers below 2^62."""
+    v = values - (values >> 1 & 0x5555555555555555)
+    v = (v & 0x3333333333333333) + (v >> 2 & 0x3333333333333333)
+    v = v + (v >> 4) & 0x0F0F0F0F0F0F0F0F
+    v = v + (v >> 8)
+    v = v + (v >> 16)
+    return np.asarray((v + (v >> 32)) & 0x7F, dtype=np.int64)
+
+
+def existence(score: FloatArray) -> FloatArray:
+    """Return the probability that belongs to the logarithm of odds."""
+    return np.asarray(1.0 / (1.0 + np.exp(-score)))
+
+
+def after_hits_and_misses(
+    history: IntArray, looks: IntArray, misses: IntArray, hit: BoolArray, missed: BoolArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return history, looks and misses after a look that hit or missed some of the tracks."""
+    counted = hit | missed
+    mask = (np.int64(1) << np.int64(LONGEST_WINDOW)) - 1
+    moved = np.where(counted, (history << 1 & mask) | hit, history)
+    return moved, looks + counted, np.where(hit, 0, misses + missed)
+
+
+def initiated(
+    rules: TrackerRules, batch: LookBatch, chosen: BoolArray, next_number: IntArray
+) -> tuple[TrackStore, IntArray]:
+    """Return a track for each of the chosen detections, and the next number of each replica."""
+    scans, looks, replica = batch.scans, batch.look, batch.replica
+    detection, of, codes = batch.detection[chosen], batch.of[chosen], batch.code[chosen]
+    count = len(detection)
+    sizes = [model.size for model in rules.estimator.models]
+    measured, variance = (
+        selected(scans.measured[:3], detection),
+        selected(scans.variance[:3], detection),
+    )
+    ranged = codes % 2 == 1
+    mean, deviation = rules.start_range_m
+    measured[2] = np.where(ranged, measured[2], mean)
+    variance[2] = np.where(ranged, variance[2], deviation**2)
+    # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
+    measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
+    pose = batch.pose(of)
+    position, jacobian = position_of(measured, pose)
+    spread = np.zeros((6, 6, count))
+    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
+    spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
+    for i in range(3, 6):
+        spread[i, i] = rules.p.start_speed_m_s**2
+    states, covariances = [], []
+    for size in sizes:
+        state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
+        state[:3], covariance[:6, :6] = position, spread
+        for i in range(6, size):
+            covariance[i, i] = rules.start_deviation(size) ** 2
+        _update_by_rates(scans, pose, codes, detection, state, covariance)
+        states.append(state)
+        covariances.append(covariance)
+    counts = np.bincount(of, minlength=len(looks))
+    within = np.arange(count) - (np.cumsum(counts) - counts)[of]
+    tick, mask, ones = scans.tick[looks][of], scans.contributors[detection], np.ones(count)
+    whole = ones.astype(np.int64)
+    born = TrackStore(
+        {
+            "replica": replica[of],
+            "number": next_number[of] + within,
+            "tick": tick,
+            "born_tick": tick,
+            "updated_tick": tick,
+            "history": whole,
+            "looks": whole,
+            "misses": 0 * whole,
+            "status": np.full(count, TENTATIVE),
+            "score": rules.start_score * ones,
+            "contributors": mask,
+            "updated_by": mask,
+            "ranged": ranged,
+            "nis": 0.0 * ones,
+            "freedom": 0 * whole,
+            "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
+            "seen": np.full((3, len(rules.fields), count), np.nan),
+            "seen_tick": np.full((len(rules.fields), count), -1),
+            **estimate_columns(
+                Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
+            ),
+        }
+    )
+    if rules.lasting is not None:
+        born = born.with_columns(**now_seen(born, pose, mask))
+    status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
+    return born.with_columns(status=status), next_number + counts
+
+
+def expected_looks(
+    rules: TrackerRules,
+    part: TrackStore,
+    of: IntArray,
+    batch: LookBatch,
+    pose: SensorPose,
+    direction: FloatArray | None,
+) -> BoolArray:
+    """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
+    scans = batch.scans
+    sensors = np.where(scans.tells_misses[batch.look], scans.sensors[batch.look], 0)
+    used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
+    looked = np.zeros((len(rules.fields), len(part)), dtype=bool)
+    if used == 0:
+        return looked
+    mine = sensors[of]
+    sees = seeing(part.vain)
+    where: tuple[FloatArray, FloatArray, FloatArray] | None = None
+    for i, field in enumerate(rules.fields):
+        if not used >> i & 1:
+            continue
+        looked[i] = (mine >> i & 1).astype(bool) & sees[i]
+        if field is None:
+            continue
+        if where is None:
+            if direction is None:
+                direction = expected(Kind(False), part.state0, pose)
+            away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
+            where = (*direction, np.where(part.ranged, away, 0.0))
+        inside = np.ones(len(part), dtype=bool)
+        looked[i] &= field.decide(*where, inside) == EVALUATE
+    return looked
+
+
+def managed(
+    rules: TrackerRules,
+    part: TrackStore,
+    changed: TrackStore,
+    pose: SensorPose,
+    looked: BoolArray,
+    hit: BoolArray,
+    gain: FloatArray,
+) -> TrackStore:
+    """Return tracks with their history, score and status after a look.
+
+    `part` are they before and `changed` after the update by detections; `looked` (sensors, tracks)
+    says whose looks were expected to see them, `gain` what a hit adds to the score.
+    """
+    missed = ~hit
+    missed &= looked.any(axis=0)
+    by = np.where(hit, changed.updated_by, 0)
+    vain = misdetection_counts(part.vain, by, looked)
+    gain[~hit] = 0.0
+    gain[missed] = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
+    history, count, misses = after_hits_and_misses(
+        part.history, part.looks, part.misses, hit, missed
+    )
+    score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
+    status = judged(rules, part.status, history, count, misses, score)
+    if rules.lasting is not None:
+        changed = changed.with_columns(**now_seen(changed, pose, by))
+    changed = changed.with_columns(
+        history=history, looks=count, misses=misses, score=score, vain=vain,
+        updated_tick=np.where(hit, changed.tick, changed.updated_tick),
+    )  # fmt: skip
+    ended = changed.ranged & (position_variance(changed) > rules.p.delete_above_m**2)
+    ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
+    return changed.with_columns(status=np.where(ended, DELETED, status))
+
+
+def misdetection_counts(vain: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
+    """Return each sensor's looks in vain since its last hit, after a look.
+
+    `by` is the mask of the sensors that updated each track.
+    """
+    new = vain.copy()
+    hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
+    for i, mine in enumerate(looked):
+        new[i] += mine
+        if hitting >> i & 1:
+            new[i][(by >> i & 1).astype(bool)] = 0
+    return new
+
+
+def position_variance(part: TrackStore) -> FloatArray:
+    """Return the variance of each track's position, summed over its axes."""
+    total = np.zeros(len(part))
+    for weight, spread in zip(part.weights, part.covariances(), strict=True):
+        total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
+    good = np.isfinite(total) & (total >= 0.0)
+    if not bool(good.all()):
+        number = int(part.number[~good][0])
+        raise ValueError(
+            f"the covariance of track {number} has become singular: the stated variances are "
+            "smaller than what the filter's arithmetic resolves at this range, or the noise of the "
+            "motion is too large beside them; state larger ones, or less noise"
+        )
+    return total
+
+
+def now_seen(part: TrackStore, pose: SensorPose, mask: IntArray) -> dict[str, Any]:
+    """Return the columns of where tracks were last seen after the sensors of a mask saw them."""
+    mine = (mask >> np.arange(len(part.vain))[:, np.newaxis] & 1).astype(bool)
+    here = expected(Kind(True), part.state0, pose)
+    return {
+        "seen": np.where(mine[np.newaxis], here[:, np.newaxis], part.seen),
+        "seen_tick": np.where(mine, part.tick, part.seen_tick),
+    }
+
+
+def _update_by_rates(
+    scans: Scans,
+    pose: SensorPose,
+    codes: IntArray,
+    detection: IntArray,
+    state: FloatArray,
+    covariance: FloatArray,
+) -> None:
+    """Update new tracks by their measured range rates, in pose."""
+    which = np.flatnonzero(codes >= 2)
+    if len(which) == 0:
+        return
+    kind, _ = kind_of(2)
+    known, slope = linearised(kind, selected(state, which), pose.take(which))
+    cells = detection[which]
+    rate, variance = selected(scans.measured[3:], cells), selected(scans.variance[3:], cells)
+    found = innovation(known[2:], slope[2:], selected(covariance, which), variance)
+    state[:, which], covariance[:, :, which] = updated(
+        selected(state, which), selected(covariance, which), found, rate - known[2:]
+    )
+
+
+def _diagonal(variance: FloatArray) -> FloatArray:
+    found = np.zeros((len(variance), *variance.shape))
+    for i, values in enumerate(variance):
+        found[i, i] = values
+    return found

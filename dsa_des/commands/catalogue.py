@@ -1,0 +1,221 @@
+"""``dsa-des components`` and ``examples``: block types, and shipped scenes and studies."""
+
+import inspect
+import os
+import typing
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from dsa_des.block.component import Component
+from dsa_des.block.entry_points import registered
+from dsa_des.block.ladder import Ladder
+from dsa_des.block.registry import UnknownType, find
+from dsa_des.commands.parameters import parameter_rows, scene_tables
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import unfinished
+from dsa_des.files.output_names import check_place, location_of, named, reason_of
+from dsa_des.scene.examples import Example, examples
+from dsa_des.scene.shipped_files import folders
+from dsa_des.terminal import terminal
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import printable
+
+_PARAMETER_HEADS = ("  name", "type", "unit", "default", "meaning")
+
+
+def show_components(name: str | None) -> None:
+    """Print the list of block types, or the description of one."""
+    console = terminal.console(120)
+    if name is None:
+        _list(console)
+        return
+    table = scene_tables().get(name)
+    if table is not None:
+        _describe_table(console, name, *table)
+        return
+    try:
+        cls = find(name)
+    except UnknownType as error:
+        tables = f"; or a table of scenes: {', '.join(scene_tables())}"
+        raise UsageError(f"{name}: {error}{tables}") from error
+    _describe(console, name, cls)
+
+
+def _list(console: Any) -> None:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("type", "takes", "sends", "what it is"):
+        table.add_column(heading, no_wrap=heading == "type")
+    for name in registered():
+        try:
+            cls = find(name)
+        except UnknownType as error:  # a broken plug-in must not hide the others
+            table.add_row(name, "", "", f"cannot be loaded: {error}")
+            continue
+        table.add_row(name, _ports(cls.inputs), _ports(cls.outputs), _summary(cls))
+    console.print(table)
+    console.print()
+    console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
+    console.print(
+        "So are tables of scenes: scene, extends, blocks, wires, processors, weather, ..."
+    )
+
+
+def _describe_table(
+    console: Any, name: str, what: str, rows: typing.Callable[[], list[typing.Any]]
+) -> None:
+    console.print(Text.assemble((name, "bold"), f"  {what}"))
+    _print_rows(
+        console,
+        _PARAMETER_HEADS,
+        [[Text(f"  {first}"), *map(Text, rest)] for first, *rest in rows()],
+    )
+
+
+def _print_rows(
+    console: Any, heads: typing.Sequence[str], rows: typing.Iterable[typing.Sequence[Any]]
+) -> None:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in heads:
+        table.add_column(heading, no_wrap=heading.startswith("  "))
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, highlight=False)
+
+
+def _ports(ports: typing.Mapping[str, Any]) -> str:
+    return ", ".join(sorted(ports)) or "-"
+
+
+def _summary(cls: type[Component]) -> str:
+    return (cls.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+
+
+def _describe(console: Any, name: str, cls: type[Component]) -> None:
+    console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.path())}"))
+    console.print(Text(inspect.cleandoc(cls.__doc__ or "")))
+    console.print()
+    console.print(f"look-ahead windows: {'yes' if cls.windowed else 'no'}", highlight=False)
+    sides: list[tuple[str, typing.Mapping[str, Any]]] = [
+        ("inputs", cls.inputs),
+        ("outputs", cls.outputs),
+    ]
+    for title, ports in sides:
+        console.print()
+        console.print(title, style="bold")
+        if not ports:
+            console.print("  none")
+        for port, declared in sorted(ports.items()):
+            mode = f", {declared.mode}" if title == "inputs" else ""
+            many = ", many writers" if getattr(declared, "many", False) else ""
+            optional = "" if getattr(declared, "required", True) else ", optional"
+            line = f"  {port} ({declared.message.__name__}{mode}{many}{optional}): {declared.doc}"
+            console.print(line, highlight=False)
+    console.print()
+    console.print("parameters", style="bold")
+    _print_rows(console, _PARAMETER_HEADS, parameter_rows(cls.Parameters))
+    _describe_hooks(console, cls)
+    for ladder in cls.ladders:
+        _describe_ladder(console, ladder)
+
+
+def _describe_hooks(console: Any, cls: type[Component]) -> None:
+    """Print what effects may act on, how they are called there, and which effects do."""
+    hooks = cls.all_hooks()
+    if not hooks:
+        return
+    console.print()
+    console.print("hooks, what effects may act on", style="bold")
+    acting = {
+        hook: ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
+        for hook in hooks
+    }
+    rows = [(f"  {hook}", how, acting[hook] or "-") for hook, how in sorted(hooks.items())]
+    _print_rows(console, ("  hook", "what it calls", "effects"), rows)
+
+
+def _describe_ladder(console: Any, ladder: Ladder) -> None:
+    units = ", ".join(f"{quantity.name} ({quantity.unit})" for quantity in ladder.quantities)
+    console.print()
+    console.print(f"ladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
+                  highlight=False)  # fmt: skip
+    names = [f"  {r.name}{' (reference)' * (r.name == ladder.reference)}" for r in ladder.rungs]
+    rows = [(name, r.type_name or "as it is", r.what)
+            for name, r in zip(names, ladder.rungs, strict=True)]  # fmt: skip
+    _print_rows(console, ("  rung", "type", "what it is"), rows)
+
+
+_HEADINGS = {
+    "scene": "Scenes: dsa-des run NAME",
+    "study": "Studies: dsa-des study NAME",
+}
+_OPTION = "--copy"
+_CODE = "__pycache__"
+
+
+def show_examples(copy: str | None) -> None:
+    """List all shipped scenes and studies, or copy their folders with all that they extend."""
+    if copy is not None:
+        _copy(named(copy, _OPTION))
+        return
+    found = examples()
+    if not found:
+        say("no installed package ships scenes or studies")
+    width = max((len(example.name) for example in found), default=0)
+    for kind, heading in _HEADINGS.items():
+        of_kind = [example for example in found if example.kind == kind]
+        if of_kind:
+            say(heading)
+        for example in of_kind:
+            say(_line(example, width))
+
+
+def _line(example: Example, width: int) -> str:
+    return f"  {example.name:<{width}}  {' '.join(example.title.split())}"
+
+
+def _copy(target: Path) -> None:
+    """Copy the folders of all packages; several each into a folder of the package's name.
+
+    Raises
+    ------
+    UsageError
+        If the target is there already and not empty, or is no place for a folder.
+    OutputError
+        If it cannot be written.
+    """
+    sources = folders()
+    if not sources:
+        raise UsageError("no installed package ships scenes or studies")
+    check_place(target, _OPTION)
+    try:
+        if os.path.lexists(target) and any(target.iterdir()):
+            raise UsageError(f"{_OPTION} {target}: is not empty; a new folder is needed")
+        place = location_of(target)
+        with unfinished(place) as folder:
+            copied = folder / "copy"
+            copied.mkdir()
+            several = len(sources) > 1
+            count = sum(
+                _copy_files(source, copied / source.parent.name if several else copied)
+                for source in sources
+            )
+            if place.exists():
+                place.rmdir()
+            copied.rename(place)
+    except OSError as error:
+        raise OutputError(f"{_OPTION} {target}: cannot be written: {reason_of(error)}") from error
+    say(f"{target}: {count} files")
+
+
+def _copy_files(source: Path, into: Path) -> int:
+    """Copy what is in the files, not who may read and write them."""
+    files = [path for path in sorted(source.rglob("*")) if path.is_file()]
+    files = [path for path in files if _CODE not in path.parts]
+    for path in files:
+        copy = into / path.relative_to(source)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(path.read_bytes())
+    return len(files)

@@ -1,0 +1,138 @@
+"""The command group ``dsa-des``: plain errors, and commands that packages add to it.
+
+Those are entry points of the group ``dsa_des.commands``. Each is a `click.Command` in a module that
+imports click only, so that ``--help`` stays instant: a command imports what it needs when it is
+called. Every error that a user can cause is one message and an exit code.
+"""
+
+import functools
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import click
+
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign_calls import error_text, raised_in
+from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
+from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.terminal import say, say_lines
+from dsa_des.text.safe_text import printable
+
+# What may end a command; all else is a stranger's code in a place not foreseen.
+_OURS = ("dsa_des", "components", "click", "rich")
+
+
+def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn the errors a user can cause into one message without a traceback."""
+
+    @functools.wraps(command)
+    def guarded(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except (SceneError, UsageError) as error:
+            say_lines(f"error: {error}", err=True)
+            sys.exit(2)
+        except (BlockFailure, OutputError) as error:
+            say_lines(f"error: {error}", err=True)
+            sys.exit(getattr(error, "exit_code", 1))
+        except SystemExit as error:
+            module = raised_in(error.__traceback__)
+            if module.partition(".")[0] in _OURS:
+                raise
+            say(f"error: the module {module!r} left with {error_text(error)}", err=True)
+            sys.exit(2)
+        except BrokenPipeError:  # the reader of our output went away
+            sys.stderr.close()
+            sys.exit(1)
+
+    return guarded
+
+
+@contextmanager
+def plain_output() -> Iterator[None]:
+    """Say in one line that a file or our own output cannot be written, and end with exit code 1."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()  # now, where it can be said, and not when Python ends
+    except OSError as error:
+        # What is left in the buffer is written when Python ends, and must not fail again.
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+        if not isinstance(error, BrokenPipeError):
+            what = error.filename or "the output cannot be written"
+            with suppress(OSError, ValueError):
+                say(f"error: {what}: {error.strerror or error}", err=True)
+        sys.exit(1)
+
+
+COMMANDS = "dsa_des.commands"
+# What click (from 8.2 on) raises where a command is missing: its message is the whole help.
+HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
+
+
+@contextmanager
+def _printable_errors() -> Iterator[None]:
+    """Escape what click repeats of the arguments in its own errors."""
+    try:
+        yield
+    except HELP:
+        raise
+    except click.ClickException as error:
+        attributes = vars(error)  # click calls them final
+        for name in ("message", "ui_filename"):
+            if name in attributes:
+                attributes[name] = printable(attributes[name])
+        raise
+
+
+class PluginGroup(click.Group):
+    """A command group whose registered commands are loaded when they are named or listed.
+
+    Whatever it runs ends in one line: also when a signal interrupts it (exit code 130 for ctrl-C,
+    143 for SIGTERM) and when its output cannot be written (1).
+    """
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a command and end the program."""
+        with plain_ending(), plain_output():
+            try:
+                return super().main(*args, **kwargs)
+            except UsageError as error:  # a registered command that cannot be imported
+                say_lines(f"error: {error}", err=True)
+                sys.exit(2)
+
+    # click turns KeyboardInterrupt into exit code 1 outside of these two.
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Read the command line."""
+        with plain_ending(), _printable_errors():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that the command line names."""
+        with plain_ending(), _printable_errors():
+            return super().invoke(ctx)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return our own commands and the registered ones, sorted."""
+        return sorted({*super().list_commands(ctx), *registered(COMMANDS)})
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return one command, our own first."""
+        own = super().get_command(ctx, cmd_name)
+        if own is not None or cmd_name not in registered(COMMANDS):
+            return own
+        from dsa_des.block.foreign import installed
+
+        found: Any = installed(registered(COMMANDS)[cmd_name])
+        if not isinstance(found, click.Command):
+            raise click.ClickException(
+                f"the registered command {cmd_name!r} is not a click.Command"
+            )
+        return found

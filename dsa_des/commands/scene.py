@@ -1,0 +1,267 @@
+"""``dsa-des run``, ``check`` and ``explain``: one scene run, checked, and its effects told."""
+
+import gc
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from dsa_des.block.foreign import Foreign, Imports, imports
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.running.effect_plan import Planned
+from dsa_des.running.long_run import say_if_long
+from dsa_des.running.pacing import Pacer, parse_factor
+from dsa_des.running.recorded_run import record_run
+from dsa_des.running.reports import load_reports
+from dsa_des.running.simulation import Simulation
+from dsa_des.running.warnings import say_warnings, warnings_of
+from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.graph import in_cycles
+from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.terminal import terminal
+from dsa_des.terminal.terminal import say, say_json
+from dsa_des.text.safe_text import shortened
+
+
+def load(
+    scene: str,
+    sets: Iterable[str],
+    swaps: Iterable[str],
+    seed: int | None,
+    duration: str | None,
+    quiet: bool = False,
+) -> Scene:
+    """Load and check a scene; parameters that were dropped are listed on standard error."""
+    path = chosen_file(scene, "scene")
+    loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    if not quiet:
+        say_notes(loaded)
+    return loaded
+
+
+def say_notes(loaded: Scene) -> None:
+    """List on standard error what was done to a scene that its files do not show."""
+    for key in loaded.dropped:
+        say(f"note: the swap dropped {key}", err=True)
+    for note in loaded.notes:
+        say(f"note: {note}", err=True)
+
+
+def run_scene(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    out: str | None,
+    quiet: bool,
+    as_json: bool,
+    simulate_everything: bool,
+    realtime: str | None,
+    no_figures: bool,
+) -> None:
+    """Run a scene into a folder, then print its summary."""
+    pacer = None if realtime is None else Pacer(parse_factor(realtime))
+    loaded = load(scene, sets, swaps, seed, duration, quiet)
+    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
+    summary = record_run(
+        loaded,
+        target,
+        simulate_everything=simulate_everything,
+        silent=quiet or as_json,
+        warn=not quiet,
+        pacer=pacer,
+        draw=not no_figures,
+    )
+    if as_json:
+        say_json(summary)
+    elif not quiet:
+        console = terminal.console()
+        for report in load_reports():
+            report.show(console, summary)
+        if pacer is not None:
+            console.print(pacer.sentence(), soft_wrap=True)
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Pause the search for cyclic garbage: of a million targets it takes a quarter of a check."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+def check_scene_file(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    no_import: bool,
+) -> None:
+    """Load a scene, prepare its blocks (files are read), and say what was found.
+
+    Every foreign module is named, with its file, before it is imported: one that ends the process
+    (``os._exit``) has the last line. With `no_import` none is, and what depends on it stays
+    unchecked.
+    """
+
+    def announce(foreign: Foreign) -> None:
+        verb = "does not import" if no_import else "imports"
+        say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
+
+    with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
+        loaded = load(scene, sets, swaps, seed, duration)
+        if no_import and policy.seen:
+            say(
+                f"{scene}: nothing wrong as far as it was checked. {len(loaded.blocks)} blocks; "
+                "parameters, wires and clocks of the types above, and what needs the whole scene, "
+                "were not checked."
+            )
+            return
+        simulation = Simulation(loaded)
+    say_if_long(simulation)
+    _say_if_slowed(simulation)
+    say_warnings(warnings_of(simulation), "warning")
+    clocks = [node for node in simulation.nodes.values() if node.clock is not None]
+    say(
+        f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "
+        f"{float(simulation.duration_s):g} s at {loaded.ticks_per_s:,} ticks per second."
+    )
+    for node in clocks:
+        assert node.clock is not None
+        spec = node.clock.spec
+        say(
+            f"  {node.name}: {float(spec.rate_hz):g} Hz from {float(spec.offset_s):g} s, "
+            f"a scan every {float(node.clock.period):,.10g} ticks"
+        )
+
+
+def _say_if_slowed(simulation: Simulation) -> None:
+    """Say which blocks keep a feedback loop from looking ahead."""
+    scene = simulation.scene
+    looped = in_cycles(scene.graph)
+    if not looped or not simulation.unwound:
+        return
+    # A window is rewound as a whole, so a block outside of the loop counts as well.
+    say(f"note: the feedback loop of {', '.join(sorted(looped))} runs scan by scan, which is slow:")
+    for name, why in simulation.unwound.items():
+        say(f"  {name} ({scene.classes[name].path()}) {why}")
+
+
+_WIDE = 300
+
+
+def explain_scene(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    measure: bool,
+    simulate_everything: bool,
+) -> None:
+    """Print a table of every block's effects; with `measure`, run the scene to time them."""
+    from rich.table import Table
+
+    loaded = load(scene, sets, swaps, seed, duration)
+    simulation = Simulation(loaded, simulate_everything=simulate_everything)
+    shares = measured_shares(loaded, simulate_everything) if measure else None
+    console = terminal.console(_WIDE)  # no terminal: every sentence on one line
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for heading in ("block", "effect", "largest influence"):
+        table.add_column(heading, no_wrap=heading == "block")
+    if shares is not None:
+        table.add_column("share of run time", justify="right")
+    planned = [*simulation.plan, *simulation.timing_plan]
+    for item in planned:
+        row = [shortened(item.block), item.sentence(), _bound(item)]
+        if shares is not None:
+            share = shares.get((item.block, item.effect.name))
+            row.append("" if share is None else f"{share:.1%}")
+        table.add_row(*row)
+    for name, component in simulation.components.items():
+        for sentence in component.left_out():
+            table.add_row(shortened(name), sentence)
+    if not table.row_count:
+        console.print("No block of this scene declares effects.")
+        return
+    console.print(table)
+    if outside := [item for item in planned if not item.effect.neutral and not item.built]:
+        console.print()
+        console.print(_outside_the_proof(outside))
+
+
+def _outside_the_proof(items: list[Planned]) -> Any:
+    """Return a table of the effects that --simulate-everything leaves out, and why."""
+    from rich.table import Table
+
+    table = Table(
+        box=None,
+        padding=(0, 2, 0, 0),
+        title="not built by --simulate-everything, so not covered by its proof",
+        title_justify="left",
+        title_style="",
+        show_header=False,
+    )
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for item in items:
+        why = item.effect.outside_the_proof or "it has no neutral form"
+        reasons.setdefault((item.effect.name, why), []).append(item.block)
+    for (name, why), blocks in reasons.items():
+        table.add_row(f"{', '.join(shortened(block) for block in blocks)}", f"{name}: {why}")
+    return table
+
+
+def _bound(item: Planned) -> str:
+    return ", ".join(f"{q} {bound:.2g}" for q, bound in sorted(item.verdict.bound.items()))
+
+
+class _Timed:
+    """A built effect that adds up the time spent in it, in calls of it and of its methods."""
+
+    def __init__(self, built: Any) -> None:
+        self.built = built
+        self.spent_s = 0.0
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self._timed(self.built, *args, **kwargs)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self.built, name)
+        return partial(self._timed, value) if callable(value) else value
+
+    def _timed(self, call: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        started = time.perf_counter()
+        try:
+            return call(*args, **kwargs)
+        finally:
+            self.spent_s += time.perf_counter() - started
+
+
+def measured_shares(
+    scene: Scene, simulate_everything: bool = False
+) -> dict[tuple[str, str], float]:
+    """Run a scene and return each built effect's share of the run time, by (block, effect).
+
+    An effect that is a choice rather than a calculation, such as the name of a method, has none.
+    """
+    timed: dict[tuple[str, str], _Timed] = {}
+
+    def wrap(item: Planned, built: Any) -> Any:
+        if not callable(built):
+            return built
+        timed[item.block, item.effect.name] = _Timed(built)
+        return timed[item.block, item.effect.name]
+
+    simulation = Simulation(scene, simulate_everything=simulate_everything, wrap_effect=wrap)
+    started = time.perf_counter()
+    simulation.run()
+    whole = time.perf_counter() - started
+    return {key: effect.spent_s / whole for key, effect in timed.items()}

@@ -1,0 +1,384 @@
+"""Curves of a study's results: along an axis, over bearing, of a series, spread over the runs."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.results.labels import axis_label, readable, unit_of, value_label
+from dsa_des.results.maps import Target, digits
+from dsa_des.results.statistics import chi_square_bounds
+from dsa_des.results.summary import Compared, Line
+
+#: Okabe and Ito's colours and markers, told apart with any kind of colour vision.
+STYLES = (
+    ("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D"), ("#E69F00", "^"), ("#CC79A7", "v"),
+    ("#56B4E9", "P"), ("#000000", "X"),
+)  # fmt: skip
+_MOST_LINES = 12
+#: Letters of a title.
+_TITLE = 80
+#: More texts than this below an axis cannot be told apart.
+_MOST_NAMES = 60
+_FEWEST_BINS, _MOST_BINS = 5, 40
+
+
+def _style(mark: tuple[str, str] | None, number: int, of: int) -> tuple[str, str]:
+    """Return colour and marker of a series: a lone one has those of the block it is of."""
+    return mark if of == 1 and mark is not None else STYLES[number % len(STYLES)]
+
+
+def _series_along(
+    axes: Sequence[str], lines: Sequence[Line], axis: str, by: str | None
+) -> dict[str, list[Line]]:
+    """Return label → lines along `axis`, one series per value of all other axes."""
+    others = [k for k, name in enumerate(axes) if name != axis]
+    if by is not None:  # the named axis first, so that its values share a colour
+        others.sort(key=lambda k: axes[k] != by)
+    found: dict[str, list[Line]] = {}
+    for line in lines:
+        named = ", ".join(value_label(axes[k], line.at[k]) for k in others)
+        found.setdefault(named, []).append(line)
+    return found
+
+
+def draw_axis(
+    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str,
+    by: str | None, category: bool, shown: Sequence[Compared], title: str, confidence: float,
+) -> None:  # fmt: skip
+    """Draw a result against an axis, with intervals; below it the paired differences, if any."""
+    place = axes.index(axis)
+    values = list(dict.fromkeys(line.at[place] for line in lines))
+    where, numeric = _positions(values, category)
+    series = list(_series_along(axes, lines, axis, by).items())
+    with drawing(9.6 if len(series) > 4 else 7.5, 6.4 if shown else 4.2, target) as figure:
+        grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
+        top = grid[0]
+        for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
+            colour, marker = _style(some[0].result.mark, number, len(series))
+            shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
+            x = np.array([where[line.at[place]] for line in some]) + shift
+            known = any(not np.isnan(line.estimate.half_width) for line in some)
+            seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
+            _points(top, x, some, colour, marker, seen, join=numeric)
+            expected = [line.expected for line in some]
+            if any(item is not None for item in expected):
+                y = [np.nan if item is None else item for item in expected]
+                # One entry for all: each is dotted in the colour of its series.
+                note = "analytic" if number == 0 else None
+                top.plot(
+                    x, y, color=colour, ls=":" if numeric else "", marker="_", ms=9, label=note,
+                    zorder=1,
+                )  # fmt: skip
+        top.set_ylabel(readable(metric))
+        top.set_title(figure_text(title, _TITLE), loc="left")
+        if len(series) > 1 or top.get_legend_handles_labels()[1][1:]:
+            _beside_or_inside(top)
+        else:
+            top.legend()
+        if shown:
+            _differences(grid[1], shown, where, axes, axis, confidence)
+        bottom = grid[-1]
+        bottom.set_xlabel(axis_label(axis))
+        _ticks(bottom, values, where, numeric)
+        tight(figure)
+
+
+def _positions(values: list[Any], category: bool) -> tuple[dict[Any, float], bool]:
+    numeric = all(isinstance(v, int | float) for v in values)
+    if numeric and not category:
+        return {v: float(v) for v in values}, True
+    return {v: float(k) for k, v in enumerate(values)}, False
+
+
+def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
+    if not numeric:
+        shown = values[:: -(-len(values) // _MOST_NAMES)]
+        names = [f"{v:g}" if isinstance(v, float) else figure_text(v) for v in shown]
+        axes.set_xticks([where[v] for v in shown], names)
+        if sum(map(len, names)) > 60:
+            axes.tick_params(axis="x", labelrotation=30)
+            for label in axes.get_xticklabels():
+                label.set_ha("right")
+        axes.set_xlim(-0.5, len(values) - 0.5)
+        return
+    positive = [v for v in values if v > 0]
+    if len(positive) == len(values) > 2 and max(values) / min(values) >= 8:
+        axes.set_xscale("log")
+        ticks = _apart(values)
+        axes.set_xticks(ticks, [f"{v:g}" for v in ticks])
+        axes.set_xticks([], minor=True)
+
+
+def _apart(values: list[float]) -> list[float]:
+    """Return those values whose labels do not touch on a log axis, the first and the last first."""
+    low, high = math.log(min(values)), math.log(max(values))
+    kept: list[float] = []
+    for value in [min(values), max(values), *values]:
+        at = (math.log(value) - low) / (high - low)
+        if all(abs(at - (math.log(other) - low) / (high - low)) >= 0.055 for other in kept):
+            kept.append(value)
+    return sorted(kept)
+
+
+def _beside_or_inside(axes: Any) -> None:
+    """Put the legend inside where it is short, and beside the axes where it would cover them."""
+    names = axes.get_legend_handles_labels()[1]
+    if len(names) > 4:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    else:
+        axes.legend()
+
+
+def _points(
+    axes: Any, x: Any, lines: list[Line], colour: str, marker: str, series_label: str, *, join: bool
+) -> None:
+    y = np.array([line.estimate.value for line in lines])
+    low = np.array([line.estimate.low for line in lines])
+    high = np.array([line.estimate.high for line in lines])
+    bars = np.nan_to_num(np.abs([y - low, high - y]))
+    axes.errorbar(
+        x, y, yerr=bars, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
+        ls="-" if join else "none", label=series_label or None, zorder=2,
+    )  # fmt: skip
+
+
+def _differences(
+    axes: Any,
+    shown: Sequence[Compared],
+    where: dict[Any, float],
+    names: Sequence[str],
+    axis: str,
+    confidence: float,
+) -> None:
+    baseline = shown[0].baseline
+    text = f"{baseline:g}" if isinstance(baseline, float) else figure_text(baseline)
+    axes.axhline(0.0, color="#888888", lw=0.8)
+    groups: dict[tuple[Any, ...], list[Compared]] = {}
+    for item in shown:
+        groups.setdefault(item.at, []).append(item)
+    others = [name for name in names if name != axis]
+    for number, (at, items) in enumerate(list(groups.items())[:_MOST_LINES]):
+        colour, marker = _style(shown[0].result.mark, number, len(groups))
+        x = np.array([where[item.value] for item in items])
+        y = np.array([item.difference.paired.value for item in items])
+        half = np.nan_to_num([item.difference.paired.half_width for item in items])
+        series_label = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
+        axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
+                      ls="none", label=series_label or None)  # fmt: skip
+        if len(groups) == 1:
+            for px, item in zip(x, items, strict=True):
+                e = item.difference.paired
+                width = "" if np.isnan(e.half_width) else f" ± {digits(e.half_width)}"
+                text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
+                axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
+    unit = unit_of(shown[0].result.name)
+    axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
+    axes.set_title(
+        f"Paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
+    )
+    axes.margins(x=0.12, y=0.2)
+
+
+def _signed(value: float) -> str:
+    return ("+" if value > 0 else "") + digits(value)
+
+
+def draw_polar(
+    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str, title: str
+) -> None:
+    """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
+    place = axes.index(axis)
+    with drawing(6.2, 6.0, target) as figure:
+        polar = figure.add_subplot(projection="polar")
+        polar.set_theta_zero_location("N")
+        polar.set_theta_direction(-1)
+        series = list(_series_along(axes, lines, axis, None).items())
+        for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
+            colour, marker = _style(some[0].result.mark, number, len(series))
+            some = sorted(some, key=lambda line: line.at[place])
+            angle = np.radians([line.at[place] for line in some])
+            low, value, high = (
+                np.array([getattr(line.estimate, name) for line in some])
+                for name in ("low", "value", "high")
+            )
+            ring = slice(None)
+            if len(some) > 2 and np.ptp(np.degrees(angle)) >= 270:
+                ring = np.append(np.arange(len(some)), 0)  # type: ignore[assignment]
+            polar.plot(
+                angle[ring], value[ring], color=colour, marker=marker, ms=4, label=series_label
+            )
+            polar.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
+        polar.set_ylim(bottom=0.0)
+        over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
+        polar.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
+        if len(series) > 1:
+            polar.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
+        tight(figure)
+
+
+#: A label, and the values of its runs, NaN where a run has none.
+Spread = tuple[str, FloatArray]
+
+
+def draw_histogram(
+    path: Target, series: Sequence[Spread], metric: str, title: str, mark: tuple[str, str] | None
+) -> None:
+    """Draw how many runs have which value, one outline per series over common bins."""
+    known = [
+        (series_label, values[~np.isnan(values)], len(values))
+        for series_label, values in series[:_MOST_LINES]
+    ]
+    every = np.concatenate([values for _, values, _ in known] or [np.empty(0)])
+    with drawing(9.0 if len(known) > 4 else 7.5, 4.2, path) as figure:
+        axes = figure.add_subplot()
+        edges = _edges(every, max((len(values) for _, values, _ in known), default=0))
+        for number, (series_label, values, runs) in enumerate(known):
+            colour = _style(mark, number, len(known))[0]
+            counts = np.histogram(values, edges)[0]
+            axes.stairs(
+                counts, edges, color=colour, lw=1.4, label=_counted(series_label, values, runs)
+            )
+            axes.stairs(counts, edges, color=colour, fill=True, alpha=0.15)
+        axes.set_ylim(bottom=0.0)
+        axes.yaxis.get_major_locator().set_params(integer=True)
+        axes.set_ylabel("Runs")
+        _finish(figure, axes, metric, title)
+
+
+def draw_cdf(
+    path: Target, series: Sequence[Spread], metric: str, title: str, mark: tuple[str, str] | None
+) -> None:
+    """Draw the share of all runs whose value is at most x, one step curve per series.
+
+    Runs without a value count as well: where some have none, a curve ends below 1.
+    """
+    shown = series[:_MOST_LINES]
+    with drawing(9.0 if len(shown) > 4 else 7.5, 4.2, path) as figure:
+        axes = figure.add_subplot()
+        for number, (series_label, values) in enumerate(shown):
+            ascending = np.sort(values[~np.isnan(values)])
+            if not len(ascending):
+                axes.plot(
+                    [],
+                    [],
+                    color=_style(mark, number, len(shown))[0],
+                    label=f"{series_label}: no value",
+                )
+                continue
+            share = np.arange(1, len(ascending) + 1) / len(values)
+            axes.step(
+                np.concatenate((ascending[:1], ascending)), np.concatenate(([0.0], share)),
+                where="post", color=_style(mark, number, len(shown))[0], lw=1.4,
+                label=_counted(series_label, ascending, len(values)),
+            )  # fmt: skip
+        axes.set_ylim(0.0, 1.02)
+        axes.set_ylabel("Share of the runs at or below")
+        axes.grid(color="#DDDDDD", linewidth=0.5)
+        _finish(figure, axes, metric, title)
+
+
+def _counted(series_label: str, values: FloatArray, runs: int) -> str:
+    of = f"{len(values):,} of {runs:,}" if len(values) < runs else f"{runs:,}"
+    return f"{series_label}: {of} runs" if series_label else f"{of} runs"
+
+
+def _edges(values: FloatArray, most: int) -> FloatArray:
+    """Return the edges of bins that all series share: about the square root of the runs of one."""
+    if not len(values):
+        return np.array([0.0, 1.0])
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        half = max(abs(low) * 0.01, 0.5)
+        return np.array([low - half, low + half])
+    bins = int(np.clip(np.ceil(np.sqrt(most)), _FEWEST_BINS, _MOST_BINS))
+    return np.linspace(low, high, bins + 1)
+
+
+def _finish(figure: Any, axes: Any, metric: str, title: str) -> None:
+    axes.set_xlabel(readable(metric))
+    axes.set_title(figure_text(title, _TITLE), loc="left")
+    _beside_or_inside(axes)
+    tight(figure)
+
+
+#: A label, numbers, and the line at each.
+Series = tuple[str, Sequence[float], Sequence[Line]]
+
+
+def draw_series(
+    path: Target,
+    series: Sequence[Series],
+    metric: str,
+    title: str,
+    confidence: float,
+    freedom: float | None,
+) -> None:
+    """Draw the means of a series with their intervals, one line for each place of the axes.
+
+    With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
+    """
+    name, _, along = metric.partition(".")
+    with drawing(9.6 if len(series) > 4 else 7.5, 4.2, path) as figure:
+        axes = figure.add_subplot()
+        if freedom is not None and series:
+            _bounds(axes, series[0][1], series[0][2], freedom, confidence)
+        for place, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
+            colour, marker = STYLES[place % len(STYLES)]
+            value, low, high = (
+                np.array([getattr(line.estimate, part) for line in lines])
+                for part in ("value", "low", "high")
+            )
+            label = series_label or f"mean of the runs, {100 * confidence:g} % interval"
+            axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label, zorder=2)
+            axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2)
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel(axis_label(along) if along else "")
+        axes.set_ylabel(readable(name))
+        axes.set_title(figure_text(title, _TITLE), loc="left")
+        if len(series) > 4:
+            _beside_or_inside(axes)
+        else:  # from 0 on there is room below
+            axes.legend(loc="lower left")
+        tight(figure)
+
+
+def _bounds(
+    axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
+) -> None:
+    counts = [line.estimate.count for line in lines]
+    # The mean of n variables, each with so many degrees, is one with n times as many, by n.
+    found = [
+        np.array(chi_square_bounds(freedom * n, confidence)) / n if n else (math.nan, math.nan)
+        for n in counts
+    ]
+    low, high = np.array(found).T
+    axes.fill_between(
+        x, low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0,
+        label=f"{100 * confidence:g} % bounds of χ², {freedom:g} degrees",
+    )  # fmt: skip
+    axes.axhline(freedom, color="#999999", lw=0.8, zorder=1)
+
+
+def draw_scatter(
+    path: Target, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
+) -> None:
+    """Draw a result of two conditions against each other, one point per encounter or replica."""
+    both = ~np.isnan(first) & ~np.isnan(second)
+    with drawing(5.4, 5.2, path) as figure:
+        axes = figure.add_subplot()
+        if both.any():
+            ends = [
+                min(first[both].min(), second[both].min()),
+                max(first[both].max(), second[both].max()),
+            ]
+            axes.plot(ends, ends, color="#888888", lw=0.8)
+        axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color="#0072B2",
+                  alpha=0.6, markeredgewidth=0)  # fmt: skip
+        axes.set_xlabel(f"{readable(metric)}: {figure_text(names[0])}")
+        axes.set_ylabel(f"{readable(metric)}: {figure_text(names[1])}")
+        axes.set_title(figure_text(title, _TITLE), loc="left")
+        tight(figure)

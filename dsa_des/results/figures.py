@@ -1,0 +1,168 @@
+"""Figures of a study: those its file asks for, and two conditions against each other."""
+
+import hashlib
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+from dsa_des.results.curves import (
+    Series,
+    draw_axis,
+    draw_cdf,
+    draw_histogram,
+    draw_polar,
+    draw_scatter,
+    draw_series,
+)
+from dsa_des.results.labels import value_label
+from dsa_des.results.maps import Target, draw_heat, draw_map
+from dsa_des.results.record import FigureRecord
+from dsa_des.results.rows import paired
+from dsa_des.results.summary import Line, of_series
+from dsa_des.results.tables import Tables
+
+#: Letters of a figure's title.
+_LONGEST_TITLE = 200
+#: Bytes of a file's name, with room for what is put around it while it is written.
+_LONGEST_NAME = 200
+
+#: Draws a replica of a cell as ``dsa-des run`` does, and returns the paths.
+DrawRun = Callable[[int, int], list[Path]]
+
+
+def draw_figures(
+    tables: Tables, only: Sequence[str] = (), draw_run: DrawRun | None = None
+) -> list[Path]:
+    """Draw the study's figures into its folder and return their paths.
+
+    `only` names the results whose conditions are drawn against each other where there is a swap; by
+    default those that the figures show, or the first ones. Without `draw_run` no run is drawn.
+    """
+    paths: list[Path] = []
+    for number, figure in enumerate(tables.record.figures):
+        if figure.kind == "run":
+            paths += [] if draw_run is None else draw_run(figure.cell, figure.replica)
+            continue
+        drawn = io.BytesIO()
+        if draw_figure(drawn, tables, figure):
+            paths.append(_write(tables, f"figure-{number + 1:02d}-{figure.kind}.png", drawn))
+    if tables.compared and tables.baseline is not None and tables.baseline[0].startswith("swap."):
+        paths += _draw_scatters(tables, *tables.baseline, only)
+    return paths
+
+
+def _write(tables: Tables, name: str, drawn: io.BytesIO) -> Path:
+    tables.folder.write_file(name, drawn.getvalue())
+    return tables.folder.path / name
+
+
+def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
+    """Draw one figure; return False, and draw nothing, where the tables lack what it shows."""
+    axes, metric = tables.rows.axes, str(figure.metric)
+    if any(n is not None and n not in axes for n in (figure.axis, figure.x, figure.y)):
+        return False
+    title = _cut(tables.record.title if figure.title is None else figure.title)
+    confidence = tables.record.confidence
+    if figure.kind in ("histogram", "cdf"):
+        return _draw_spread(target, tables, figure, title)
+    if figure.kind == "series":
+        series = _series_of(tables, metric)
+        draw_series(target, series, metric, title, confidence, figure.freedom)
+        return True
+    if not axes:
+        return False
+    lines = [line for line in tables.lines if line.result.name == metric]
+    if figure.kind in ("heat", "map"):
+        x = figure.x or axes[0]
+        y = figure.y or next((a for a in axes if a != x), x)
+        if x == y:
+            return False
+        if figure.kind == "heat":
+            draw_heat(target, axes, lines, metric, x, y, title)
+        else:
+            draw_map(target, axes, lines, metric, x, y, figure.limits, title, confidence)
+        return True
+    axis = figure.axis or axes[0]
+    if figure.kind == "polar":
+        draw_polar(target, axes, lines, metric, axis, title)
+    else:
+        own = tables.baseline is not None and tables.baseline[0] == axis
+        compared = [c for c in tables.compared if own and c.result.name == metric]
+        category = any(a.category for a in tables.record.axes if a.column == axis)
+        draw_axis(target, axes, lines, metric, axis, figure.lines, category, compared, title,
+                   confidence)  # fmt: skip
+    return True
+
+
+def _cut(title: str) -> str:
+    return title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
+
+
+def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: str) -> bool:
+    """Draw how a result is spread over the runs, one series per value of an axis."""
+    rows, metric = tables.rows, str(figure.metric)
+    (result,) = (result for result in tables.results if result.name == metric)
+    if not result.is_number:
+        return False
+    axis = figure.axis or next(iter(rows.axes), None)
+    found: dict[Any, list[FloatArray]] = {}
+    for at, chosen in rows.each_place():
+        value = None if axis is None else at[rows.axes.index(axis)]
+        found.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
+    series = [
+        ("" if axis is None else value_label(axis, value), np.concatenate(values))
+        for value, values in found.items()
+    ]
+    draw = draw_histogram if figure.kind == "histogram" else draw_cdf
+    draw(target, series, metric, title, result.mark)
+    return True
+
+
+def _series_of(tables: Tables, metric: str) -> list[Series]:
+    """Return the results whose names differ in a number, one series per place of the axes."""
+    known = of_series(metric, [line.result.name for line in tables.lines])
+    by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
+    for line in tables.lines:
+        if line.result.name in known:
+            by_place.setdefault(line.at, {})[line.result.name] = line
+    axes = tables.rows.axes
+    return [
+        (
+            ", ".join(value_label(a, v) for a, v in zip(axes, at, strict=True)),
+            list(known.values()),
+            [lines[name] for name in known],
+        )
+        for at, lines in by_place.items()
+    ]
+
+
+def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]) -> list[Path]:
+    """Draw results of two types in one block against each other."""
+    place = tables.rows.axes.index(axis)
+    by_place = dict(tables.rows.each_place())
+    paths = []
+    for at, chosen in by_place.items():
+        base = (*at[:place], baseline, *at[place + 1 :])
+        if at[place] == baseline or base not in by_place:
+            continue
+        for metric in tables.notable_results(only):
+            _, first, second = paired(tables.rows, metric, by_place[base], chosen)
+            name = "-".join(["scatter", metric, *map(str, at)])
+            names, drawn = (str(baseline), str(at[place])), io.BytesIO()
+            draw_scatter(drawn, first, second, names, metric, _cut(tables.record.title))
+            paths.append(_write(tables, f"{safe_name(name)}.png", drawn))
+    return paths
+
+
+def safe_name(name: str) -> str:
+    """Return a text as the name of a file: without signs of a path, and short enough for one."""
+    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    if len(plain.encode()) <= _LONGEST_NAME:
+        return plain
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    cut = plain.encode()[: _LONGEST_NAME - 9].decode("utf-8", "ignore")
+    return f"{cut}-{digest}"

@@ -1,0 +1,321 @@
+"""The folder of a study: one Parquet part per chunk, each there as a whole or not at all."""
+
+import io
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from pydantic import ValidationError
+
+from dsa_des.errors import UsageError
+from dsa_des.files.output_file import PREFIX, write_file
+from dsa_des.results.record import StudyHead, StudyRecord
+from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+STUDY_JSON = "study.json"
+PARTS = "parts"
+LOCK = ".lock"
+#: A part: the number of its round and its own.
+_PART = re.compile(r"part-(\d{3,})-\d{6,}\.parquet")
+_MOST_JSON_BYTES = 256 * 2**20
+_Head = TypeVar("_Head", bound=StudyHead)
+
+
+class StudyFolder:
+    """Where a study keeps its results.
+
+    It may hold anything: what is not a regular file of this very study is no part of it, and
+    nothing is written through a link.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.parts = path / PARTS
+        self._lock: int | None = None
+        self._record: StudyRecord | None = None
+
+    def open(self, description: str, *, resume: bool) -> None:
+        """Make the folder, or take up the one that is there, and lock it until `close`.
+
+        `description` is the content of ``study.json``.
+
+        Raises
+        ------
+        UsageError
+            If it holds something else, another study, or results that were not to be resumed, or
+            if another process runs the study.
+        """
+        if self.path.is_symlink() and not self.path.exists():
+            raise UsageError(f"--out {self.path}: is a link to nothing; a folder is needed")
+        if self.path.exists() and not self.path.is_dir():
+            raise UsageError(f"--out {self.path}: is a file; a folder is needed")
+        try:
+            self._refuse_foreign()
+            self.parts.mkdir(parents=True, exist_ok=True)
+            self._take_lock()
+            # Only now is all that is there ours: before, it may have been another process's.
+            self._take_up(description, resume=resume)
+        except OSError as error:
+            self.close()
+            raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let other processes write into the folder."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def _refuse_foreign(self) -> None:
+        if self.parts.is_symlink():
+            raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
+        if os.path.lexists(self.path / STUDY_JSON) or not self.path.exists():
+            return
+        own = {LOCK, PARTS}  # a process was killed before it wrote what study it is
+        left = {entry.name for entry in self.path.iterdir()}
+        strange = {name for name in left - own if not name.startswith(f".{STUDY_JSON}.")}
+        if strange or (PARTS in left and any(self.parts.iterdir())):
+            raise UsageError(f"{self.path}: is a folder that holds something other than a study")
+
+    def _take_lock(self) -> None:
+        try:
+            import fcntl
+        except ImportError:  # no such locks on this system
+            return
+        try:
+            self._lock = open_lock(self.path / LOCK)
+        except OSError as error:
+            reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
+            raise UsageError(reason) from None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(f"{self.path}: another process is running this study") from None
+
+    def _take_up(self, text: str, *, resume: bool) -> None:
+        known = os.path.lexists(self.path / STUDY_JSON)
+        if known and not resume:
+            raise UsageError(
+                f"{self.path}: holds a study already; --resume continues it, --out names another"
+            )
+        self._record = StudyRecord.model_validate_json(text)
+        if known:
+            head = self._read(StudyHead)
+            if head.study_sha256 != self._record.study_sha256:
+                raise UsageError(
+                    f"{self.path}: holds another study or another version of it "
+                    f"(made of {head.study}), or an encounter file has changed since; results "
+                    "of the two cannot be mixed"
+                )
+        self.part_names()
+        self._clear()
+        path = self.path / STUDY_JSON
+        if not known or read_regular(path) != text.encode():  # as an older version wrote it
+            self.write_file(STUDY_JSON, text.encode())
+
+    def _clear(self) -> None:
+        """Remove what processes left that were killed while they wrote."""
+        earlier = r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+"
+        ours = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{12}}|{earlier}")
+        for folder in (self.parts, self.path):
+            for left in folder.iterdir():
+                if ours.fullmatch(left.name):
+                    with suppress(OSError):
+                        left.unlink()
+
+    @property
+    def record(self) -> StudyRecord:
+        """What the folder says of its study.
+
+        Raises
+        ------
+        UsageError
+            If the folder is not a study.
+        """
+        if self._record is None:
+            self._record = self._read(StudyRecord)
+        return self._record
+
+    def _read(self, model: type[_Head]) -> _Head:
+        path = self.path / STUDY_JSON
+        if not os.path.lexists(path):
+            raise UsageError(f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}")
+        try:
+            return model.model_validate_json(read_regular(path, _MOST_JSON_BYTES))
+        except OSError as error:
+            raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+        except ValidationError as error:
+            what = "is damaged, or not of a study"
+            first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+            if first["loc"]:
+                key = ".".join(map(str, first["loc"]))
+                what += f" of this version of dsa_des ({key}: {first['msg']})"
+            raise UsageError(f"{path}: {what}") from None
+        except (RecursionError, MemoryError):
+            raise UsageError(f"{path}: is damaged, or not of a study") from None
+
+    # -- parts -----------------------------------------------------------------------------
+
+    def part_names(self) -> list[str]:
+        """Return the names of the parts that are there, good or not, in order.
+
+        Raises
+        ------
+        UsageError
+            If there are files among them that no study writes.
+        """
+        if self.parts.is_symlink():
+            raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
+        try:
+            files = sorted(e.name for e in self.parts.iterdir() if e.name.endswith(".parquet"))
+        except OSError:
+            return []
+        for file in files:
+            if _PART.fullmatch(file) is None and not file.startswith("."):
+                raise UsageError(f"{self.parts / file}: is no part of a study; move it away")
+        return [file.removesuffix(".parquet") for file in files if not file.startswith(".")]
+
+    def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
+        """Return the rows of a part; None if it is not there, damaged, or of another study.
+
+        Only some `columns` are read of a part that was found good before.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            content = read_regular(self.parts / f"{name}.parquet")
+            if not is_sealed(content, self._owner(name)):
+                return None
+            table = pq.read_table(io.BytesIO(content), columns=columns)
+        except (OSError, MemoryError, pa.ArrowException):
+            return None
+        table = table.replace_schema_metadata(None)
+        return table if columns is not None or _fits(table, self.record) else None
+
+    def write_part(self, name: str, content: bytes) -> None:
+        """Write a part as a whole, sealed as one of this study.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; nothing is left behind then.
+        """
+        path = self.parts / f"{name}.parquet"
+        write_file(path, sealed(content, self._owner(name)), to_disk=True)
+
+    def remove_part(self, name: str) -> None:
+        """Remove a part that no longer belongs to the study."""
+        (self.parts / f"{name}.parquet").unlink(missing_ok=True)
+
+    def _owner(self, name: str) -> str:
+        return f"{self.record.study_sha256} {name}"
+
+    def results(self) -> "pa.Table":
+        """Return the rows of all parts, in order of cell and replica.
+
+        All of them are in memory then; `dsa_des.results.rows` reads them part by part.
+
+        Raises
+        ------
+        UsageError
+            If there are none, or if one is damaged or of another study.
+        """
+        import pyarrow as pa
+
+        table = pa.concat_tables(list(self.each_part()))
+        return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
+
+    def each_part(
+        self, before_round: int | None = None, columns: Sequence[str] | None = None
+    ) -> Iterator["pa.Table"]:
+        """Give the rows of each part, in order of their names.
+
+        Only those of rounds before one, and only some columns of parts found good before.
+
+        Raises
+        ------
+        UsageError
+            At the end, if there are none, or if one is damaged or of another study.
+        """
+        names = self.part_names()
+        if before_round is not None:
+            names = [name for name in names if int(name.split("-")[1]) < before_round]
+        if not names:
+            raise UsageError(f"{self.path}: holds no results yet")
+        damaged = []
+        for name in names:
+            table = self.part(name, columns)
+            if table is None:
+                damaged.append(f"{name}.parquet")
+            else:
+                yield table
+        if damaged:
+            shown = ", ".join(damaged[:_MOST_NAMED])
+            if len(damaged) > _MOST_NAMED:
+                shown += f" and {len(damaged) - _MOST_NAMED} more"
+            raise UsageError(
+                f"{self.parts}: cannot be read: {shown}; --resume writes damaged parts anew, "
+                "those of another study must be moved away"
+            )
+
+    # -- other files -----------------------------------------------------------------------
+
+    def write_file(self, name: str, content: bytes) -> None:
+        """Write a file beside the parts as a whole."""
+        write_file(self.path / name, content, to_disk=True)
+
+    def write_table(self, name: str, content: bytes) -> None:
+        """Write a table beside the parts, sealed as one of this study."""
+        self.write_file(name, sealed(content, self._owner(name)))
+
+    def table(self, name: str) -> "pa.Table | None":
+        """Return a table beside the parts; None if it is not there or not of this study."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            content = read_regular(self.path / name)
+            if not is_sealed(content, self._owner(name)):
+                return None
+            return pq.read_table(io.BytesIO(content))
+        except (OSError, MemoryError, pa.ArrowException):
+            return None
+
+
+#: How many damaged parts a message names.
+_MOST_NAMED = 10
+
+
+def _fits(table: "pa.Table", record: StudyRecord) -> bool:
+    """Return whether rows have the columns of a study, and values where there must be some."""
+    import pyarrow.compute as pc
+
+    if not table.schema.equals(record.schema_of_parts()):
+        return False
+    axes = [axis.column for axis in record.axes]
+    if any(table[name].null_count for name in ("cell", "replica", "seed", "status", *axes)):
+        return False
+    if any(not pc.all(pc.is_finite(table[a.column])).as_py() for a in record.axes if a.numeric):
+        return False
+    cells = pc.min_max(table["cell"]).as_py()
+    return table.num_rows > 0 and cells["min"] >= 0 and cells["max"] < record.cells
+
+
+def latest_folder(parent: Path, stem: str) -> Path | None:
+    """Return the ``parent/stem-NNN`` with the highest number; None if there is none."""
+    form = re.compile(re.escape(stem) + r"-(\d{3,})")
+    try:
+        names = [entry.name for entry in parent.iterdir() if form.fullmatch(entry.name)]
+    except OSError:
+        return None
+    return parent / max(names, key=lambda name: int(name[len(stem) + 1 :])) if names else None

@@ -1,0 +1,111 @@
+"""What a study's folder says of the models of its runs: ``explained.json``, ``errors.json``.
+
+Which model each block uses and how large its error is, which effects are simulated and which are
+left out and why, and with what versions the runs were made.
+"""
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+from pydantic import ConfigDict, ValidationError
+
+from dsa_des.record.version import __version__
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.record import StrictRecord
+from dsa_des.results.sealed_files import read_regular
+
+EXPLAINED, ERRORS = "explained.json", "errors.json"
+_PACKAGES = ("numpy", "scipy", "pyarrow", "simpy", "networkx", "pydantic", "numba")
+_MOST_BYTES = 16 * 2**20
+
+
+class ModelRecord(StrictRecord):
+    """A block: its type, what that is, and the rungs of accuracy that it stands on."""
+
+    block: str
+    type: str
+    about: str
+    #: ``earth: ellipsoid, exact on WGS 84 (the reference)``.
+    rungs: list[str]
+
+
+class EffectRecord(StrictRecord):
+    """An effect that is simulated or left out, and because of what."""
+
+    block: str
+    effect: str
+    simulated: bool
+    because: str
+    #: Largest influence that is proven, by quantity.
+    bound: dict[str, float] = {}
+
+
+class SceneRecord(StrictRecord):
+    """The scene of a cell; of cells after the first, only what is not so in the first."""
+
+    where: str
+    models: list[ModelRecord]
+    effects: list[EffectRecord]
+    #: What work blocks spare themselves, and why results allow it.
+    spared: list[tuple[str, str]]
+
+
+class Explained(StrictRecord):
+    """What a study's runs are made of."""
+
+    versions: dict[str, str]
+    #: The first run's scene with every default written out, as TOML.
+    scene: str
+    scenes: list[SceneRecord]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of this program, of Python and of the packages it computes with."""
+    found = {"dsa_des": __version__, "Python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def read_explained(folder: StudyFolder) -> Explained | None:
+    """Return what a folder says of its scene; None where it says nothing that can be used."""
+    try:
+        return Explained.model_validate_json(read_regular(folder.path / EXPLAINED, _MOST_BYTES))
+    except (OSError, ValidationError):
+        return None
+
+
+class ErrorRecord(StrictRecord):
+    """How far the model of a block is off in one quantity, over target-scans; NaN where unknown."""
+
+    model_config = ConfigDict(allow_inf_nan=True)
+
+    block: str
+    ladder: str
+    rung: str
+    quantity: str
+    unit: str
+    mean: float
+    p95: float
+    largest: float
+    target_scans: int
+    against: str
+
+
+class MeasuredErrors(StrictRecord):
+    """Errors of the models of one run, and of what nothing could be measured."""
+
+    command: str
+    rows: list[ErrorRecord]
+    notes: list[str]
+
+
+def read_errors(folder: StudyFolder) -> MeasuredErrors | None:
+    """Return the errors that a folder holds; None where it holds none that can be used."""
+    try:
+        return MeasuredErrors.model_validate_json(read_regular(folder.path / ERRORS, _MOST_BYTES))
+    except (OSError, ValidationError):
+        return None

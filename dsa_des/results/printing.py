@@ -1,0 +1,225 @@
+"""The tables of a study on the terminal."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from dsa_des.results.labels import short
+from dsa_des.results.statistics import Estimate
+from dsa_des.results.summary import Answer, Compared, Line, one_sided
+from dsa_des.results.tables import Tables, cut_off_text
+from dsa_des.terminal.tables import print_table
+from dsa_des.text.safe_text import shortened
+
+#: Lines of a table that are printed.
+_MOST_SHOWN = 1000
+
+
+def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
+    """Print the tables of a study on a ``rich.console.Console``.
+
+    `only` names results; by default those that the study draws or waits for, or else all.
+    """
+    study = tables.record
+    lines = tables.shown_lines(only)
+    level = f"{100 * study.confidence:g} %"
+    unit = "encounters" if study.over else "replicas"
+    expected = any(line.expected is not None for line in lines)
+    heads = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
+    heads += ["without"]
+    rows = []
+    for line in lines[:_MOST_SHOWN]:
+        e = line.estimate
+        cut_off = cut_off_text(line)
+        row = [*map(short, line.at), line.result.name, short(e.value)]
+        row += [f"({cut_off})" if cut_off else "", interval_text(e), str(e.count)]
+        row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
+        if expected:
+            row.append("" if line.expected is None else short(line.expected))
+        rows.append(row)
+    heads += ["analytic"] if expected else []
+    notes = {result.name: result.meaning for result in tables.results}
+    group = len(tables.rows.axes)
+    print_table(console, shortened(study.title), heads, rows, group=group, notes=notes)
+    if study.over:
+        console.print(
+            "intervals are over encounters like these, of which each counts once, whatever its "
+            "replicas"
+        )
+    ratios = [line for line in lines if line.ratio is not None]
+    if ratios:
+        console.print()
+        _show_ratios(console, tables, ratios)
+    if tables.answers:
+        console.print()
+        _show_answers(console, tables)
+    if tables.compared:
+        console.print()
+        _show_differences(console, tables, {line.result.name for line in lines})
+    longest = max(len(lines), len(tables.compared))
+    if longest > _MOST_SHOWN:
+        console.print(f"... and {longest - _MOST_SHOWN:,} more lines in summary.parquet")
+    few = [line for line in lines if line.estimate.few and line.estimate.count]
+    if few:
+        console.print(
+            f"* warning: too few values to rely on the interval in {len(few)} of {len(lines)} "
+            f"lines; give more {unit}"
+        )
+    if any(line.cut_off for line in lines):
+        console.print(
+            "(N of RUNS at the start): so many values are only where the run began or ended; "
+            "without that they would lie beyond it"
+        )
+    _note_unreached(console, tables)
+    if len(lines) < len(tables.lines):
+        console.print("all results: summary.parquet, or dsa-des study show FOLDER")
+    if tables.rows.failed:
+        console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
+    if tables.rows.crashed:
+        console.print(
+            f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "
+            "--resume tries them again"
+        )
+
+
+#: Columns of the table of requirements.
+ANSWER_HEADS = (
+    "requirement", "along", "where", "cheapest", "value there", "interval", "by the estimate alone",
+    "note",
+)  # fmt: skip
+
+
+def answer_cells(tables: Tables, answer: Answer) -> list[str]:
+    """Return the cells of what a requirement comes to, as `ANSWER_HEADS` names them."""
+    estimate = answer.line.estimate
+    notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
+    notes += ["few"] if estimate.few else []
+    return [
+        answer.requirement.text(), answer.requirement.axis, tables.other_values(answer),
+        "none" if answer.value is None else short(answer.value), short(estimate.value),
+        interval_text(estimate), "none" if answer.estimated is None else short(answer.estimated),
+        "; ".join(notes),
+    ]  # fmt: skip
+
+
+def _show_answers(console: Any, tables: Tables) -> None:
+    """Print the cheapest value that meets each requirement, at every place of the other axes."""
+    rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_SHOWN]]
+    sure = f"{100 * one_sided(tables.record.confidence):g} %"
+    print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)
+    if any(answer.value is None for answer in tables.answers):
+        console.print(
+            "none: the interval of the dearest does not lie within the limit, or is marked *"
+        )
+
+
+#: Columns of the table of ratios, behind those of the axes.
+RATIO_HEADS = (
+    "ratio of events", "unresolved", "induced", "gamma", "bootstrap", "effective size",
+    "nominal, mitigated, induced", "without",
+)  # fmt: skip
+
+
+def ratio_cells(line: Line) -> list[str]:
+    """Return the cells of a ratio, as `RATIO_HEADS` names them."""
+    found = line.ratio
+    assert found is not None
+    by = {r.method: r for r in (found, line.other) if r is not None}
+
+    def interval(method: str) -> str:
+        if method not in by or by[method].interval[0] != by[method].interval[0]:
+            return ""
+        low, high = by[method].interval
+        return f"{short(low)} to {short(high)}" + (" *" if by[method].few else "")
+
+    return [
+        line.result.name, short(found.unresolved), short(found.induced), interval("gamma"),
+        interval("bootstrap"), f"{found.effective_sample_size:.1f} of {found.encounters}",
+        found.reason
+        or f"{found.nominal_events}, {found.mitigated_events}, {found.induced_events}",
+        str(line.missing) if line.missing else "",
+    ]  # fmt: skip
+
+
+def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
+    """Print of what each ratio is made, and both of its intervals."""
+    rows = [[*map(short, line.at), *ratio_cells(line)] for line in lines[:_MOST_SHOWN]]
+    level = f"{100 * tables.record.confidence:g} %"
+    heads = [*tables.rows.axes, *RATIO_HEADS]
+    print_table(console, f"parts of the ratios, {level} intervals", heads, rows,
+                group=len(tables.rows.axes))  # fmt: skip
+
+
+def _note_unreached(console: Any, tables: Tables) -> None:
+    stop = tables.record.stop_when
+    if stop is None:
+        return
+    wide = [
+        line
+        for line in tables.lines
+        if line.result.name == stop.metric and not line.estimate.half_width <= stop.half_width
+    ]
+    if wide:
+        console.print(
+            f"warning: after all {tables.record.replicas} replicas the half-width of {stop.metric} "
+            f"is still above {stop.half_width:g} in {len(wide)} cells"
+        )
+
+
+def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
+    assert tables.baseline is not None
+    axis, baseline = tables.baseline
+    others = [name for name in tables.rows.axes if name != axis]
+    heads = [axis, *others, "result", "difference", "paired interval", "pairs",
+             "only one has it", "unpaired interval", "narrower"]  # fmt: skip
+    rows = []
+    shown = [item for item in tables.compared if item.result.name in names]
+    for item in shown[:_MOST_SHOWN]:
+        d = item.difference
+        only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
+        rows.append(
+            [short(item.value), *map(short, item.at), item.result.name, short(d.paired.value),
+             interval_text(d.paired), str(d.paired.count), only,
+             interval_text(d.unpaired).rstrip(" *"), times(d.narrower)]
+        )  # fmt: skip
+    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
+    print_table(console, title, heads, rows, group=1 + len(others))
+    if tables.record.compare_weight is not None:
+        _show_event_ratios(console, tables, shown)
+
+
+def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) -> None:
+    """Print how often events happen, by how often at the baseline, weighted."""
+    assert tables.baseline is not None
+    axis, baseline = tables.baseline
+    others = [name for name in tables.rows.axes if name != axis]
+    rows = [
+        [short(item.value), *map(short, item.at), item.result.name, short(item.ratio.ratio),
+         f"{short(item.ratio.interval[0])} to {short(item.ratio.interval[1])}"
+         + (" *" if item.ratio.few else ""),
+         short(item.ratio.unresolved), short(item.ratio.induced),
+         f"{item.ratio.effective_sample_size:.1f} of {item.ratio.encounters}", item.ratio.reason]
+        for item in shown[:_MOST_SHOWN] if item.ratio is not None
+    ]  # fmt: skip
+    if rows:
+        console.print()
+        title = f"events by those at {shortened(axis)} = {short(baseline)}, weighted by "
+        heads = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
+                 "effective size", ""]  # fmt: skip
+        print_table(console, title + str(tables.record.compare_weight), heads, rows,
+                    group=1 + len(others))  # fmt: skip
+
+
+def interval_text(estimate: Estimate) -> str:
+    """Return an interval for a table; nothing without one, an asterisk where values are few."""
+    if estimate.low != estimate.low:
+        return ""
+    return f"{short(estimate.low)} to {short(estimate.high)}" + (" *" if estimate.few else "")
+
+
+#: Intervals that shrink more than this rest on the rounding of equal numbers.
+_ROUNDING = 1e9
+
+
+def times(ratio: float) -> str:
+    """Return how many times narrower for a table; empty where nothing but rounding differs."""
+    return f"{ratio:.1f} times" if ratio < _ROUNDING else ""

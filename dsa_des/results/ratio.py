@@ -1,0 +1,386 @@
+"""The ratio of two weighted counts of events over the same units, with what is uncertain about it.
+
+It is the risk ratio of encounters that are run without a remedy (*nominal*) and with it
+(*mitigated*) on the same random numbers. Nominal flags n, mitigated flags m and weights w give
+
+    R = Σ w m / Σ w n,   unresolved Σ w min(m, n) / Σ w n,   induced Σ w max(m - n, 0) / Σ w n,
+
+and R is the sum of the two. The same encounters stand above and below the line, so the error of R
+is that of a ratio of dependent sums (W. G. Cochran, "Sampling techniques", 3rd edition, 1977,
+chapter 6): with residuals w (m - R n) its variance is Σ w² (m - R n)² / (Σ w n)². Taking the
+denominator as known, as the usual tools do, is another number: `PairedRatio.unpaired_error`.
+
+The interval is made for few events of uneven weights (`gamma`). That R is below some R0 means that
+the terms y - R0 x, which are positive for a risk that stays and negative for one that went, sum to
+less than nothing. Either sum is one of independent weighted Poisson counts, whose interval is a
+gamma distribution's with the sum's mean and variance, and on the side that must be certain those of
+one event more (M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates",
+Statistics in Medicine 16, 1997; for a ratio of two, M. P. Fay, Communications in Statistics 28,
+1999). That event is one that nobody has seen. Above the line it weighs what those seen do, drawn in
+proportion to their weights, for that is how one enters the sum; on the other side as much as the
+heaviest nominal one. With equal weights and nothing induced the lower end is Clopper and Pearson's;
+the upper lies a little above theirs, because the event more may be an induced one.
+
+Runs that hang together (several of one encounter, or copies of it) are one *cluster*: their terms
+are added up first, and clusters are what is independent.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.errors import shown_value
+
+#: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
+#: drawn sets of encounters.
+METHODS = ("gamma", "delta", "bootstrap")
+# Counts of drawn encounters that are in memory at once.
+_AT_ONCE = 2_000_000
+_FEW = 20.0
+
+
+@dataclass(frozen=True)
+class PairedRatio:
+    """A ratio with what is uncertain about it."""
+
+    #: NaN where `reason` says why there is none.
+    ratio: float
+    induced: float
+    unresolved: float
+    #: Of the ratio: paired delta method; with ``"bootstrap"`` the spread of its ratios.
+    standard_error: float
+    #: At the confidence that was asked for.
+    interval: tuple[float, float]
+    #: The standard error that takes the nominal probability as known.
+    unpaired_error: float
+    #: Kish's (Σ w)² / Σ w²: so many encounters of equal weight would tell as much of a mean.
+    effective_sample_size: float
+    #: Counts, without weights.
+    encounters: int
+    nominal_events: int
+    mitigated_events: int
+    induced_events: int
+    #: Per encounter of the airspace, Σ w n / Σ w.
+    nominal_probability: float
+    mitigated_probability: float
+    method: str = "gamma"
+    #: Why there is no ratio; empty where there is one.
+    reason: str = ""
+    #: Whether the interval holds the truth less often than it says: that of the delta method or the
+    #: bootstrap where one event more would add more than a twentieth to the variance of those that
+    #: stay (with equal weights: fewer than 20). Never of the gamma method.
+    few: bool = False
+    #: Independent ones: clusters, or encounters where none hang together.
+    clusters: int = 0
+
+
+def paired_ratio(
+    nominal: npt.ArrayLike,
+    mitigated: npt.ArrayLike,
+    weight: npt.ArrayLike | None = None,
+    *,
+    cluster: npt.ArrayLike | None = None,
+    confidence: float = 0.95,
+    method: str = "gamma",
+    resamples: int = 4000,
+    seed: int = 0,
+) -> PairedRatio:
+    """Return the ratio of paired encounters with its error and its interval.
+
+    Parameters
+    ----------
+    nominal, mitigated : (encounters,)
+        Whether the event (NMAC, loss of well clear) happened: 0 or 1, or the share of an
+        encounter's replicas in which it did.
+    weight : (encounters,), optional
+        How often each happens in the airspace; not negative. Left out, all weigh the same.
+    cluster : (encounters,), optional
+        Which of them hang together: rows of the same cluster. Left out, none do.
+    confidence : float
+        Of the interval.
+    method : {"gamma", "delta", "bootstrap"}
+        ``"gamma"``: either end errs at most half as often as the interval may, with few events of
+        uneven weights too. ``"delta"``: R exp(± z s / R), s the paired standard error.
+        ``"bootstrap"``: the percentiles of ratios of encounters drawn with their weight and both
+        flags.
+    resamples, seed : int
+        Of the bootstrap.
+
+    Returns
+    -------
+    PairedRatio
+        Without a ratio, and with the reason, where no encounter of any weight has a nominal event.
+        Where no encounter differs from R times its nominal flag (nothing is left of the risk, or
+        all of it), ``"delta"`` and ``"bootstrap"`` cannot tell how wrong R is: the interval then
+        reaches to what as many nominal events, of which none went otherwise, leave possible.
+
+    Raises
+    ------
+    ValueError
+        Naming the first encounter (counted from 0) whose value cannot be used.
+    """
+    n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
+    w = _weights(weight, len(n))
+    if len(m) != len(n):
+        raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
+    if method not in METHODS:
+        raise ValueError(f"method = {method!r}: must be one of {', '.join(METHODS)}")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence = {confidence}: must lie between 0 and 1")
+    if resamples < 2:
+        raise ValueError(f"resamples = {resamples}: must be 2 or more")
+    terms = _terms(n, m, w, cluster)
+    total, below = math.fsum(w), math.fsum(w * n)
+    squares = math.fsum(terms[0] ** 2)
+    counts = len(n), *_counts(n, m)
+    sizes = total * total / squares if squares > 0.0 else 0.0
+    if below == 0.0:
+        nan = math.nan
+        why = _why_none(n, total)
+        share = (0.0, math.fsum(w * m) / total) if total > 0.0 else (nan, nan)
+        return PairedRatio(
+            nan, nan, nan, nan, (nan, nan), nan, sizes, *counts, *share, method, why,
+            clusters=len(terms[0]),
+        )  # fmt: skip
+    left, added = math.fsum(w * np.minimum(m, n)), math.fsum(w * np.maximum(m - n, 0.0))
+    above = math.fsum(w * m)
+    ratio = above / below
+    each, x, y = terms
+    residual = y - ratio * x
+    error = math.sqrt(math.fsum(residual * residual)) / below
+    spread = y - above / total * each
+    unpaired = math.sqrt(math.fsum(spread * spread)) / below
+    tail = (1.0 - confidence) / 2.0
+    # Rounding alone leaves residuals where m is R n throughout.
+    certain = error <= 1e-12 * max(ratio, 1.0)
+    if method == "gamma":
+        interval = _by_gammas(x, y, ratio, tail)
+    elif certain:
+        # The same number of events, of which none went otherwise, has this upper limit.
+        possible = -math.log(tail) * math.fsum(x**2) / below**2
+        interval = max(0.0, ratio - possible), ratio + possible
+    elif method == "bootstrap":
+        ratios = _resampled(x, y, resamples, seed)
+        error = float(np.std(ratios, ddof=1)) if len(ratios) > 1 else math.nan
+        low, high = np.quantile(ratios, [tail, 1.0 - tail]) if len(ratios) else (math.nan,) * 2
+        interval = float(low), float(high)
+    else:
+        from scipy.special import ndtri
+
+        reach = math.exp(float(ndtri(1.0 - tail)) * error / ratio)
+        interval = ratio / reach, ratio * reach
+    few = method != "gamma" and math.fsum(y**2) < _FEW * _unseen(np.maximum(x, y))[1]
+    return PairedRatio(
+        ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
+        below / total, above / total, method, "", few, len(each),
+    )  # fmt: skip
+
+
+def ratios_by_class(
+    nominal: npt.ArrayLike,
+    mitigated: npt.ArrayLike,
+    weight: npt.ArrayLike | None,
+    labels: npt.ArrayLike,
+    cluster: npt.ArrayLike | None = None,
+    **options: object,
+) -> dict[str, PairedRatio]:
+    """Return the ratio of every class of encounters, in order of the classes' names.
+
+    Parameters
+    ----------
+    nominal, mitigated, weight
+        As in `paired_ratio`.
+    labels : (encounters,)
+        The class of each, for example of its geometry.
+    cluster : (encounters,), optional
+    **options
+        Keywords of `paired_ratio`.
+    """
+    n, m, names = np.asarray(nominal), np.asarray(mitigated), np.asarray(labels)
+    w = _weights(weight, len(n))
+    ratio: Callable[..., PairedRatio] = paired_ratio
+    if len(names) != len(n):
+        raise ValueError(f"there are {len(names)} classes for {len(n)} encounters")
+    found = {}
+    for name in np.unique(names):
+        mine = names == name
+        together = None if cluster is None else np.asarray(cluster)[mine]
+        found[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
+    return found
+
+
+def influences(
+    nominal: npt.ArrayLike, mitigated: npt.ArrayLike, weight: npt.ArrayLike | None, ratio: float
+) -> FloatArray:
+    """Return what each encounter adds to the error of a ratio: their squares sum to its variance.
+
+    Values are those of `paired_ratio`.
+    """
+    n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
+    w = _weights(weight, len(n))
+    found: FloatArray = w * (m - ratio * n) / math.fsum(w * n)
+    return found
+
+
+def _unseen(terms: FloatArray) -> tuple[float, float]:
+    """Return what one event more adds to a weighted sum, on average, and to its variance."""
+    once = math.fsum(terms)
+    return math.fsum(terms**2) / once, math.fsum(terms**3) / once
+
+
+def _by_gammas(
+    below: FloatArray, above: FloatArray, ratio: float, tail: float
+) -> tuple[float, float]:
+    """Return the ends of an interval of which either errs with a probability of at most `tail`.
+
+    `below` and `above` are the clusters' terms below and above the line.
+    """
+    # In order of above/below, the terms y - R x that are negative are the first ones, for any R.
+    some = (below > 0.0) | (above > 0.0)
+    x, y = below[some], above[some]
+    with np.errstate(divide="ignore"):
+        each = y / x
+    order = np.argsort(each, kind="stable")
+    each, x, y = each[order], x[order], y[order]
+    moments = np.stack([x, y, x * x, x * y, y * y])
+    first = np.concatenate([np.zeros((5, 1)), np.cumsum(moments, axis=1)], axis=1)
+    last = np.concatenate([np.cumsum(moments[:, ::-1], axis=1)[:, ::-1], np.zeros((5, 1))], axis=1)
+
+    def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the terms that went and those that stay: their sums and their squares'."""
+        place = int(np.searchsorted(each, limit))
+        went, stay = (part[:, place].tolist() for part in (first, last))
+        return (
+            (limit * went[0] - went[1], limit**2 * went[2] - 2.0 * limit * went[3] + went[4]),
+            (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
+        )
+
+    more, heaviest = _unseen(np.maximum(x, y)), float(x.max())
+
+    def below_it(limit: float) -> float:
+        """Return how sure it is that the ratio is below a limit."""
+        went, stay = sums(limit)
+        return _surely_more(went, (stay[0] + more[0], stay[1] + more[1]))
+
+    def above_it(limit: float) -> float:
+        went, stay = sums(limit)
+        had = limit * heaviest
+        return _surely_more(stay, (went[0] + had, went[1] + had * had))
+
+    sure = 1.0 - tail
+    low = 0.0 if ratio == 0.0 else _where(above_it, sure, ratio, 0.5)
+    return low, _where(below_it, sure, ratio or 1.0 / len(x), 2.0)
+
+
+def _surely_more(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return the probability that a gamma variable is larger than another: means and variances."""
+    from scipy.special import betainc
+
+    if not (one[0] > 0.0 and one[1] > 0.0):
+        return 0.0
+    scales = one[1] / one[0], other[1] / other[0]
+    shapes = one[0] / scales[0], other[0] / scales[1]
+    return float(betainc(shapes[1], shapes[0], scales[0] / (scales[0] + scales[1])))
+
+
+def _where(certainty: Callable[[float], float], sure: float, start: float, factor: float) -> float:
+    """Return the ratio from which on a limit further out is sure, by halving its logarithm."""
+    inner = outer = start
+    while certainty(outer) < sure:
+        if not 1e-300 < outer < 1e300:
+            return 0.0 if factor < 1.0 else math.inf
+        inner, outer = outer, outer * factor
+    for _ in range(60):
+        middle = math.sqrt(inner * outer)
+        if certainty(middle) < sure:
+            inner = middle
+        else:
+            outer = middle
+    return outer
+
+
+def _terms(
+    nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, cluster: npt.ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the weight, and the terms below and above the line, of every independent cluster."""
+    each = weight, weight * nominal, weight * mitigated
+    if cluster is None:
+        return each
+    names = np.asarray(cluster)
+    if names.shape != weight.shape:
+        raise ValueError(f"cluster has the shape {names.shape}: {len(weight)} encounters have one")
+    _, place = np.unique(names, return_inverse=True)
+    one, two, three = (np.bincount(place, weights=values).astype(float) for values in each)
+    return one, two, three
+
+
+def _flags(what: str, values: npt.ArrayLike) -> FloatArray:
+    flags = np.asarray(values, dtype=np.float64)
+    if flags.ndim != 1:
+        raise ValueError(f"{what} has the shape {flags.shape}: one value per encounter is needed")
+    _refuse(what, flags, ~((flags >= 0.0) & (flags <= 1.0)), "must be 0 or 1, or a share between")
+    return flags
+
+
+def _weights(weight: npt.ArrayLike | None, count: int) -> FloatArray:
+    if weight is None:
+        return np.ones(count)
+    weights = np.asarray(weight, dtype=np.float64)
+    if weights.shape != (count,):
+        raise ValueError(f"weight has the shape {weights.shape}: {count} encounters have one each")
+    _refuse("weight", weights, ~(np.isfinite(weights) & (weights >= 0.0)), "must be 0 or more")
+    return weights
+
+
+def _counts(nominal: FloatArray, mitigated: FloatArray) -> tuple[int, int, int]:
+    """Count encounters with the event nominally, mitigated, and mitigated more than nominally."""
+    induced = mitigated > nominal
+    return (
+        int(np.count_nonzero(nominal)),
+        int(np.count_nonzero(mitigated)),
+        int(np.count_nonzero(induced)),
+    )
+
+
+def _refuse(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
+    if bad.any():
+        place = int(np.argmax(bad))
+        value = float(values[place])
+        shown = "missing" if math.isnan(value) else shown_value(value)
+        raise ValueError(f"{what} of encounter {place} is {shown}: {allowed}")
+
+
+def _why_none(nominal: FloatArray, total: float) -> str:
+    if total == 0.0:
+        return "there is no encounter" if len(nominal) == 0 else "all weights are 0"
+    if nominal.any():
+        return "the encounters with a nominal event weigh nothing"
+    return "no encounter has a nominal event"
+
+
+def _resampled(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
+    """Return ratios of sets of encounters drawn with replacement.
+
+    Encounters without any event are drawn together: they add nothing to either sum. Those that are
+    alike in both sums are too, which leaves few kinds where weights repeat.
+    """
+    pairs = np.stack([below, above], axis=1)
+    pairs = pairs[pairs.any(axis=1)]
+    kinds, many = np.unique(pairs, axis=0, return_counts=True)
+    # The last kind: all encounters without an event.
+    kinds = np.concatenate([kinds, np.zeros((1, 2))])
+    many = np.append(many, len(below) - len(pairs))
+    generator = np.random.Generator(np.random.Philox(seed))
+    step = max(1, _AT_ONCE // len(kinds))
+    parts = []
+    for start in range(0, resamples, step):
+        some = min(step, resamples - start)
+        drawn: IntArray = generator.multinomial(len(below), many / len(below), size=some)
+        sums = drawn @ kinds
+        good = sums[:, 0] > 0.0
+        parts.append(sums[good, 1] / sums[good, 0])
+    return np.concatenate(parts)

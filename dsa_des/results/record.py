@@ -1,0 +1,346 @@
+"""The record of a study in its folder, and the columns of its parts.
+
+It is enough to read the tables of a study without scene or blocks: a folder may come from a
+stranger, so it is checked when it is read, and nothing that it names is opened or imported. What is
+saved of results, limits and figures is what the study itself uses.
+"""
+
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_Whole = Annotated[int, Field(ge=0, lt=2**63)]
+_Label = str | int | float
+
+
+class StrictRecord(BaseModel):
+    """What a file of ours holds: nothing is converted, and a number is finite."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+#: Kinds of results: a number with a mean; a number from 0 to 1 with a mean, such as a share of the
+#: time; an event that happens or not; a share of trials; the ratio of two events over all units of
+#: a cell; the name of a class.
+NUMBER, FRACTION, EVENT, SHARE = "number", "fraction", "event", "share"
+RATIO, CLASS = "ratio", "class"
+#: What is put behind the name of a share for the column of its trials.
+TRIALS = ".trials"
+
+
+class Told(NamedTuple):
+    """How a change of a result is told: ``radar``, ``sees a target earlier``, ``... later``.
+
+    Parameters
+    ----------
+    who : str
+    less, more : str
+        What it does where the result is smaller, or larger; of an event, where it no longer
+        happens, or now does.
+    """
+
+    who: str
+    less: str
+    more: str
+
+
+@dataclass(frozen=True)
+class RatioOf:
+    """Which columns a ratio is made of.
+
+    Parameters
+    ----------
+    below, above : str
+        Events under and over the line (nominal and mitigated), of the same units.
+    weight : str, optional
+        A number: how often a unit happens.
+    cluster : str, optional
+        A number that runs share which hang together; they count as one unit.
+    only : (column, class), optional
+        Of which runs: those of this class.
+    """
+
+    below: str
+    above: str
+    weight: str | None = None
+    cluster: str | None = None
+    only: tuple[str, str] | None = None
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the names of all columns it reads."""
+        names = (self.below, self.above, self.weight, self.cluster, self.only and self.only[0])
+        return tuple(name for name in names if name)
+
+
+_Colour = Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")]
+_Marker = Annotated[str, Field(pattern="^[osDdv^<>PXph8*]$")]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One column of a study's results.
+
+    Parameters
+    ----------
+    name : str
+        With its unit, for example ``declaration_time_s.radar``.
+    kind : {"number", "fraction", "event", "share", "ratio", "class"}
+        A number may be NaN (no value in this run), and so may a fraction, which lies between 0 and
+        1, as does the interval of its mean; an event is 0 or 1; a share has a second
+        column ``NAME.trials``, and is NaN without trials. A class is a text or None, and stands in
+        no summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
+    meaning : str
+    cut_off : str, optional
+        Name of a further column, a text: where the run's start or end cut this value off (``at the
+        start``, ``never``), nothing where it did not. Results may share one.
+    told : Told, optional
+        How comparisons tell a change of it.
+    block : str, optional
+        The block it is of, if that is not what stands behind the dot of its name.
+    mark : (colour, marker), optional
+        How figures mark that block; a study fills it in.
+    """
+
+    name: str
+    kind: Annotated[str, Field(pattern="^(number|fraction|event|share|ratio|class)$")]
+    meaning: str
+    cut_off: str | None = None
+    told: Told | None = None
+    block: str | None = None
+    mark: tuple[_Colour, _Marker] | None = None
+    ratio: RatioOf | None = None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether each run has a number of its own for it."""
+        return self.kind not in (RATIO, CLASS)
+
+
+#: What became of a run: it has results; it failed, and will again; its process died.
+DONE, FAILED, CRASHED = "done", "failed", "crashed"
+
+
+@dataclass(frozen=True)
+class StopWhen:
+    """When a cell has enough replicas: half-width of a result's confidence interval."""
+
+    metric: str
+    half_width: float
+    batch: int
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A limit on a result, and the axis along which the cheapest value is looked for."""
+
+    metric: str
+    axis: str
+    limit: float
+    #: Whether the result must be at most the limit; otherwise at least.
+    below: bool = True
+    #: Whether the last value of the axis is the cheapest; otherwise the first.
+    cheap_last: bool = False
+
+    def text(self) -> str:
+        """Return ``nmac_risk_ratio at most 0.3``."""
+        return f"{self.metric} at {'most' if self.below else 'least'} {self.limit:g}"
+
+    def met(self, low: float, high: float) -> bool:
+        """Return whether an interval (or a value, given twice) lies within the limit."""
+        return high <= self.limit if self.below else low >= self.limit
+
+
+class AxisRecord(StrictRecord):
+    """An axis: its column, its values, and what each changes in the scene, as texts."""
+
+    column: str
+    values: list[_Label]
+    over: bool
+    numeric: bool
+    #: Whether its numbers are names: nothing lies between two of them.
+    category: bool = False
+    sets: list[list[tuple[str, str]]]
+    swaps: list[list[tuple[str, str]]]
+
+
+class DrawRecord(StrictRecord):
+    """A drawn value: its key in the scene, its column, and whether it is a number."""
+
+    key: str
+    column: str
+    numeric: bool
+
+
+class FigureRecord(StrictRecord):
+    """A figure; see `read_figures`."""
+
+    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series", "run"]
+    metric: str | None = None
+    title: str | None = None
+    axis: str | None = None
+    lines: str | None = None
+    x: str | None = None
+    y: str | None = None
+    limits: list[float] = []
+    freedom: float | None = None
+    cell: _Whole = 0
+    replica: _Whole = 0
+
+
+class StudyHead(StrictRecord):
+    """Which study a folder holds."""
+
+    #: The study's file.
+    study: str
+    #: Of all that fixes its results.
+    study_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class StudyRecord(StudyHead):
+    """A study as its tables need it: what names something that is not there is refused."""
+
+    title: str
+    scene: str
+    seed: int
+    cells: _Whole
+    replicas: _Whole
+    axes: list[AxisRecord]
+    draws: list[DrawRecord]
+    results: list[Result]
+    sets: list[tuple[str, str]]
+    swaps: list[tuple[str, str]]
+    compare: tuple[str, _Label] | None
+    stop_when: StopWhen | None
+    confidence: Annotated[float, Field(gt=0.5, lt=1.0)]
+    interval: Literal["t", "bootstrap"]
+    figures: list[FigureRecord]
+    requirements: list[Requirement] = []
+    compare_weight: str | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "StudyRecord":
+        axes = {axis.column: axis for axis in self.axes}
+        columns = self.schema_of_parts().names
+        if len(set(columns)) < len(columns):
+            raise ValueError("two columns have one name")
+        for result in self.results:
+            if (result.kind == "ratio") != (result.ratio is not None):
+                raise ValueError("a ratio, and nothing else, says of which columns it is")
+            if result.ratio is not None and not set(result.ratio.reads()) <= {*columns}:
+                raise ValueError("a ratio names no column")
+        if self.compare is not None and self.compare[0] not in axes:
+            raise ValueError("compare names no axis")
+        if any(len(a.values) != len(a.sets) or len(a.values) != len(a.swaps) for a in self.axes):
+            raise ValueError("an axis has values without changes")
+        for figure in self.figures:
+            for name in (figure.axis, figure.lines, figure.x, figure.y):
+                if name is not None and name not in axes:
+                    raise ValueError("a figure names no axis")
+            if figure.kind == "map" and len(axes) < 2:
+                raise ValueError("a map needs two axes")
+            if figure.kind == "polar" and figure.axis and not axes[figure.axis].numeric:
+                raise ValueError("a polar figure needs numbers")
+            if figure.kind != "run" and figure.metric is None:
+                raise ValueError("a figure needs a metric")
+        numbers = {result.name for result in self.results if result.kind == "number"}
+        if self.compare_weight is not None and self.compare_weight not in numbers:
+            raise ValueError("compare names no number as its weight")
+        if any(item.axis not in axes for item in self.requirements):
+            raise ValueError("a requirement names no axis")
+        return self
+
+    def schema_of_parts(self) -> "pa.Schema":
+        """Return the columns of the study's parts."""
+        return columns_of(
+            [(axis.column, axis.numeric) for axis in self.axes],
+            [(draw.column, draw.numeric) for draw in self.draws],
+            self.results,
+        )
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Columns of axes that are a sample."""
+        return tuple(axis.column for axis in self.axes if axis.over)
+
+    def command(self, row: Mapping[str, Any]) -> str:
+        """Return the command that repeats the run of a row of the parts."""
+        return run_command(self.scene, int(row["seed"]), *self.changes(row))
+
+    def changes(
+        self, row: Mapping[str, Any]
+    ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+        """Return the swaps and the values that make the scene of a run."""
+        swaps, sets = list(self.swaps), list(self.sets)
+        place = int(row["cell"])
+        places = []
+        for axis in reversed(self.axes):
+            place, index = divmod(place, len(axis.values))
+            places.append(index)
+        for axis, index in zip(self.axes, reversed(places), strict=True):
+            swaps += axis.swaps[index]
+            sets += axis.sets[index]
+        sets += [(draw.key, as_text(row[draw.column])) for draw in self.draws]
+        return swaps, sets
+
+
+def columns_of(
+    axes: Sequence[tuple[str, bool]],
+    draws: Sequence[tuple[str, bool]],
+    results: Sequence[Result],
+) -> "pa.Schema":
+    """Return the columns of a part; axes and draws are (column, whether it holds numbers)."""
+    import pyarrow as pa
+
+    fields = [("cell", pa.int64()), ("replica", pa.int64()), ("seed", pa.int64())]
+    fields += [
+        (name, pa.float64() if numeric else pa.string()) for name, numeric in [*axes, *draws]
+    ]
+    cut_off: set[str] = set()
+    for result in results:
+        if result.kind == RATIO:
+            continue
+        fields.append((result.name, pa.string() if result.kind == CLASS else pa.float64()))
+        if result.kind == SHARE:
+            fields.append((result.name + TRIALS, pa.float64()))
+        if result.cut_off is not None and result.cut_off not in cut_off:
+            cut_off.add(result.cut_off)
+            fields.append((result.cut_off, pa.string()))
+    fields += [("status", pa.string()), ("error", pa.string()), ("command", pa.string())]
+    return pa.schema(fields)
+
+
+def draw_column(key: str) -> str:
+    """Return the column of a drawn value."""
+    return f"draw.{key.removeprefix('blocks.')}"
+
+
+def run_command(
+    scene: str,
+    seed: int,
+    swaps: Iterable[tuple[str, str]],
+    sets: Iterable[tuple[str, str]],
+) -> str:
+    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
+    words = ["dsa-des", "run", scene, "--seed", str(seed)]
+    for block, name in swaps:
+        words += ["--swap", f"{block}={name}"]
+    for key, value in sets:
+        words += ["--set", f"{key}={value}"]
+    return shlex.join(words)
+
+
+def as_text(value: Any) -> str:
+    """Return a value the way ``--set`` takes it."""
+    if isinstance(value, Fraction):
+        decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")
+        return decimal if Fraction(decimal) == value else f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)

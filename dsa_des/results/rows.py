@@ -1,0 +1,376 @@
+"""The rows of a study's parts, read part by part, and how they fall into places and units.
+
+Where a study runs over a sample of encounters (`over`), the encounters are the independent units
+and a place of the summary joins all of them; otherwise the replicas are.
+"""
+
+from collections import Counter, OrderedDict
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
+from dsa_des.results.record import CRASHED, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
+from dsa_des.results.statistics import (
+    Estimate,
+    EstimatedDifference,
+    fraction,
+    mean,
+    normal_error,
+    share,
+    symmetric,
+)
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from dsa_des.results.folder import StudyFolder
+
+
+#: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
+_MOST_HELD_BYTES = 2**27
+#: Of rows without result, the first ones are told.
+MOST_FAILED = 50
+_PLACE = ("cell", "replica")
+#: Columns that stand in no statistics.
+_ABOUT = ("status", "error", "command")
+
+
+class StoredRows:
+    """The rows with a result, in order of cell and replica, and what became of the others.
+
+    With `before_round` only those of earlier rounds.
+
+    Raises
+    ------
+    UsageError
+        If there are none, or if a part is damaged or of another study.
+    """
+
+    def __init__(self, folder: "StudyFolder", before_round: int | None = None) -> None:
+        self._folder, self._before_round = folder, before_round
+        schema = folder.record.schema_of_parts()
+        self.names = [field.name for field in schema if field.name not in _ABOUT]
+        #: Status → how many runs ended in it.
+        self.status: Counter[str] = Counter()
+        #: The first rows without result, and the first row of all, as column → value.
+        self.failed: list[dict[str, Any]] = []
+        self.first: dict[str, Any] = {}
+        self._order: IntArray | None = None
+        self._held: OrderedDict[str, AnyArray] = OrderedDict()
+        rows = max(1, folder.record.cells * folder.record.replicas)
+        self._at_once = max(3, _MOST_HELD_BYTES // (8 * rows))
+        others = [name for name in self.names if name not in _PLACE]
+        self._read([*_PLACE, *others[: self._at_once - len(_PLACE)]], look=True)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def column(self, name: str) -> AnyArray:
+        """Return a column; missing numbers are NaN, missing texts None."""
+        if name not in self._held:
+            place = self.names.index(name)
+            others = [n for n in self.names[place:] if n not in self._held]
+            self._read(others[: self._at_once], look=False)
+        self._held.move_to_end(name)
+        return self._held[name]
+
+    def _read(self, names: Sequence[str], *, look: bool) -> None:
+        """Read columns of all parts; `look` also at what became of the runs."""
+        while self._held and len(self._held) + len(names) > self._at_once:
+            self._held.popitem(last=False)
+        columns = None if look else [*names, "error"]
+        pieces: dict[str, list[Any]] = {name: [] for name in names}
+        for table in self._folder.each_part(self._before_round, columns):
+            good = np.asarray(table["error"].is_null())
+            if look:
+                self._look(table, good)
+            kept = table if good.all() else table.filter(good)
+            for name, found in pieces.items():
+                found.append(_codes(kept[name].combine_chunks()))
+        if look:
+            cell, replica = (_joined(pieces[name]) for name in _PLACE)
+            self._count = len(cell)
+            later = (np.diff(cell) > 0) | ((np.diff(cell) == 0) & (np.diff(replica) > 0))
+            self._order = None if later.all() else np.lexsort((replica, cell))
+        for name in names:
+            column = _joined(pieces.pop(name))
+            self._held[name] = column if self._order is None else column[self._order]
+
+    def _look(self, table: "pa.Table", good: BoolArray) -> None:
+        self.status.update(table["status"].to_pylist())
+        places = table.select(_PLACE).to_pydict()
+        least = min(range(table.num_rows), key=lambda k: tuple(places[name][k] for name in _PLACE))
+        self.first = min(
+            (row for row in (self.first, table.slice(least, 1).to_pylist()[0]) if row),
+            key=_cell_and_replica,
+        )
+        if not good.all():
+            bad = table.filter(~good).slice(0, MOST_FAILED).to_pylist()
+            self.failed = sorted([*self.failed, *bad], key=_cell_and_replica)[:MOST_FAILED]
+
+
+def _cell_and_replica(row: dict[str, Any]) -> tuple[int, int]:
+    return row["cell"], row["replica"]
+
+
+def _codes(values: "pa.Array") -> Any:
+    """Return numbers as an array, texts as Arrow's codes of them: each text is held once."""
+    import pyarrow as pa
+
+    if pa.types.is_string(values.type):
+        return values.dictionary_encode()
+    return values.to_numpy(zero_copy_only=False)
+
+
+def _joined(pieces: list[Any]) -> AnyArray:
+    if not pieces or isinstance(pieces[0], np.ndarray):
+        return np.concatenate(pieces) if pieces else np.empty(0)
+    texts: dict[str, str] = {}
+    found = []
+    for piece in pieces:
+        names = [texts.setdefault(name, name) for name in piece.dictionary.to_pylist()]
+        place = piece.indices.fill_null(len(names)).to_numpy(zero_copy_only=False)
+        found.append(np.array([*names, None], dtype=object)[place])
+    joined: AnyArray = np.concatenate(found)
+    return joined
+
+
+#: Sets that are drawn for a bootstrap interval of a ratio.
+_RESAMPLES = 2000
+
+
+class Rows:
+    """The rows of a study as columns, and how they fall into places and units."""
+
+    def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
+        self.stored = stored
+        self.failed = stored.status.total() - len(stored)
+        #: Those of the failed whose process died; they are tried again.
+        self.crashed = stored.status[CRASHED]
+        self.axes = [name for name in axes if name not in over]
+        self.over = list(over)
+        #: What rows share that belong to the same place, and to the same independent unit.
+        self.places = self._codes(self.axes)
+        self.units = self._codes(self.over if self.over else ["replica"])
+
+    def column(self, name: str) -> AnyArray:
+        """Return a column; missing numbers are NaN."""
+        return self.stored.column(name)
+
+    def row(self, number: int) -> dict[str, Any]:
+        """Return a row as column → value."""
+        return {name: _plain(self.column(name)[number]) for name in self.stored.names}
+
+    def _codes(self, names: Sequence[str]) -> IntArray:
+        codes = np.zeros(len(self.stored), dtype=np.int64)
+        for name in names:
+            _, code = np.unique(self.column(name), return_inverse=True)
+            codes = codes * (int(code.max(initial=0)) + 1) + code
+        return codes
+
+    def each_place(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
+        """Return the axis values and the rows of every place, in order of first occurrence."""
+        order = np.argsort(self.places, kind="stable")
+        _, starts = np.unique(self.places[order], return_index=True)
+        groups = np.split(order, starts[1:]) if len(order) else []
+        for rows in sorted(groups, key=lambda rows: int(rows[0])):
+            at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
+            yield at, rows
+
+    def by_unit(self, name: str, rows: IntArray) -> tuple[IntArray, FloatArray]:
+        """Return the units in some rows and each one's mean value (over its replicas)."""
+        values = self.column(name)[rows].astype(float)
+        known = ~np.isnan(values)
+        units, place = np.unique(self.units[rows], return_inverse=True)
+        total = np.bincount(place[known], weights=values[known], minlength=len(units))
+        many = np.bincount(place[known], minlength=len(units))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return units, np.where(many > 0, total / many, np.nan)
+
+    def estimate(
+        self, result: Result, rows: IntArray, confidence: float, method: str
+    ) -> tuple[Estimate, int]:
+        """Return the estimate of a result over some rows, and how many rows have no value."""
+        if result.kind == RATIO:
+            ratio, missing = self.ratio(result, rows, confidence, method)
+            return estimate_of(ratio), missing
+        values = self.column(result.name)[rows].astype(float)
+        missing = int(np.isnan(values).sum())
+        if result.kind not in (EVENT, SHARE):
+            _, of_units = self.by_unit(result.name, rows)
+            if result.kind == FRACTION:
+                return fraction(of_units, confidence), missing
+            return mean(of_units, confidence, method), missing
+        trials = np.ones(len(rows))
+        if result.kind == SHARE:
+            trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))
+        trials = np.where(np.isnan(values), 0.0, trials)
+        units, place = np.unique(self.units[rows], return_inverse=True)
+        won = np.bincount(place, weights=np.nan_to_num(values) * trials, minlength=len(units))
+        tried = np.bincount(place, weights=trials, minlength=len(units))
+        return share(won.astype(float), tried.astype(float), confidence), missing
+
+    def ratio(
+        self, result: Result, rows: IntArray, confidence: float, method: str
+    ) -> tuple[PairedRatio, int]:
+        """Return the ratio of some rows, and how many of them have no value for it.
+
+        Runs of the same encounter, and of the same unit, hang together.
+        """
+        found, used, missing = self._paired(result, rows)
+        below, above, weight, cluster = found
+        method = "bootstrap" if method == "bootstrap" else "gamma"
+        together = cluster if len(np.unique(cluster)) < len(used) else None
+        ratio = paired_ratio(
+            below, above, weight, cluster=together, confidence=confidence, method=method,
+            resamples=_RESAMPLES,
+        )  # fmt: skip
+        return ratio, missing
+
+    def _paired(
+        self, result: Result, rows: IntArray
+    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray, AnyArray], IntArray, int]:
+        """Return the columns of a ratio over the rows that have all of them, and those rows."""
+        of = result.ratio
+        assert of is not None
+        if of.only is not None:
+            rows = rows[self.column(of.only[0])[rows] == of.only[1]]
+        below, above = (self.column(name)[rows].astype(float) for name in (of.below, of.above))
+        weight = np.ones(len(rows))
+        if of.weight is not None:
+            weight = self.column(of.weight)[rows].astype(float)
+        units = self.units[rows]
+        cluster = units if of.cluster is None else self.column(of.cluster)[rows]
+        known = ~(np.isnan(below) | np.isnan(above) | np.isnan(weight))
+        if of.cluster is not None:
+            known &= ~np.isnan(cluster.astype(float))
+            if self.over:  # one encounter's number means another in another file
+                _, number = np.unique(cluster, return_inverse=True)
+                cluster = units * (int(number.max(initial=0)) + 1) + number
+        columns = below[known], above[known], weight[known], cluster[known]
+        return columns, rows[known], int((~known).sum())
+
+    def ratio_difference(
+        self, result: Result, first: IntArray, second: IntArray, confidence: float
+    ) -> EstimatedDifference:
+        """Return how a ratio differs between two conditions on the same runs, by their influences.
+
+        What each run adds to the error of either ratio is subtracted run by run, so what they
+        share falls out; the interval is that of the normal distribution.
+        """
+        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
+        runs = runs + self.column("replica")
+        sides = [self._paired(result, rows) for rows in (first, second)]
+        one, two = (runs[side[1]] for side in sides)
+        _, here, there = np.intersect1d(one, two, return_indices=True)
+        parts, ratios, cluster = [], [], sides[0][0][3][here]
+        for (columns, _, _), common in zip(sides, (here, there), strict=True):
+            below, above, weight = (column[common] for column in columns[:3])
+            ratio = paired_ratio(
+                below, above, weight, cluster=cluster, confidence=confidence, method="delta"
+            )
+            ratios.append(ratio)
+            if not ratio.reason:
+                parts.append(influences(below, above, weight, ratio.ratio))
+        alone = [len(side[1]) - len(here) for side in sides]
+        if len(parts) < 2:
+            none = Estimate(np.nan, np.nan, np.nan, 0, True)
+            return EstimatedDifference(none, none, *alone)
+        _, place = np.unique(cluster, return_inverse=True)
+        each = np.array([np.bincount(place, weights=part) for part in parts])
+        value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
+        # A ratio whose runs all agree has no such error; its interval tells another.
+        unseen = sum(
+            normal_error(estimate_of(ratio), confidence) ** 2
+            for ratio, part in zip(ratios, each, strict=True)
+            if np.abs(part).max() < 1e-12
+        )
+        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + unseen))
+        apart = float(np.sqrt((each**2).sum() + unseen))
+        return EstimatedDifference(
+            symmetric(value, joint, each.shape[1], few, confidence),
+            symmetric(value, apart, each.shape[1], few, confidence),
+            *alone,
+        )
+
+    def event_ratio(
+        self, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
+    ) -> PairedRatio:
+        """Return how often an event happens in some rows, by how often in others: run by run.
+
+        Rows `first` are below the line, `second` above; runs that only one has do not count. The
+        result `weight` says how often each unit happens.
+        """
+        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
+        runs = runs + self.column("replica")
+        sides = []
+        for rows in (first, second):
+            known = ~np.isnan(self.column(name)[rows].astype(float))
+            if weight is not None:
+                known &= ~np.isnan(self.column(weight)[rows].astype(float))
+            sides.append(rows[known])
+        one, two = (runs[rows] for rows in sides)
+        _, here, there = np.intersect1d(one, two, return_indices=True)
+        below, above = sides[0][here], sides[1][there]
+        weights = None if weight is None else self.column(weight)[below].astype(float)
+        return paired_ratio(
+            self.column(name)[below].astype(float), self.column(name)[above].astype(float),
+            weights, cluster=self.units[below], confidence=confidence,
+        )  # fmt: skip
+
+    def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
+        """Return where the run cut a result off in some rows, and in how many, sorted."""
+        if result.cut_off is None:
+            return ()
+        said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]
+        return tuple(sorted(Counter(said).items()))
+
+
+def estimate_of(ratio: PairedRatio) -> Estimate:
+    """Return a ratio as the summary's other lines are."""
+    return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def paired(
+    rows: Rows, name: str, first: IntArray, second: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the units that both sets of rows have, and the values of each in both."""
+    values, replica = rows.column(name), rows.column("replica")
+    runs = rows.units * (int(replica.max(initial=0)) + 1) + replica
+    _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
+    one, two = first[here], second[there]
+    return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
+
+
+def paired_units(
+    units: IntArray, first: FloatArray, second: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return units, and each one's mean value in two conditions, over runs that have both.
+
+    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
+    with a value on one side only would compare other draws.
+
+    A run without a value has NaN.
+    """
+    found, place = np.unique(units, return_inverse=True)
+
+    def means(values: FloatArray, used: AnyArray) -> FloatArray:
+        many = np.bincount(place[used], minlength=len(found))
+        total = np.bincount(place[used], weights=values[used], minlength=len(found))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(many > 0, total / many, np.nan)
+
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = means(first, here & there), means(second, here & there)
+    without = np.isnan(one)
+    alone = np.where(without, means(first, here), np.nan)
+    one = np.where(without, alone, one)
+    two = np.where(without & np.isnan(alone), means(second, there), two)
+    return found, one, two

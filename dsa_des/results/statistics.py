@@ -1,0 +1,286 @@
+"""Confidence intervals: Wilson for shares, t or bootstrap for means, paired for differences."""
+
+import math
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+
+#: Below this many values (effective trials, for a share) an interval says little.
+FEW = 10
+#: Below this many units with a trial that went otherwise than most, an interval of a share of
+#: trials that hang together says little.
+FEW_UNLIKE = 5
+_RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean or a share, and its interval."""
+
+    #: NaN where there are too few values to say.
+    value: float
+    low: float
+    high: float
+    #: Values it rests on.
+    count: int
+    #: Whether those are too few to rely on the interval.
+    few: bool
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval's width."""
+        return (self.high - self.low) / 2.0
+
+
+def wilson(successes: float, trials: float, confidence: float) -> tuple[float, float]:
+    """Return Wilson's score interval of a share.
+
+    Trials may be an effective number, and need not be whole.
+
+    Notes
+    -----
+    Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22 (1927).
+    """
+    if trials <= 0:
+        return math.nan, math.nan
+    z = _z(confidence)
+    share = successes / trials
+    middle = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials)
+    spread = share * (1.0 - share) / trials + z * z / (4.0 * trials * trials)
+    half = z / (1.0 + z * z / trials) * math.sqrt(max(spread, 0.0))
+    low = 0.0 if successes == 0 else max(0.0, middle - half)
+    high = 1.0 if successes == trials else min(1.0, middle + half)
+    return low, high
+
+
+def _z(confidence: float) -> float:
+    """Return the two-sided quantile of the normal distribution."""
+    return NormalDist().inv_cdf(0.5 + confidence / 2.0)
+
+
+def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estimate:
+    """Return a share over independent units, each with trials that may hang together.
+
+    The interval is Wilson's with the effective number of trials: units that differ more from each
+    other than chance allows count for less (Rao and Scott, "A simple method for the analysis of
+    clustered binary data", Biometrics 48, 1992). How much they differ is itself known from so many
+    units only, for which the number is reduced once more (Korn and Graubard, "Confidence intervals
+    for proportions with small expected number of positive counts", Survey Methodology 24, 1998).
+    Where all trials went alike nothing tells how they hang together, and each unit counts once; of
+    one unit with several trials there is no interval.
+    """
+    used = trials > 0
+    successes, trials = successes[used], trials[used]
+    total = math.fsum(trials)
+    if total == 0:
+        return Estimate(math.nan, math.nan, math.nan, 0, True)
+    value = math.fsum(successes) / total
+    effective, units = total, len(trials)
+    clustered = float(trials.max()) > 1.0
+    if clustered and units == 1:
+        return Estimate(value, math.nan, math.nan, 1, True)
+    plain = value * (1.0 - value) / total
+    if plain > 0.0 and units > 1:
+        residuals = successes - value * trials
+        spread = units / (units - 1) * math.fsum(residuals**2) / total**2
+        if clustered:
+            spread *= (t_quantile(units - 1, confidence) / _z(confidence)) ** 2
+        effective = total / max(1.0, spread / plain)
+    elif clustered:
+        effective = float(units)
+    low, high = wilson(value * effective, effective, confidence)
+    few = effective < FEW or (clustered and _rests_on_few(successes, trials))
+    return Estimate(value, low, high, units, few)
+
+
+def _rests_on_few(successes: FloatArray, trials: FloatArray) -> bool:
+    """Return whether few units say how trials hang together: few in all, or few unlike the rest."""
+    unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
+    return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
+
+
+def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
+    """Return the mean of independent values; NaN ones are left out.
+
+    `method` is "t" or "bootstrap": Student's t, or the studentised bootstrap over 2000 resamples
+    (always the same ones), which leans to the side of the longer tail (Efron and Tibshirani, "An
+    introduction to the bootstrap", 1993, chapter 12.5).
+    """
+    values = values[~np.isnan(values)]
+    count = len(values)
+    if count == 0:
+        return Estimate(math.nan, math.nan, math.nan, 0, True)
+    value = math.fsum(values) / count
+    if count == 1:
+        return Estimate(value, math.nan, math.nan, 1, True)
+    error = standard_error(values)
+    below = above = t_quantile(count - 1, confidence)
+    if method == "bootstrap":
+        below, above = _bootstrap(values, confidence) or (below, above)
+    low, high = value - below * error, value + above * error
+    return Estimate(value, low, high, count, count < FEW)
+
+
+def fraction(values: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of independent values between 0 and 1; NaN ones are left out.
+
+    The interval is Wilson's with as many trials as would make a share as uncertain as the mean is
+    by Student's t, so it stays between 0 and 1; where all values are alike each is one trial.
+    """
+    plain = mean(values, confidence)
+    if plain.count < 2:
+        return plain
+    error = normal_error(plain, confidence)
+    spread = plain.value * (1.0 - plain.value)
+    trials = spread / error**2 if spread > 0.0 and error > 1e-9 else float(plain.count)
+    low, high = wilson(plain.value * trials, trials, confidence)
+    return Estimate(plain.value, low, high, plain.count, plain.few)
+
+
+def symmetric(value: float, error: float, count: int, few: bool, confidence: float) -> Estimate:
+    """Return an estimate whose interval is that of the normal distribution."""
+    half = _z(confidence) * error
+    return Estimate(value, value - half, value + half, count, few)
+
+
+def normal_error(estimate: Estimate, confidence: float) -> float:
+    """Return the standard error whose normal interval is as wide as an estimate's."""
+    return estimate.half_width / _z(confidence)
+
+
+def standard_error(values: FloatArray) -> float:
+    """Return the standard error of a mean."""
+    count = len(values)
+    middle = math.fsum(values) / count
+    return math.sqrt(math.fsum((values - middle) ** 2) / (count - 1) / count)
+
+
+def t_quantile(degrees: float, confidence: float) -> float:
+    """Return the two-sided quantile of Student's t."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees, 0.5 + confidence / 2.0))
+
+
+def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float] | None:
+    """Return how many standard errors an interval reaches below and above the mean.
+
+    None where most resamples hold one value only, so that they tell nothing.
+    """
+    generator = np.random.Generator(np.random.Philox(len(values)))
+    middle, root = values.mean(), math.sqrt(len(values))
+    pivots = []
+    step = max(1, 1_000_000 // len(values))  # memory stays flat in the number of values
+    for start in range(0, _RESAMPLES, step):
+        some = min(step, _RESAMPLES - start)
+        drawn = values[generator.integers(0, len(values), (some, len(values)))]
+        errors = drawn.std(axis=1, ddof=1) / root
+        good = np.ptp(drawn, axis=1) > 0.0
+        pivots.append((drawn[good].mean(axis=1) - middle) / errors[good])
+    known = np.concatenate(pivots)
+    if len(known) < _RESAMPLES // 2:
+        return None
+    tail = (1.0 - confidence) / 2.0
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return float(high), -float(low)
+
+
+@dataclass(frozen=True)
+class EstimatedDifference:
+    """How two conditions differ on the same units."""
+
+    #: Mean of the differences, unit by unit.
+    paired: Estimate
+    #: The same mean with the interval it would have on independent units (Welch).
+    unpaired: Estimate
+    #: Units that have a value in one condition only; they are in neither estimate.
+    only_first: int
+    only_second: int
+
+    @property
+    def narrower(self) -> float:
+        """How many times narrower the paired interval is; infinite where nothing differs."""
+        if self.paired.half_width == 0.0:
+            return math.inf if self.unpaired.half_width > 0.0 else math.nan
+        return self.unpaired.half_width / self.paired.half_width
+
+
+def difference(
+    first: FloatArray,
+    second: FloatArray,
+    confidence: float,
+    method: str = "t",
+    *,
+    kind: str = "number",
+) -> EstimatedDifference:
+    """Return second minus first on common units.
+
+    NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
+    Events, and shares of which each unit has all or nothing, are counted: their paired interval is
+    that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
+    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012).
+    It is no point where no unit differs.
+    """
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    both = here & there
+    changes = second[both] - first[both]
+    whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
+    counted = len(changes) > 1 and (kind == "event" or whole)
+    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
+    unpaired = _welch(first[both], second[both], confidence)
+    if kind != "number":
+        paired, unpaired = _of_shares(paired), _of_shares(unpaired)
+    return EstimatedDifference(
+        paired,
+        unpaired,
+        int((here & ~there).sum()),
+        int((there & ~here).sum()),
+    )
+
+
+def _of_shares(found: Estimate) -> Estimate:
+    """Return a difference of shares whose interval holds nothing that none can be."""
+    return replace(found, low=max(-1.0, found.low), high=min(1.0, found.high))
+
+
+def _counted(changes: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
+
+    Units of several runs differ by parts of an event: there the two lie the smallest part that is
+    seen to either side of the mean.
+    """
+    count = len(changes)
+    value = math.fsum(changes) / count
+    sizes = np.abs(changes)
+    step = float(sizes[sizes > 1e-9].min(initial=1.0))
+    about = 0.0 if step == 1.0 else value
+    more = np.append(changes, [about - step, about + step])
+    middle = math.fsum(more) / len(more)
+    error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
+    half = t_quantile(count - 1, confidence) * error
+    return Estimate(value, middle - half, middle + half, count, count < FEW)
+
+
+def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+    count = len(first)
+    if count < 2:
+        return Estimate(math.nan, math.nan, math.nan, count, True)
+    value = math.fsum(second) / count - math.fsum(first) / count
+    one, other = standard_error(first) ** 2, standard_error(second) ** 2
+    if one + other == 0.0:
+        return Estimate(value, value, value, count, count < FEW)
+    degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
+    half = t_quantile(degrees, confidence) * math.sqrt(one + other)
+    return Estimate(value, value - half, value + half, count, count < FEW)
+
+
+def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float]:
+    """Return the interval that holds a chi-square variable with a probability, tails alike."""
+    from scipy.special import gammaincinv
+
+    tail = 0.5 * (1.0 - share)
+    low, high = (2.0 * float(gammaincinv(0.5 * freedom, p)) for p in (tail, 1.0 - tail))
+    return low, high

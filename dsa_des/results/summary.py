@@ -1,0 +1,188 @@
+"""From the rows of a study to its tables: estimates, paired differences, cheapest values."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dsa_des.results.ratio import PairedRatio
+from dsa_des.results.record import (
+    CLASS,
+    EVENT,
+    RATIO,
+    Requirement,
+    Result,
+)
+from dsa_des.results.rows import Rows, estimate_of, paired
+from dsa_des.results.statistics import (
+    Estimate,
+    EstimatedDifference,
+    difference,
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One result at one place of the summary's axes."""
+
+    at: tuple[Any, ...]
+    result: Result
+    estimate: Estimate
+    missing: int
+    expected: float | None
+    #: Runs of this place, and (where, how many) of those whose value the run cut off.
+    runs: int = 0
+    cut_off: tuple[tuple[str, int], ...] = ()
+    #: Of a ratio: all its numbers, by the study's own kind of interval and by the other.
+    ratio: PairedRatio | None = None
+    other: PairedRatio | None = None
+
+
+def summarise(
+    rows: Rows,
+    results: Sequence[Result],
+    confidence: float,
+    method: str,
+    expected: Mapping[tuple[str, tuple[Any, ...]], float],
+) -> list[Line]:
+    """Return one line per place and result."""
+    lines = []
+    for at, chosen in rows.each_place():
+        for result in results:
+            if result.kind == CLASS:
+                continue
+            ratio = other = None
+            if result.kind == RATIO:
+                ratio, missing = rows.ratio(result, chosen, confidence, method)
+                estimate = estimate_of(ratio)
+                # Drawing sets again takes a while; of classes it is done only where it is asked.
+                if method == "bootstrap":
+                    other, _ = rows.ratio(result, chosen, confidence, "t")
+                elif result.ratio is not None and result.ratio.only is None:
+                    other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
+            else:
+                estimate, missing = rows.estimate(result, chosen, confidence, method)
+            known = expected.get((result.name, at))
+            cut_off = rows.cut_off(result, chosen)
+            lines.append(
+                Line(at, result, estimate, missing, known, len(chosen), cut_off, ratio, other)
+            )
+    return lines
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A result at one value of the compared axis, less the same at the baseline."""
+
+    at: tuple[Any, ...]
+    value: Any
+    baseline: Any
+    result: Result
+    difference: EstimatedDifference
+    #: Of an event: how often it happens, by how often at the baseline.
+    ratio: PairedRatio | None = None
+
+
+def compare_axis(
+    rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float,
+    method: str, weight: str | None = None,
+) -> list[Compared]:  # fmt: skip
+    """Return the paired differences of every value of an axis against one of them.
+
+    Rows are paired that share the unit and the values of all other axes. `weight` names the result
+    that weighs units in ratios of events.
+    """
+    place = rows.axes.index(axis)
+    by_place = dict(rows.each_place())
+    found = []
+    for at, chosen in by_place.items():
+        base = (*at[:place], baseline, *at[place + 1 :])
+        if at[place] == baseline or base not in by_place:
+            continue
+        for result in results:
+            if result.kind == CLASS:
+                continue
+            others = (*at[:place], *at[place + 1 :])
+            if result.kind == RATIO:
+                change = rows.ratio_difference(result, by_place[base], chosen, confidence)
+            else:
+                first, second = paired(rows, result.name, by_place[base], chosen)[1:]
+                change = difference(first, second, confidence, method, kind=result.kind)
+            ratio = None
+            if result.kind == EVENT:
+                ratio = rows.event_ratio(result.name, by_place[base], chosen, weight, confidence)
+            found.append(Compared(others, at[place], baseline, result, change, ratio))
+    return found
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest value at one place of the other axes."""
+
+    requirement: Requirement
+    #: Values of the other axes.
+    at: tuple[Any, ...]
+    #: Cheapest value whose interval, and that of all dearer ones, meets the limit; None if none.
+    value: Any
+    #: The same by the estimates alone, which is sure of nothing.
+    estimated: Any
+    #: The summary's line at `value`, or at the dearest value where none meets it.
+    line: Line
+    #: Whether a cheaper value meets the limit though a dearer one does not: more runs would tell.
+    uneven: bool
+
+
+def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]) -> list[Answer]:
+    """Return the cheapest value at every place of the other axes."""
+    if requirement.axis not in axes:
+        return []
+    place = list(axes).index(requirement.axis)
+    found: dict[tuple[Any, ...], list[Line]] = {}
+    for line in lines:
+        if line.result.name == requirement.metric:
+            others = (*line.at[:place], *line.at[place + 1 :])
+            found.setdefault(others, []).append(line)
+    told = []
+    for at, some in found.items():
+        dearest_first = some if requirement.cheap_last else some[::-1]
+        sure = [
+            not line.estimate.few and requirement.met(line.estimate.low, line.estimate.high)
+            for line in dearest_first
+        ]
+        likely = [
+            requirement.met(line.estimate.value, line.estimate.value) for line in dearest_first
+        ]
+        last, guess = _run(sure), _run(likely)
+        told.append(
+            Answer(
+                requirement, at,
+                dearest_first[last - 1].at[place] if last else None,
+                dearest_first[guess - 1].at[place] if guess else None,
+                dearest_first[max(last - 1, 0)],
+                any(sure[last:]),
+            )
+        )  # fmt: skip
+    return told
+
+
+def _run(good: Sequence[bool]) -> int:
+    """Return how many stand before the first that is false."""
+    return next((k for k, one in enumerate(good) if not one), len(good))
+
+
+def one_sided(confidence: float) -> float:
+    """Return how sure one end of a two-sided interval is."""
+    return 0.5 + confidence / 2.0
+
+
+def of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
+    """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
+    found = {}
+    for name in names:
+        number = name.removeprefix(f"{metric}.")
+        if number == name:
+            continue
+        try:
+            found[name] = float(number)
+        except ValueError:
+            continue
+    return dict(sorted(found.items(), key=lambda item: item[1]))

@@ -1,0 +1,202 @@
+"""The models of a study's scene and their errors, kept beside its results."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from dsa_des.block.ladder import Ladder, Unavailable
+from dsa_des.costs.climb import RungCost, applies, climb
+from dsa_des.costs.variants import Choice, Variants
+from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.files.toml_files import to_toml
+from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.labels import short
+from dsa_des.results.models import (
+    ERRORS,
+    EXPLAINED,
+    EffectRecord,
+    ErrorRecord,
+    Explained,
+    MeasuredErrors,
+    ModelRecord,
+    SceneRecord,
+    read_explained,
+    versions,
+)
+from dsa_des.results.rows import StoredRows
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.study import Study
+from dsa_des.studies.study_checks import one_per_value
+
+#: Cells that are looked at: the first, and one for each value of an axis.
+_MOST_CELLS = 12
+
+
+def explained(study: Study) -> Explained:
+    """Return of what a study's runs are made."""
+    scenes: list[SceneRecord] = []
+    text = ""
+    for cell in one_per_value(study)[:_MOST_CELLS]:
+        labels = study.labels(cell)
+        where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
+        try:
+            scene = scene_of(study.scene(cell), study.replica(0, cell))
+            found = _of_scene(where, scene)
+            text = text or to_toml(scene.resolved())
+        except (SceneError, BlockFailure, ValueError):
+            continue  # its rows say why
+        scenes.append(_less(found, scenes[0]) if scenes else found)
+    scenes = [one for one in scenes if one.models or one.effects or one.spared]
+    return Explained(versions=versions(), scene=text, scenes=scenes)
+
+
+def _of_scene(where: str, scene: Scene) -> SceneRecord:
+    simulation = Simulation(scene)
+    models, spared = [], []
+    for name, component in simulation.components.items():
+        block = scene.blocks[name]
+        about = (type(component).__doc__ or "").strip().partition("\n")[0]
+        rungs = [_rung(scene, name, ladder) for ladder in block.cls.ladders_for(block.parameters)]
+        models.append(
+            ModelRecord(
+                block=name, type=block.type_name, about=about, rungs=list(filter(None, rungs))
+            )
+        )
+        spared += [(name, sentence) for sentence in component.left_out()]
+    effects = [
+        EffectRecord(
+            block=item.block, effect=item.effect.name, simulated=item.built, because=item.because,
+            bound={k: float(v) for k, v in item.verdict.bound.items() if math.isfinite(v)},
+        )
+        for item in [*simulation.plan, *simulation.timing_plan]
+    ]  # fmt: skip
+    return SceneRecord(where=where, models=models, effects=effects, spared=spared)
+
+
+def _rung(scene: Scene, name: str, ladder: Ladder) -> str:
+    """Return which rung of a ladder a block is, as far as its type and keys tell."""
+    block = scene.blocks[name]
+    table = scene.resolved()["blocks"][name]
+    best = ""
+    for rung in ladder.rungs:
+        try:
+            changes = rung.changes(table)
+        except Unavailable:
+            continue
+        same = rung.type_name in ("", block.type_name) and all(
+            getattr(scene.sections.get(section), key, None) == value
+            for section, keys in rung.sections.items()
+            for key, value in keys.items()
+        )
+        if same and all(table.get(key) == value for key, value in changes.items()):
+            reference = " (the reference)" if rung.name == ladder.reference else ""
+            best = f"{ladder.name}: {rung.name}, {rung.what}{reference}"
+            if changes or rung.type_name or rung.sections:
+                return best
+    return best
+
+
+def _less(found: SceneRecord, first: SceneRecord) -> SceneRecord:
+    """Return what is not so in the first scene."""
+    lists = ("models", "effects", "spared")
+    new = {n: [one for one in getattr(found, n) if one not in getattr(first, n)] for n in lists}
+    return found.model_copy(update=new)
+
+
+def keep_explained(study: Study, folder: StudyFolder) -> None:
+    """Write ``explained.json`` into a study's folder, unless it is there.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    if read_explained(folder) is None:
+        content = explained(study).model_dump()
+        text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+        folder.write_file(EXPLAINED, text.encode())
+
+
+def measure_errors(folder: StudyFolder) -> None:
+    """Run the first run's scene with its models and their references, and keep the errors.
+
+    It reads the scene that the folder names, and imports its blocks: not for folders of strangers.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be run.
+    OSError
+        If the folder cannot be written.
+    """
+    record = folder.record
+    first = StoredRows(folder).first
+    swaps, sets = record.changes(first)
+    variants = Variants(
+        Path(record.scene), sets=[f"{key}={value}" for key, value in sets],
+        swaps=[f"{block}={name}" for block, name in swaps], seed=int(first["seed"]),
+    )  # fmt: skip
+    rows, notes = scene_errors(variants)
+    errors = MeasuredErrors(command=record.command(first), rows=rows, notes=notes)
+    folder.write_file(ERRORS, (json.dumps(errors.model_dump(), indent=1) + "\n").encode())
+
+
+def scene_errors(variants: Variants) -> tuple[list[ErrorRecord], list[str]]:
+    """Run a scene with its own models and with each one's reference, and return their errors.
+
+    Beside them notes: of which ladders nothing could be measured, and why.
+    """
+    rows: list[ErrorRecord] = []
+    notes: list[str] = []
+    for name, block in variants.scene.blocks.items():
+        for ladder in block.cls.ladders_for(block.parameters):
+            why = applies(variants, name, ladder)
+            if why:
+                notes.append(f"{name}, {ladder.name}: changes nothing here, {why}")
+                continue
+            rung = _rung_in_scene(variants, name, ladder)
+            if rung is None:
+                notes.append(f"{name}, {ladder.name}: the scene uses none of its rungs")
+                continue
+            wanted = {rung, ladder.reference}
+            short = replace(ladder, rungs=tuple(r for r in ladder.rungs if r.name in wanted))
+            try:
+                costs = climb(variants, name, short, repeats=1)
+            except Unavailable as error:
+                notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
+                continue
+            (mine,) = [cost for cost in costs if cost.rung == rung]
+            if not mine.errors:
+                why = mine.unavailable or mine.error_note or "nothing to compare"
+                notes.append(f"{name}, {ladder.name}: not measured, {why}")
+            rows += _error_rows(mine)
+    return rows, notes
+
+
+def _rung_in_scene(variants: Variants, name: str, ladder: Ladder) -> str | None:
+    """Return the name of the rung that the scene's block is."""
+    own = variants.scene.blocks[name]
+    for rung in ladder.rungs:
+        try:
+            block = variants.with_rungs([Choice(name, ladder, rung)]).blocks[name]
+        except (Unavailable, ValueError):
+            continue
+        if block.cls is own.cls and block.parameters == own.parameters:
+            return rung.name
+    return None
+
+
+def _error_rows(cost: RungCost) -> list[ErrorRecord]:
+    own = cost.rung == cost.reference
+    return [
+        ErrorRecord(
+            block=cost.block, ladder=cost.ladder.name, rung=cost.rung, quantity=quantity.name,
+            unit=quantity.unit, mean=spread.mean, p95=spread.p95, largest=spread.maximum,
+            target_scans=spread.count, against=cost.error_note if own else cost.reference,
+        )
+        for quantity in cost.ladder.quantities
+        if (spread := cost.errors.get(quantity.name)) is not None
+    ]  # fmt: skip

@@ -1,0 +1,115 @@
+"""Confidence intervals against published numbers and by coverage."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dsa_des.results import statistics
+from dsa_des.results.labels import axis_label, readable, unit_of, value_label
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    [
+        # Newcombe, "Two-sided confidence intervals for the single proportion", Statistics in
+        # Medicine 17 (1998), table I, method 3 (score).
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0000, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ],
+)
+def test_wilson_gives_newcombes_table(successes: int, trials: int, low: float, high: float) -> None:
+    assert statistics.wilson(successes, trials, 0.95) == pytest.approx((low, high), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "confidence", "quantile"),
+    [(1, 0.95, 12.706), (9, 0.95, 2.262), (29, 0.99, 2.756), (120, 0.90, 1.658)],
+)
+def test_quantiles_of_t_are_those_of_the_tables(
+    degrees: int, confidence: float, quantile: float
+) -> None:
+    assert statistics.t_quantile(degrees, confidence) == pytest.approx(quantile, abs=5e-4)
+
+
+def test_a_mean_has_the_t_interval() -> None:
+    # Student's sleep data (Biometrika 6, 1908): extra hours, drug 1 and drug 2.
+    first = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0])
+    second = np.array([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4])
+    estimate = statistics.mean(second - first, 0.95)
+    assert (estimate.value, estimate.low, estimate.high) == pytest.approx(
+        (1.58, 0.7001, 2.4599), abs=1e-4
+    )
+    found = statistics.difference(first, second, 0.95)
+    assert found.paired == estimate
+    # Welch's interval of the same data, as statistics packages print it.
+    assert (found.unpaired.low, found.unpaired.high) == pytest.approx((-0.2055, 3.3655), abs=2e-4)
+    assert found.narrower == pytest.approx(1.7855 / 0.8799, abs=1e-3)
+
+
+def test_a_mean_of_fractions_and_a_difference_of_shares_have_possible_intervals() -> None:
+    values = np.array([1.0] * 10 + [0.75, 0.9, 0.8, 0.2])
+    told, plain = statistics.fraction(values, 0.95), statistics.mean(values, 0.95)
+    assert plain.high > 1.0 > told.high > told.value == plain.value > told.low > 0.0
+    # As wide as Student's in the middle; at an end where all are alike each is a trial of Wilson's.
+    half = np.array([0.4, 0.5, 0.6, 0.45, 0.55] * 20)
+    both = statistics.fraction(half, 0.95), statistics.mean(half, 0.95)
+    assert both[0].half_width == pytest.approx(both[1].half_width, rel=0.01)
+    alike = statistics.fraction(np.ones(20), 0.95)
+    assert (alike.low, alike.high) == pytest.approx((1.0 - 0.1611, 1.0), abs=5e-5)
+    found = statistics.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
+    assert (found.paired.high, found.unpaired.high) == (1.0, 1.0) and found.paired.value < 0.8
+
+
+def test_intervals_cover_what_they_promise() -> None:
+    generator = np.random.default_rng(5)
+    hits = {"t": 0, "bootstrap": 0, "share": 0}
+    rounds = 120
+    for _ in range(rounds):
+        values = generator.exponential(1.0, 60)
+        for method in ("t", "bootstrap"):
+            estimate = statistics.mean(values, 0.9, method)
+            hits[method] += estimate.low <= 1.0 <= estimate.high
+        # Trials of a unit hang together: half of the units succeed at 0.9, half at 0.1.
+        chance = np.where(generator.random(40) < 0.5, 0.9, 0.1)
+        won = generator.binomial(25, chance).astype(float)
+        found = statistics.share(won, np.full(40, 25.0), 0.9)
+        hits["share"] += found.low <= 0.5 <= found.high
+    for name, count in hits.items():
+        assert 0.80 <= count / rounds <= 0.97, name
+    # As if all 1000 trials were independent, the interval would be far too narrow.
+    assert found.half_width > 3 * (statistics.wilson(500, 1000, 0.9)[1] - 0.5)
+
+
+def test_missing_values_are_counted_and_left_out() -> None:
+    first = np.array([1.0, np.nan, 3.0, 4.0])
+    second = np.array([2.0, 2.0, np.nan, 6.0])
+    found = statistics.difference(first, second, 0.95)
+    assert (found.paired.count, found.only_first, found.only_second) == (2, 1, 1)
+    assert found.paired.value == 1.5
+    assert math.isnan(statistics.mean(np.array([np.nan]), 0.95).value)
+
+
+def test_few_values_are_marked() -> None:
+    assert statistics.mean(np.arange(9.0), 0.95).few
+    assert not statistics.mean(np.arange(10.0), 0.95).few
+    one = statistics.mean(np.array([4.0]), 0.95)
+    assert one.value == 4.0 and math.isnan(one.low) and one.few
+    assert statistics.share(np.array([3.0]), np.array([5.0]), 0.95).few
+
+
+def test_axes_of_figures_carry_units() -> None:
+    assert readable("declaration_range_m.radar") == "Declaration range, radar (m)"
+    assert readable("track_breaks") == "Track breaks"
+    assert readable("track_nees") == "Track NEES"
+    assert readable("fused_share.ir_with_radar") == "Fused share, IR with radar"
+    assert axis_label("radar.scan_rate_hz") == "Radar scan rate (Hz)"
+    assert axis_label("swap.fusion") == "Type of fusion"
+    assert axis_label("weather.rain_mm_per_h") == "Weather rain (mm/h)"
+    assert axis_label("traffic.intruders[0].rcs_dbsm") == "Traffic intruders[0] RCS (dBsm)"
+    assert value_label("bearing_deg", 30.0) == "bearing 30°"
+    assert value_label("ir.rate_error_ppm", 100) == "IR rate error 100 ppm"
+    assert value_label("swap.fusion", "fusion.gated") == "fusion.gated"
+    assert unit_of("declaration_time_s.any") == "s" and unit_of("track_breaks") == ""

@@ -1,0 +1,141 @@
+"""Ratios of events in summaries: by hand, clustered, by class, compared, and how often right."""
+
+import math
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from dsa_des.results.ratio import paired_ratio
+from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
+from dsa_des.results.rows import Rows
+from dsa_des.results.summary import compare_axis, summarise
+from tests.results.conftest import rows_of_table
+
+FLAGS = [
+    Result("n", EVENT, ""), Result("m", EVENT, ""), Result("w", NUMBER, ""),
+    Result("family", NUMBER, ""), Result("kind", CLASS, ""),
+]  # fmt: skip
+
+
+def ratio(name: str = "r", **of: object) -> Result:
+    return Result(name, RATIO, "", ratio=RatioOf("n", "m", **of))  # type: ignore[arg-type]
+
+
+def rows_of(n, m, w=None, family=None, kind=None, axis=None, replica=None) -> Rows:
+    count = len(n)
+    columns = {
+        "n": np.asarray(n, dtype=float), "m": np.asarray(m, dtype=float),
+        "w": np.ones(count) if w is None else w, "family": family, "kind": kind,
+        "x": np.zeros(count) if axis is None else axis,
+        "replica": np.arange(count) if replica is None else replica,
+        "error": pa.nulls(count, pa.string()), "status": ["done"] * count,
+    }  # fmt: skip
+    return rows_of_table(pa.table({k: v for k, v in columns.items() if v is not None}), ["x"], [])
+
+
+def test_a_ratio_by_hand_with_both_intervals() -> None:
+    rows = rows_of([1, 1, 0, 0, math.nan], [0, 1, 1, 0, 1], np.array([1, 2, 3, 4, 5.0]))
+    (line,) = summarise(rows, [ratio(weight="w")], 0.95, "t", {})
+    assert line.ratio is not None and line.other is not None
+    assert (line.ratio.ratio, line.ratio.unresolved, line.ratio.induced) == pytest.approx(
+        (5 / 3, 2 / 3, 1)
+    )
+    assert line.missing == 1 and line.estimate.count == 4
+    assert line.ratio.standard_error == pytest.approx(math.sqrt(25 / 9 + 16 / 9 + 9) / 3)
+    assert (line.estimate.low, line.estimate.high) == line.ratio.interval
+    assert (line.ratio.method, line.estimate.few) == ("gamma", False)
+    assert (line.other.method, line.other.few) == ("bootstrap", True)
+    (drawn,) = summarise(rows, [ratio(weight="w")], 0.95, "bootstrap", {})
+    assert (drawn.estimate.low, drawn.estimate.high) == line.other.interval
+    assert drawn.other is not None and drawn.other.interval == line.ratio.interval
+
+
+def test_a_class_counts_its_own_and_none_stands_in_no_class() -> None:
+    rows = rows_of([1, 1, 1, 1], [1, 0, 0, 1], kind=["a", "a", "b", None])
+    found = summarise(
+        rows, [ratio("a", only=("kind", "a")), ratio("b", only=("kind", "b")), ratio(), FLAGS[4]],
+        0.95, "t", {},
+    )  # fmt: skip
+    assert [line.estimate.value for line in found] == [0.5, 0.0, 0.5]
+    assert [line.other is None for line in found] == [True, True, False]
+
+
+def test_runs_of_a_family_count_as_one_of_all_their_weight() -> None:
+    """Copies of an encounter tell no more of other encounters than the encounter itself."""
+    random = np.random.default_rng(5)
+    n = random.random(60) < 0.6
+    m = n & (random.random(60) < 0.4)
+    one = paired_ratio(n, m)
+    copies = np.repeat(np.arange(60), 4)
+    rows = rows_of(n[copies], m[copies], np.full(240, 0.25), copies.astype(float))
+    (line,) = summarise(rows, [ratio(weight="w", cluster="family")], 0.95, "t", {})
+    assert line.ratio is not None and line.ratio.clusters == 60 == line.estimate.count
+    assert line.ratio.standard_error == pytest.approx(one.standard_error)
+    assert line.ratio.effective_sample_size == pytest.approx(60)
+    (loose,) = summarise(rows, [ratio(weight="w")], 0.95, "t", {})
+    assert loose.ratio is not None
+    assert loose.ratio.standard_error == pytest.approx(one.standard_error / 2)
+
+
+def test_differences_of_ratios_hold_what_they_share_once() -> None:
+    """Two conditions on the same encounters, again and again: the paired interval holds 95 %."""
+    random = np.random.default_rng(11)
+    held, widths, truth, rounds = 0, [], 0.3 - 0.5, 400
+    for _ in range(rounds):
+        w = random.choice([1.0, 2.0], 1500)
+        n = random.random(1500) < 0.2
+        u = random.random(1500)
+        m = np.concatenate([n & (u < 0.5), n & (u < 0.3)])
+        rows = rows_of(
+            np.tile(n, 2), m, np.tile(w, 2), axis=np.repeat([0.0, 1.0], 1500),
+            replica=np.tile(np.arange(1500), 2),
+        )  # fmt: skip
+        (found,) = compare_axis(rows, "x", 0.0, [ratio(weight="w")], 0.95, "t")
+        d = found.difference
+        held += d.paired.low <= truth <= d.paired.high
+        widths.append(d.narrower)
+    assert 0.925 <= held / rounds <= 0.975 and min(widths) > 1.2
+    # Where only one side has an interval by error, the other one's uncertainty still counts.
+    n = np.ones(100)
+    m = np.concatenate([np.zeros(100), np.ones(100)])
+    rows = rows_of(np.tile(n, 2), m, axis=np.repeat([0.0, 1.0], 100),
+                   replica=np.tile(np.arange(100), 2))  # fmt: skip
+    (sure,) = compare_axis(rows, "x", 0.0, [ratio()], 0.95, "t")
+    assert sure.difference.paired.value == 1.0 and sure.difference.paired.half_width > 0.01
+
+
+@pytest.mark.parametrize("method", ["t", "bootstrap"])
+def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
+    random = np.random.default_rng(23)
+    chance, left, new, kept, rounds = 0.3, 0.25, 0.01, 0, 300
+    truth = left + (1 - chance) / chance * new
+    for _ in range(rounds):
+        n = np.repeat(random.random(700) < chance, 3)
+        hard = np.repeat(random.random(700) < 0.5, 3)  # what copies of an encounter share
+        m = random.random(2100) < np.where(n, np.where(hard, 2 * left - 0.05, 0.05), new)
+        w = np.repeat(random.choice([1.0, 3.0], 700), 3)
+        found = paired_ratio(
+            n, m, w, cluster=np.repeat(np.arange(700), 3),
+            method="gamma" if method == "t" else method, resamples=300,
+        )  # fmt: skip
+        kept += found.interval[0] <= truth <= found.interval[1]
+    # What one event more would be is a whole cluster to the gammas: a little too wide.
+    assert 0.925 <= kept / rounds <= (0.99 if method == "t" else 0.975)
+
+
+def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
+    """Runs without and with a remedy as values of an axis: those that both have, by hand."""
+    rows = rows_of(
+        [1, 1, 0, 0, 1, 0, 1, 1, 0, 1], np.zeros(10),
+        np.array([1, 2, 3, 4, 9, 1, 2, 3, 4, 9.0]), axis=np.repeat([0.0, 1.0], 5),
+        replica=np.array([0, 1, 2, 3, 4, 0, 1, 2, 3, 5]),
+    )  # fmt: skip
+    (found,) = compare_axis(rows, "x", 0.0, [FLAGS[0]], 0.95, "t", "w")
+    # Below the line 1 + 2, above it 2 of them and 3 that are induced; the fifth ones are alone.
+    assert found.ratio is not None and found.ratio.encounters == 4
+    assert (found.ratio.ratio, found.ratio.induced) == pytest.approx((5 / 3, 1))
+    (plain,) = compare_axis(rows, "x", 0.0, [FLAGS[0]], 0.95, "t")
+    assert plain.ratio is not None and plain.ratio.ratio == 1.0
+    (number,) = compare_axis(rows, "x", 0.0, [FLAGS[2]], 0.95, "t")
+    assert number.ratio is None

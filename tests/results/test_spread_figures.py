@@ -1,0 +1,89 @@
+"""Histograms and cumulative shares in studies: drawn alike each time, refused with reasons."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from dsa_des.cli import main
+from dsa_des.results.curves import _edges
+
+STUDY = """
+scene = "small.toml"
+replicas = 4
+metrics = ["first_detection"]
+[axes]
+blocks.ir.reach_km = [0.1, 4.8, 9]
+"""
+
+
+def study(figure: str, *words: str, code: int = 0) -> str:
+    Path("study.toml").write_text(f"{STUDY}\n[[figures]]\n{figure}\n")
+    result = CliRunner().invoke(main, ["study", "study.toml", "--workers", "1", *words])
+    assert result.exit_code == code, result.output
+    return " ".join(result.output.split())
+
+
+@pytest.mark.parametrize("kind", ["histogram", "cdf"])
+def test_a_spread_is_drawn_to_the_same_bytes(small: Path, kind: str) -> None:
+    drawn = []
+    for out in ("a", "b"):
+        study(f'kind = "{kind}"\nmetric = "first_detection_range_m.ir"', "--out", out)
+        drawn.append(Path(out, f"figure-01-{kind}.png").read_bytes())
+    assert drawn[0] == drawn[1] and drawn[0].startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("figure", "said"),
+    [
+        ('kind = "histogramm"\nmetric = "detected.ir"', "did you mean 'histogram'?"),
+        ('kind = "cdf"\nmetric = "detected.ir"', "is an event, 0 or 1: a cdf shows how numbers"),
+        ('kind = "cdf"\nmetric = "first_detection_range_m.irr"',
+         "did you mean 'first_detection_range_m.ir'?"),
+        ('kind = "histogram"', "needs a metric"),
+        ('kind = "histogram"\nmetric = "first_detection_range_m.ir"\nbins = 4',
+         "unknown key of a histogram figure"),
+        ('kind = "cdf"\nmetric = "first_detection_range_m.ir"\naxis = "ir.reach"',
+         "the study has no such axis"),
+    ],
+)  # fmt: skip
+def test_what_a_spread_cannot_show_is_said_before_anything_runs(
+    small: Path, figure: str, said: str
+) -> None:
+    assert said in study(figure, "--out", "out", code=2)
+    assert not Path("out").exists()
+
+
+def test_bins_cover_every_value() -> None:
+    values = np.array([3.0, -1.0, 8.0, 8.0])
+    edges = _edges(values, 4)
+    assert np.histogram(values, edges)[0].sum() == 4
+    assert np.histogram(np.full(3, 7.0), _edges(np.full(3, 7.0), 3))[0].sum() == 3
+    assert len(_edges(np.empty(0), 0)) == 2
+    assert len(_edges(np.linspace(0, 1, 10**6), 10**6)) == 41
+
+
+def test_without_figures_nothing_of_matplotlib_is_imported(small: Path) -> None:
+    """A run and a study say so; both leave the same tables."""
+    Path("study.toml").write_text(STUDY + '[[figures]]\nmetric = "detected.ir"\n')
+    code = """
+import sys
+from dsa_des.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert end.code in (0, None), end.code
+sys.exit(any(name.partition(".")[0] == "matplotlib" for name in sys.modules))
+"""
+    for words in (("run", "small.toml", "--out", "r"),
+                  ("study", "study.toml", "--workers", "1", "--out", "s"),
+                  ("study", "show", "s")):  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words, "--no-figures"], capture_output=True, text=True
+        )
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+    assert not [*Path("r").glob("*.png"), *Path("s").glob("*.png")]
+    assert Path("r/detections.parquet").exists() and Path("s/summary.parquet").exists()

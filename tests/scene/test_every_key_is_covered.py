@@ -1,0 +1,65 @@
+"""Every key of a scene has a test that sees its effect, or a reason why not."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+from parameter_keys import every_key
+
+TESTS = [
+    path
+    for path in sorted(Path(__file__).parents[1].rglob("test_*.py"))
+    if "from covering import" in path.read_text(encoding="utf-8")
+]
+
+#: Keys whose effect no test sees, with the reason.
+UNCOVERED: dict[str, str] = {
+    "operator.human.unattended": "it is about a page that is closed: tests/cdti/test_session.py"
+}
+
+
+def covered() -> dict[str, set[str]]:
+    """Return key → tests that claim to see its effect."""
+    found: dict[str, set[str]] = {}
+    for path in TESTS:
+        spec = importlib.util.spec_from_file_location(f"covered_{path.stem}", path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        for name, test in vars(module).items():
+            for key in getattr(test, "covers", ()):
+                found.setdefault(key, set()).add(f"{path.name}::{name}")
+    return found
+
+
+@pytest.fixture(scope="module")
+def claims() -> dict[str, set[str]]:
+    return covered()
+
+
+def test_no_key_is_without_a_test(claims):
+    """A new parameter needs a test here that sees its effect, marked with `covers`."""
+    assert sorted(every_key() - claims.keys() - UNCOVERED.keys()) == []
+
+
+def test_no_test_claims_a_key_that_there_is_not(claims):
+    """A key that is gone or renamed takes its claim along."""
+    known = every_key()
+    assert {key: tests for key, tests in claims.items() if key not in known} == {}
+    assert sorted(UNCOVERED.keys() - known) == []
+
+
+def test_what_is_uncovered_is_not_covered_and_has_its_reason(claims):
+    assert sorted(UNCOVERED.keys() & claims.keys()) == []
+    assert all(len(reason) > 20 for reason in UNCOVERED.values())
+
+
+def test_each_claim_stands_where_the_key_is_written(claims):
+    """The last part of a claimed key is found in the text of the file that claims it."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in TESTS}
+    for key, tests in claims.items():
+        last = key.rpartition(".")[2]
+        for test in tests:
+            text = texts[test.partition("::")[0]]
+            found = last in text or last.removesuffix("_m2") in text
+            assert found, f"{test} does not name {key}"
