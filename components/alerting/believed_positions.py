@@ -7,8 +7,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Deviations
 from components.alerting.own_poses import OwnPoses, run_begins
-from components.geometry.attitude import body_to_ned
-from components.geometry.earth_models import east_north_m
+from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks

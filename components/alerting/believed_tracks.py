@@ -9,8 +9,7 @@ from components.alert_configuration.configuration import Deviations, largest
 from components.alerting.believed_positions import BelievedFlights
 from components.alerting.own_poses import OwnPoses
 from components.estimation.frame import ned_axes
-from components.geometry.earth_models import east_north_m, east_north_mps
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake

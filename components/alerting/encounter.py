@@ -8,7 +8,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Configuration, Deviations, largest, margins
 from components.alerting.levels import AlertPairs
-from components.geometry.earth_models import east_north_m, east_north_mps
+from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
 from components.traffic.daa_file import EXTRA_HEADERS, read_daa_samples
 from components.traffic.traffic_file import Problems

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.earth_models import east_north_m
+from components.geometry import east_north_m
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake

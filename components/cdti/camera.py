@@ -8,7 +8,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster, VisibleAreas
 from components.cdti.contacts import OwnNow
-from components.geometry.attitude import body_to_ned, ned_to_body, unit_vector_unchecked
+from components.geometry import body_to_ned, ned_to_body, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.detections import Detections
 from components.messages.targets import TrafficStates

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.geometry.angles import local_axes
-from components.geometry.ellipsoid import enu_to_geodetic, line_of_sight_ned
+from components.geometry import enu_to_geodetic, line_of_sight_ned, local_axes
 from components.traffic.geodesic_motion import geodesic_parameter_table, geodesic_state
 from dsa_des.arrays.types import BoolArray, FloatArray
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.encounters.encounter_set import TRACKS, EncounterSet, flown_events
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic
 from components.traffic.trajectory import CELLS_AT_ONCE, SampledTrajectory
 from dsa_des.arrays.types import FloatArray
 

@@ -26,7 +26,7 @@ from components.encounters.pair_densities import PairingRules
 from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
 from components.encounters.set_file import read_set
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry import line_of_sight
 from components.traffic.files import FileParameters, RecordedTraffic
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.scripted import Ownship, flight_arguments

@@ -20,7 +20,7 @@ import numpy as np
 
 from components.encounters.public_formats import Track
 from components.encounters.set_file import EncounterSetError
-from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry import line_of_sight_ned
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import did_you_mean

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.directions import unit_vectors
+from components.geometry import unit_vectors
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer

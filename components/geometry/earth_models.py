@@ -38,8 +38,8 @@ import numpy.typing as npt
 from components.arguments.checks import positions, shaped
 from components.geometry.angles import RAD_PER_DEG, longitude_difference_rounded, positive_turn
 from components.geometry.ellipsoid import north_east_up, radii_of_curvature, spherical_from_enu
-from components.geometry.sensor_angles import MODELS as ATTITUDE_MODELS
-from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
+from components.geometry.sensor_axes import MODELS as ATTITUDE_MODELS
+from components.geometry.sensor_axes import sensor_angles, sensor_angles_of_offsets
 from dsa_des.arrays.types import FloatArray
 
 METRES_PER_DEGREE = 111195.0
@@ -305,7 +305,7 @@ class LineOfSight:
     earth : {"flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"}
         See the module.
     attitude : {"exact", "small_angle"}
-        As for `components.geometry.sensor_angles.sensor_angles`.
+        As for `components.geometry.sensor_angles`.
 
     Raises
     ------

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.environment.tables import Terrain
-from components.geometry.earth_models import SeenFromOwnship
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import SeenFromOwnship, sensor_angles
 from components.terrain.rays import (
     behind_terrain,
     behind_the_limb,

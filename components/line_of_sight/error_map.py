@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import wrap_by_sines
-from components.geometry.attitude import unit_vector
-from components.geometry.directions import angle_of_chord, chord_between
-from components.geometry.earth_models import EARTH_MODELS, LineOfSight
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import (
+    EARTH_MODELS,
+    LineOfSight,
+    angle_of_chord,
+    chord_between,
+    enu_to_geodetic,
+    unit_vector,
+    wrap_by_sines,
+)
 from dsa_des.arrays.types import FloatArray
 
 ALTITUDE_M = 1000.0

@@ -6,7 +6,7 @@ from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 from components.aircraft.known_targets import KnownTraffic
-from components.geometry.earth_models import EARTH_MODELS
+from components.geometry import EARTH_MODELS
 from components.geometry.error_bounds import Envelope, ErrorBound, error_bound
 from components.messages.reach import REACH_MARGIN, FarthestLook, farthest_look
 from dsa_des.block.component import Context

@@ -9,9 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from components.geometry.angles import wrap_pi_unchecked
-from components.geometry.directions import unit_vectors
-from components.geometry.earth_models import LineOfSight
+from components.geometry import LineOfSight, unit_vectors, wrap_pi_unchecked
 from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
 from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, true_reach_m
 from components.messages.reach import FarthestLook, farthest_look

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, line_of_sight_ned
 from components.metrics.separation import (
     RelativeFlight,
     distances_m,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight, north_east_up
+from components.geometry import line_of_sight, north_east_up
 from components.traffic.censored import present_together_s
 from components.traffic.sample_times import (
     SampleTimes,

@@ -23,9 +23,14 @@ from components.arguments.checks import (
     require_between,
     unflatten,
 )
-from components.geometry.angles import wrap_two_pi
-from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
-from components.geometry.ellipsoid import radii_of_curvature
+from components.geometry import (
+    body_angles,
+    body_to_ned,
+    ned_to_body,
+    radii_of_curvature,
+    unit_vector,
+    wrap_two_pi,
+)
 from components.messages.detections import Detections, LastingPart
 from components.messages.targets import RelativeTargets, TrafficStates
 from dsa_des.arrays.types import FloatArray, IntArray

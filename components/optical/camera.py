@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.geometry.field_of_view import sector_width_rad
+from components.geometry import sector_width_rad
 from components.optical.area_of_cells import check_silhouette, fitted_otherwise
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,

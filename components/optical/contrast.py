@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
 from components.atmosphere.visibility import KOSCHMIEDER
-from components.geometry.directions import angle_between
+from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
 from components.sensor.look import Cells
 from components.terrain.rays import dip_rad

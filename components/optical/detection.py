@@ -23,7 +23,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.field_of_view import sector_width_rad
+from components.geometry import sector_width_rad
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.radar.false_alarms import false_alarm_count

@@ -18,7 +18,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.directions import angle_between
+from components.geometry import angle_between
 from dsa_des.arrays.types import FloatArray
 
 # Illuminance of the sun's beam outside the atmosphere, lux (IES RP-21, 1984).

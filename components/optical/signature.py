@@ -16,8 +16,7 @@ from components.arguments.checks import (
     positive,
     unflatten,
 )
-from components.geometry.angles import wrap_by_sines
-from components.geometry.directions import angle_between
+from components.geometry import angle_between, wrap_by_sines
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
-from components.geometry.angles import sine_and_cosine
+from components.geometry import sine_and_cosine
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:

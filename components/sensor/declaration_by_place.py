@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry import body_to_ned, unit_vector
 from components.messages.detections import Detections
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict

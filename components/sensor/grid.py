@@ -6,8 +6,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from components.geometry import rising_sector
 from components.geometry.angles import TWO_PI, past, wrap_pi
-from components.geometry.field_of_view import rising_sector
 from components.sensor.resolution import Grid
 from dsa_des.arrays.types import FloatArray
 

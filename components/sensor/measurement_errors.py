@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart
 from components.sensor.constant_columns import constant_column
 from components.sensor.error_parameters import StatedError

@@ -5,8 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from components.geometry.angles import TWO_PI
-from components.geometry.field_of_view import rising_sector
+from components.geometry import TWO_PI, rising_sector
 from components.messages.reach import Reach
 from components.sensor.error_parameters import ErrorParameters
 from components.sensor.resolution import Grid

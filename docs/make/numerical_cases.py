@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import earth_models, ellipsoid
-from components.geometry.angles import longitude_difference_deg
-from components.geometry.attitude import body_angles
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import (
+    body_angles,
+    earth_models,
+    ellipsoid,
+    longitude_difference_deg,
+    sensor_angles,
+)
 from components.high_precision.multiprecision import multiprecision
 from components.sensor.resolution import round_to_grid
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution

@@ -20,7 +20,7 @@ import numpy as np
 
 import dsa_des
 from components.estimation.motion import CoordinatedTurn, Motion
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_of
 from components.metrics.true_states import states_in_frame

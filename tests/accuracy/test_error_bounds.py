@@ -8,10 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import earth_models, ellipsoid
-from components.geometry.attitude import unit_vector
-from components.geometry.earth_models import LineOfSight
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import (
+    LineOfSight,
+    earth_models,
+    ellipsoid,
+    enu_to_geodetic,
+    sensor_angles,
+    unit_vector,
+)
 from components.geometry.error_bounds import (
     Envelope,
     ErrorBound,
@@ -19,7 +23,6 @@ from components.geometry.error_bounds import (
     azimuth_error_rad,
     error_bound,
 )
-from components.geometry.sensor_angles import sensor_angles
 
 MODELS = {
     "flat_earth": LineOfSight("flat_earth").in_ned,

@@ -6,7 +6,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry import line_of_sight
 from components.messages.reach import FarthestLook, Reach, farthest_look
 from components.sensor.mounting import MountedAxes
 from components.traffic.envelope import attitude_extremes_rad, traffic_envelope

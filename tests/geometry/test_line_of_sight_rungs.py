@@ -9,8 +9,7 @@ from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import earth_models, ellipsoid
-from components.geometry.earth_models import EARTH_MODELS, LineOfSight
+from components.geometry import EARTH_MODELS, LineOfSight, earth_models, ellipsoid
 
 ALL = {name: LineOfSight(name).in_ned for name in EARTH_MODELS}
 RUNGS = {name: line for name, line in ALL.items() if name != "ellipsoid"}

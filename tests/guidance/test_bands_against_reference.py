@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.geometry.earth_models import east_north_m, east_north_mps
+from components.geometry import east_north_m, east_north_mps
 from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many, resolution
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.directions import angle_between
+from components.geometry import angle_between
 from components.optical.signature import (
     MovingTargets,
     confidence,
