@@ -135,29 +135,15 @@ POLARISATIONS = {"horizontal": 1.0, "vertical": -1.0, "circular": 0.0}
 
 @dataclass(frozen=True)
 class RainCoefficients:
-    """Hold k and α of γ = k R^α for one frequency and both linear polarisations.
+    """Hold k and α of γ = k R^α for one frequency and both linear polarisations."""
 
-    Parameters
-    ----------
-    k_horizontal, k_vertical : float
-        dB/km at 1 mm/h.
-    alpha_horizontal, alpha_vertical : float
-    """
-
-    k_horizontal: float
+    k_horizontal: float  # dB/km at 1 mm/h
     alpha_horizontal: float
     k_vertical: float
     alpha_vertical: float
 
     def specific_attenuation(self, rain_rate_mm_h: FloatArray, balance: FloatArray) -> FloatArray:
-        """Return γ in dB/km for flat arrays of checked rain rates and polarisation balances.
-
-        Parameters
-        ----------
-        rain_rate_mm_h : (m,) array, mm/h
-        balance : (m,) array
-            cos² of the path's elevation times cos 2τ, in [-1, 1].
-        """
+        """Return γ in dB/km for flat arrays of checked rain rates and polarisation balances."""
         horizontal = 0.5 * (1.0 + balance) * self.k_horizontal
         vertical = 0.5 * (1.0 - balance) * self.k_vertical
         k = horizontal + vertical

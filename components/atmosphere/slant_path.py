@@ -44,29 +44,21 @@ class AttenuationTable:
     """Hold the attenuation of one radar's frequency by altitude.
 
     Build it with `attenuation_table`.
-
-    Parameters
-    ----------
-    frequency_hz : float
-    gas_db_km, gas_slope, gas_sum : (nodes,) arrays or None
-        Specific attenuation of the gases at altitudes `BOTTOM_M` + i `STEP_M`, its increase to the
-        next node, and its sum up to node i by the trapezium rule (in node steps). None: no gas.
-    rain : RainCoefficients or None
-    rain_rate_mm_h, rain_height_m, rain_balance : float
-        Rain falls from `rain_height_m` down; the balance is cos 2τ of the polarisation.
-    fog_db_km, fog_base_m, fog_top_m : float
-        Fog or cloud fills the altitudes from base to top.
     """
 
     frequency_hz: float
+    # (nodes,) arrays or None: Specific attenuation of the gases at altitudes `BOTTOM_M` + i
+    # `STEP_M`, its increase to the next node, and its sum up to node i by the trapezium rule
+    # (in node steps). None: no gas
     gas_db_km: FloatArray | None
     gas_slope: FloatArray | None
     gas_sum: FloatArray | None
     rain: RainCoefficients | None
+    # Rain falls from `rain_height_m` down; the balance is cos 2τ of the polarisation
     rain_rate_mm_h: float
     rain_height_m: float
     rain_balance: float
-    fog_db_km: float
+    fog_db_km: float  # Fog or cloud fills the altitudes from base to top
     fog_base_m: float
     fog_top_m: float
 

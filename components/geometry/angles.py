@@ -179,20 +179,7 @@ def wrap_heading_rad(angle: FloatArray) -> FloatArray:
 
 
 def past(angle: FloatArray, turn: float) -> FloatArray:
-    """Give the remainder of angles by a turn, in [0, turn).
-
-    Parameters
-    ----------
-    angle : ndarray
-        In the unit of `turn`.
-    turn : float
-        2 pi or 360.
-
-    Returns
-    -------
-    ndarray
-        0 where the remainder rounds up to the turn itself, as that of -1e-20 does.
-    """
+    """Give the remainder of angles by a turn, in [0, turn)."""
     rest = np.mod(angle, turn)
     return np.where(rest >= turn, 0.0, rest)
 

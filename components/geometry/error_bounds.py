@@ -72,29 +72,18 @@ _METRES_PER_RAD = math.degrees(METRES_PER_DEGREE)
 
 @dataclass(frozen=True)
 class Envelope:
-    """Where a scene's lines of sight can lie.
+    """Where a scene's lines of sight can lie."""
 
-    Parameters
-    ----------
-    range_max_m : float
-        Longest line of sight that a sensor looks along.
-    own_lat_deg, own_alt_m, target_alt_m : (low, high)
-        Geodetic latitude of the ownship, altitudes of the ownship and of its targets.
-    target_lat_deg : (low, high), optional
-        Left out: whatever the range allows.
-    steepest_rad : float
-        Largest size of a body elevation that a sensor reads; pi/2 bounds no azimuth.
-    pitch_rad, roll_rad : float
-        Largest sizes of the ownship's pitch and roll.
-    """
-
-    range_max_m: float
+    range_max_m: float  # Longest line of sight that a sensor looks along
+    # (low, high): geodetic latitude of the ownship, altitudes of the ownship and of its targets
     own_lat_deg: Interval
     own_alt_m: Interval
     target_alt_m: Interval
+    # (low, high), optional: left out: whatever the range allows
     target_lat_deg: Interval | None = None
+    # Largest size of a body elevation that a sensor reads; pi/2 bounds no azimuth
     steepest_rad: float = 0.5 * math.pi
-    pitch_rad: float = 0.5 * math.pi
+    pitch_rad: float = 0.5 * math.pi  # Largest sizes of the ownship's pitch and roll
     roll_rad: float = math.pi
 
     def __post_init__(self) -> None:
@@ -288,24 +277,14 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True)
 class ErrorBound:
-    """Largest possible errors of a model over an envelope.
+    """Largest possible errors of a model over an envelope."""
 
-    Parameters
-    ----------
-    direction_rad : float
-        Angle between the model's line of sight and the true one; pi where nothing is proven.
-    azimuth_rad : float
-        Error of the azimuth in body axes at elevations up to the envelope's steepest.
-    range_m : float
-        Error of the slant range; infinite where nothing is proven.
-    relative_range : float
-        Error of the slant range over the slant range, at any range.
-    """
-
+    # Angle between the model's line of sight and the true one; pi where nothing is proven
     direction_rad: float
+    # Error of the azimuth in body axes at elevations up to the envelope's steepest
     azimuth_rad: float
-    range_m: float
-    relative_range: float
+    range_m: float  # Error of the slant range; infinite where nothing is proven
+    relative_range: float  # Error of the slant range over the slant range, at any range
 
     @property
     def elevation_rad(self) -> float:
@@ -321,24 +300,6 @@ class ErrorBound:
 def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> ErrorBound:
     """Bound the error of a model of the Earth and of the attitude over an envelope.
 
-    Parameters
-    ----------
-    earth : {"flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"}
-    envelope : Envelope
-    attitude : {"exact", "small_angle"}
-
-    Returns
-    -------
-    ErrorBound
-        Against the exact line of sight on WGS-84 and the exact rotation.
-
-    Raises
-    ------
-    ValueError
-        An unknown model.
-
-    Notes
-    -----
     Over usual envelopes (10 to 30 km, within 70 degrees
     of latitude) the bounds are 1.0 to 1.7 times the worst direction found by search, and 1.0 to
     1.8 times the worst range; up to 5 times where altitudes span 12 km, more beside a pole.
@@ -378,18 +339,6 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
 def attitude_error_rad(pitch_rad: float, roll_rad: float) -> float:
     """Bound the direction error of the small-angle attitude (thesis eq. 4-5).
 
-    Parameters
-    ----------
-    pitch_rad, roll_rad : float
-        Largest sizes.
-
-    Returns
-    -------
-    float
-        2 |pitch| + |roll|, at most pi; reached by pitch astern.
-
-    Notes
-    -----
     The exact rotation turns the direction by |pitch| and by |roll| at most; the small-angle form
     moves it along its own meridian by |pitch|. Both take a level aircraft to be the same.
     """

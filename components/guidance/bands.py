@@ -29,20 +29,13 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class Resolution(NamedTuple):
-    """Where the red band around the own value ends.
+    """Where the red band around the own value ends."""
 
-    Parameters
-    ----------
-    low, high : float
-        The nearest values that are not red to either side: left and right, or down and up;
-        infinite where there is none.
-    prefers_high : bool
-        Whether the right or upper one is nearer, or no farther.
-    """
-
+    # The nearest values that are not red to either side: left and right, or down and up;
+    # infinite where there is none
     low: float
     high: float
-    prefers_high: bool
+    prefers_high: bool  # Whether the right or upper one is nearer, or no farther
 
 
 def resolution(
@@ -116,22 +109,12 @@ _MOST_AT_ONCE = {"hdir": 32, "hs": 64, "vs": 64, "alt": 128}
 
 
 class Guidance(NamedTuple):
-    """The bands of one kind.
-
-    Parameters
-    ----------
-    own_value : float
-    bands : list of Band
-        In SI units and radians, from the lowest to the highest value.
-    recovery : Recovery or None
-        Where one was needed.
-    line : list of Band
-        The bands before NONE is called RECOVERY: what `components.guidance.memory` takes.
-    """
+    """The bands of one kind."""
 
     own_value: float
-    bands: list[Band]
-    recovery: Recovery | None
+    bands: list[Band]  # In SI units and radians, from the lowest to the highest value
+    recovery: Recovery | None  # Where one was needed
+    # The bands before NONE is called RECOVERY: what `components.guidance.memory` takes
     line: list[Band]
 
     @property
@@ -142,23 +125,12 @@ class Guidance(NamedTuple):
 
 @dataclass(frozen=True)
 class GuidedIntruder:
-    """One intruder as guidance sees it.
+    """One intruder as guidance sees it."""
 
-    Parameters
-    ----------
-    state : State
-        In the ownship's plane.
-    alerter : Alerter
-    early_level : int
-        The level whose early alerting time counts; 0 for none.
-    bounds : Bounds of (), optional
-        How far the relative state may be wrong.
-    """
-
-    state: State
+    state: State  # In the ownship's plane
     alerter: Alerter
-    early_level: int = 0
-    bounds: Bounds | None = None
+    early_level: int = 0  # The level whose early alerting time counts; 0 for none
+    bounds: Bounds | None = None  # (), optional: how far the relative state may be wrong
 
 
 def guidance(

@@ -21,21 +21,6 @@ def true_reach_m(context: Context, earth: str, look: FarthestLook) -> float:
     Traffic leaves far targets out by their true ranges; sensors go by those of the model.
     With a relative error e of the range, proven for all targets that seem to be in reach, these
     are within R / (1 - e).
-
-    Parameters
-    ----------
-    context : Context
-        Of the transform.
-    earth : str
-        Its model of the Earth.
-    look : FarthestLook
-        What is asked for downstream, with ranges as the model gives them.
-
-    Returns
-    -------
-    float, m
-        Infinite where nothing is proven: near a pole, far away, or with traffic that does not say
-        where the ownship can be.
     """
     reach_m = look.range_m
     offers = [producer.offer for producer in context.producers]
@@ -74,17 +59,11 @@ _LARGEST_RELATIVE_RANGE = 0.5 * (REACH_MARGIN - 1.0)
 
 @dataclass(frozen=True)
 class Allowance:
-    """Errors that a scene allows its lines of sight; infinite where it does not judge.
-
-    Parameters
-    ----------
-    angle_rad, range_m : float
-    relative_range : float
-        What sensors downstream bear (see `components.messages.reach.Reach`).
-    """
+    """Errors that a scene allows its lines of sight; infinite where it does not judge."""
 
     angle_rad: float = math.inf
     range_m: float = math.inf
+    # What sensors downstream bear (see `components.messages.reach.Reach`)
     relative_range: float = math.inf
 
     def complaint(self, bound: ErrorBound) -> str:
@@ -114,20 +93,12 @@ class Allowance:
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """What was chosen, with its bound, and why each cheaper one was not.
-
-    Parameters
-    ----------
-    earth, attitude : str
-    bound : ErrorBound
-    refused : tuple of str
-        "flat earth: …", cheapest first.
-    """
+    """What was chosen, with its bound, and why each cheaper one was not."""
 
     earth: str
     attitude: str
     bound: ErrorBound
-    refused: tuple[str, ...]
+    refused: tuple[str, ...]  # "flat earth: …", cheapest first
 
 
 def choose(
@@ -136,17 +107,7 @@ def choose(
     envelopes: Sequence[Envelope],
     allowed: Allowance,
 ) -> ModelChoice:
-    """Return the cheapest pair of models whose proven error is allowed.
-
-    Parameters
-    ----------
-    earths, attitudes : tuple of str
-        What there is to choose from; if nothing is good enough, the exact one of each.
-    envelopes : sequence of Envelope
-        One for each sensor; none where no sensor looks.
-    allowed : Allowance
-        The error of the two models together must stay within it.
-    """
+    """Return the cheapest pair of models whose proven error is allowed."""
     pairs = sorted(
         ((earth, attitude) for earth in earths for attitude in attitudes),
         key=lambda pair: (EARTH_COST[pair[0]] + ATTITUDE_COST[pair[1]], pair),
@@ -192,21 +153,12 @@ def _share(relative: float) -> str:
 
 @dataclass(frozen=True)
 class PickedModels:
-    """The models a transform computes with.
-
-    Parameters
-    ----------
-    earth, attitude : str
-    bound : ErrorBound, optional
-        Of their error over the scene, where it was asked for.
-    sentences : tuple of str
-        For `explain`.
-    """
+    """The models a transform computes with."""
 
     earth: str
     attitude: str
-    bound: ErrorBound | None = None
-    sentences: tuple[str, ...] = ()
+    bound: ErrorBound | None = None  # Of their error over the scene, where it was asked for
+    sentences: tuple[str, ...] = ()  # For `explain`
 
 
 def pick_rung(transform: Any) -> PickedModels:
@@ -216,10 +168,6 @@ def pick_rung(transform: Any) -> PickedModels:
     cheaper ones where ``[accuracy]`` allows their errors: ``auto`` is judged by those of
     ``angle_deg`` and ``range_m`` that are given, an exact model only gives way if both are. What
     the error in range does to a radar's Pd counts where ``detection_probability`` is given.
-
-    Parameters
-    ----------
-    transform : components.line_of_sight.transform.Transform
     """
     parameters, tolerance = transform.p, transform.context.tolerance
     named = parameters.model or type(transform).earth

@@ -54,29 +54,6 @@ def position_with_error(
 ) -> tuple[Any, Any, Any]:
     """Return the position that the ownship believes it has.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg : array_like, deg
-        True geodetic position; latitude in [-90, 90].
-    alt_m : array_like, m
-        True height above the ellipsoid.
-    bias_north_east_down_m, sigma_north_east_down_m : three floats, m
-        Constant error and standard deviation of the white noise, believed minus true.
-    normals : three array_like
-        Standard normal numbers for north, east and down.
-
-    Returns
-    -------
-    lat_deg, lon_deg, alt_m : arrays of the broadcast shape
-        Where the error is 0 they are the true ones to the bit. Longitude is not wrapped.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite, a sigma negative, or an error over 100 km.
-
-    Notes
-    -----
     The displacement is an arc along a sphere with the local radii of the ellipsoid, so it also
     works across a pole. Against a straight displacement in the tangent plane an error of 10 m
     comes out 0.1 µm off horizontally and, as it follows the Earth, 8 µm lower (100 m: 8 µm and
@@ -129,27 +106,6 @@ def attitude_with_error(
 ) -> tuple[Any, Any, Any]:
     """Return the attitude that the ownship believes it has.
 
-    Parameters
-    ----------
-    yaw_rad, pitch_rad, roll_rad : array_like, rad
-        True attitude, ZYX.
-    bias_rad, sigma_rad : three floats, rad
-        Constant error and standard deviation of the white noise of yaw, pitch and roll.
-    normals : three array_like
-        Standard normal numbers for yaw, pitch and roll.
-
-    Returns
-    -------
-    yaw_rad, pitch_rad, roll_rad : arrays of the broadcast shape
-        Angle plus error, not wrapped; where an error is 0 the true angle to the bit.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite or a sigma negative.
-
-    Notes
-    -----
     The error is one of the reported angles, as a data sheet states it, not of the axes; a pitch
     beyond ±90° means what its rotation means.
     """
@@ -218,13 +174,7 @@ def navigation_errs(context: Context) -> bool:
 
 
 def navigation_noise(context: Context) -> tuple[Three, Three]:
-    """Return the standard deviations that the ownship's navigation states of itself.
-
-    Returns
-    -------
-    position_m, attitude_rad : three floats each
-        North, east and down; yaw, pitch and roll. A bias it does not know of.
-    """
+    """Return the standard deviations that the ownship's navigation states of itself."""
     navigation = context.sections.get("navigation")
     if navigation is None:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -355,22 +305,7 @@ class NavigationReport(_Navigation):
 def in_the_horizons_axes(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
-    """Add each detection's line of sight in NED, by what the ownship believes of its attitude.
-
-    Parameters
-    ----------
-    detections : Detections
-        With the ownship's believed pose; without one nothing is added.
-    targets : RelativeTargets
-    rows : (scans,) of int
-        As every report is given them.
-
-    Returns
-    -------
-    Detections
-        Its extras hold ``ned_azimuth_rad`` in [0, 2 pi) and ``ned_elevation_rad``. The rotation is
-        the exact one, also where the transform took the thesis's small angles.
-    """
+    """Add each detection's line of sight in NED, by what the ownship believes of its attitude."""
     own = detections.pose_columns()
     if not own:
         return detections
@@ -388,23 +323,7 @@ def in_the_horizons_axes(
 def with_navigation_noise(
     detections: Detections, position_m: Three, attitude_rad: Three
 ) -> Detections:
-    """Add to a report's variances those of the pose that its measurements are turned by.
-
-    Parameters
-    ----------
-    detections : Detections
-        With the ownship's believed pose; without one nothing is added.
-    position_m : three floats
-        Standard deviations of the ownship's position north, east and down.
-    attitude_rad : three floats
-        Of its yaw, pitch and roll.
-
-    Returns
-    -------
-    Detections
-        Variances of azimuth and elevation in body axes hold those of the three angles to first
-        order, and where a range is measured those of the place it is counted from.
-    """
+    """Add to a report's variances those of the pose that its measurements are turned by."""
     own = detections.pose_columns()
     if not own or not (any(position_m) or any(attitude_rad)) or not len(detections.target):
         return detections

@@ -143,16 +143,10 @@ MOST_WAITING = 32
 
 @dataclass(frozen=True)
 class Laid:
-    """A decision on the desk, and who is told when it was taken in.
-
-    Parameters
-    ----------
-    decision : OperatorDecision
-    taken : callable
-        Called with the simulated time, s, from the thread of the simulation.
-    """
+    """A decision on the desk, and who is told when it was taken in."""
 
     decision: OperatorDecision
+    # Called with the simulated time, s, from the thread of the simulation
     taken: Callable[[float], None]
 
 

@@ -18,18 +18,7 @@ from dsa_des.arrays.types import FloatArray
 
 
 def table_of_targets(roster: Roster, path: str) -> list[Any]:
-    """Return every target's own table over aspect.
-
-    Parameters
-    ----------
-    roster : Roster
-    path : {"eo.silhouette_table", "ir.silhouette_table"}
-
-    Raises
-    ------
-    ValueError
-        If a target has none.
-    """
+    """Return every target's own table over aspect."""
     tables, place = roster.tables(path)
     missing = np.flatnonzero(place < 0)
     if missing.size:
@@ -43,19 +32,7 @@ def table_of_targets(roster: Roster, path: str) -> list[Any]:
 
 
 def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: str) -> FloatArray:
-    """Look each cell's area up in what its target has: a table over aspect, or a mesh.
-
-    Parameters
-    ----------
-    cells : Cells
-    of_target : mapping
-        ``table`` or ``mesh``, one per target of the roster; equal ones may be shared.
-    model : {"aspect_table", "convex_hull"}
-
-    Returns
-    -------
-    (cells,) array, m²
-    """
+    """Look each cell's area up in what its target has: a table over aspect, or a mesh."""
     ((kind, measured),) = of_target.items()
     distinct = list({id(item): item for item in measured}.values())
     which = np.array([next(i for i, d in enumerate(distinct) if d is m) for m in measured])
@@ -85,18 +62,7 @@ MESH_ROWS = 64
 def sampled_table(
     front_m2: float, side_m2: float, horizontal_m2: float, back_m2: float | None = None
 ) -> SilhouetteTable:
-    """Return the silhouette of the union of the three bodies at every 5 degrees of aspect.
-
-    Parameters
-    ----------
-    front_m2, side_m2, horizontal_m2, back_m2
-        As for `components.optical.silhouette.visible_area`.
-
-    Returns
-    -------
-    SilhouetteTable
-        Bilinear between its nodes.
-    """
+    """Return the silhouette of the union of the three bodies at every 5 degrees of aspect."""
     azimuth_deg = np.arange(0.0, 360.0, STEP_DEG)
     elevation_deg = np.linspace(-90.0, 90.0, round(180.0 / STEP_DEG) + 1)
     azimuth, elevation = (grid.reshape(-1) for grid in np.meshgrid(azimuth_deg, elevation_deg))
@@ -119,18 +85,7 @@ def sampled_table(
 
 @lru_cache(maxsize=64)
 def body_mesh(front_m2: float, side_m2: float, horizontal_m2: float) -> TriangleMesh:
-    """Return a closed mesh of the capsule and the plate.
-
-    Parameters
-    ----------
-    front_m2, side_m2, horizontal_m2 : float
-        As for `components.optical.silhouette.visible_area`; none of them 0.
-
-    Raises
-    ------
-    ValueError
-        If an area is 0, and the body has no volume to mesh.
-    """
+    """Return a closed mesh of the capsule and the plate."""
     if min(front_m2, side_m2, horizontal_m2) <= 0.0:
         raise ValueError("an aircraft without front, side or horizontal area has no mesh")
     bodies = [_capsule(front_m2, side_m2), _plate(horizontal_m2)]
@@ -181,19 +136,7 @@ _BODIES = ("front_m2", "side_m2", "horizontal_m2")
 
 
 def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
-    """Check that every target has what a camera's silhouette needs.
-
-    Parameters
-    ----------
-    roster : Roster
-    band, silhouette
-        As for `area_of_cells`.
-
-    Raises
-    ------
-    ValueError
-        If a target lacks it.
-    """
+    """Check that every target has what a camera's silhouette needs."""
     if silhouette == "aspect_table":
         table_of_targets(roster, f"{band}.silhouette_table")
     elif silhouette == "mesh":
@@ -212,14 +155,7 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
 
 
 def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
-    """Say which targets a camera adds the bodies of, though they were fitted to show their union.
-
-    Parameters
-    ----------
-    roster : Roster
-    band, silhouette
-        As for `area_of_cells`.
-    """
+    """Say which targets show the bodies of a camera that their areas were fitted to as a union."""
     if silhouette not in ("exact", "thesis"):
         return []
     names = [
@@ -237,25 +173,7 @@ def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
 
 
 def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
-    """Return each cell's area.
-
-    Parameters
-    ----------
-    cells : Cells
-    band : {"eo", "ir"}
-        Whose areas of the aircraft; ``ir`` has a back of its own.
-    silhouette : str
-        A model of `components.optical.silhouette.visible_area`, ``sampled_table`` or ``mesh``.
-
-    Returns
-    -------
-    (cells,) array, m²
-
-    Raises
-    ------
-    ValueError
-        If a target lacks what the silhouette needs, whether in sight or not.
-    """
+    """Return each cell's area."""
     if silhouette == "aspect_table":
         tables = table_of_targets(cells.roster, f"{band}.silhouette_table")
         return area_by_table(cells, {"table": tables}, "aspect_table")

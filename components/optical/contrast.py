@@ -45,38 +45,6 @@ def contrast_gain(
     Either is multiplied by Koschmieder's exp(-3.912 range / visibility) if a visibility is given.
     P is not limited to 1: a sunlit aircraft may be several times brighter than the forest behind
     it.
-
-    Parameters
-    ----------
-    model : {"constant", "daylight"}
-    contrast : array_like
-        P of the thesis; under ``daylight`` a calibration factor.
-    azimuth_rad, elevation_rad : array_like, rad
-        Line of sight from us to the target, in the horizon's frame (north-east-down).
-    range_m : array_like, m
-        Slant range, for the visibility.
-    visibility_m : array_like, m, optional
-        Meteorological visibility (2 % contrast). None: the air is perfectly clear.
-    sun_azimuth_rad, sun_elevation_rad : array_like, rad
-        Direction of the sun, same frame; the sun must be up.
-    sun_exclusion_rad : array_like, rad
-        Half angle of the cone round the sun in which the camera sees nothing; 0 for none.
-    paint_reflectance, ground_reflectance : array_like
-        Diffuse reflectances, paint in [0, 1], ground in (0, 1]. The defaults 0.5 (grey) and 0.2
-        (grass, forest) are assumptions.
-    sky : {"clear", "partly_cloudy", "overcast"}
-    background : {"sky", "ground", "auto"}
-        What lies behind the target; ``auto`` is sky from elevation 0 up, ground below.
-
-    Returns
-    -------
-    array of the broadcast shape
-        P, 0 or more.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite, or a name is unknown.
     """
     if model not in ("constant", "daylight"):
         raise ValueError(f"model is {model!r}: it must be 'constant' or 'daylight'")
@@ -117,22 +85,6 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
 
     exp(-3.912 range / visibility), Koschmieder's law. Exact for a target against the horizon sky
     in even haze; used for every background here.
-
-    Parameters
-    ----------
-    range_m : array_like, m
-        0 or more.
-    visibility_m : array_like, m
-        Above 0: range at which 2 % of the contrast is left.
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If the range is negative, the visibility not above 0, or either not finite.
     """
     shape, (distance, visibility) = broadcast_flat(
         range_m=not_negative("range_m", range_m),

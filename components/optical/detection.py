@@ -40,25 +40,6 @@ FAINTEST_DEVIATIONS = -_NORMAL.inv_cdf(FAINTEST_PD)
 def noise_equivalent_pixels(blur_pixels: float) -> float:
     """Return over how many pixels the picture of a point is spread, to a filter that fits it.
 
-    Parameters
-    ----------
-    blur_pixels : float
-        Standard deviation of the blur, above 0.
-
-    Returns
-    -------
-    float
-        4 pi s², with s² the variance of the picture: that of the blur and of a pixel, 1/12. The
-        noise of the signal that a matched filter finds is that of a pixel times its root, and a
-        picture has one independent place for each such area.
-
-    Raises
-    ------
-    ValueError
-        If the blur is not above 0.
-
-    Notes
-    -----
     The inverse of the sum of the squared shares of its pixels, for a Gaussian spot; King, Accuracy
     of measurement of star images on a pixel array, Publications of the Astronomical Society of the
     Pacific 95, 1983.
@@ -68,28 +49,7 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
 
 
 def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: ArrayLike) -> Any:
-    """Return the probability that a sample of a signature with noise reaches the threshold.
-
-    Parameters
-    ----------
-    signature : array_like
-        Without noise.
-    threshold : array_like
-    noise : array_like
-        Standard deviation of the noise, 0 or more, in the unit of both.
-
-    Returns
-    -------
-    array of the broadcast shape
-        Q((threshold - signature) / noise), with its full relative precision in the tail, and 0
-        where that is below `FAINTEST_PD`. Without noise 1 where the signature reaches the
-        threshold, else 0 (eq. 19).
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, or the noise is negative.
-    """
+    """Return the probability that a sample of a signature with noise reaches the threshold."""
     from scipy.special import ndtr
 
     shape, (level, needed, deviation) = broadcast_flat(
@@ -104,13 +64,7 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
 
 
 def deviations_exceeded(probability: float) -> float:
-    """Return how many standard deviations Gaussian noise exceeds with some probability.
-
-    Parameters
-    ----------
-    probability : float
-        In (0, 1).
-    """
+    """Return how many standard deviations Gaussian noise exceeds with some probability."""
     return -_NORMAL.inv_cdf(probability)
 
 
@@ -130,26 +84,6 @@ def false_alarm_direction(
 ) -> tuple[Any, Any]:
     """Return where in the picture false alarms appear: every pixel is as likely.
 
-    Parameters
-    ----------
-    azimuth_uniform, elevation_uniform : array_like
-        In [0, 1), one of each per false alarm.
-    azimuth_start_rad, azimuth_width_rad : float, rad
-        The field of view runs clockwise from the start over the width, (0, 2π].
-    lowest_elevation_rad, highest_elevation_rad : float, rad
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad : arrays of the broadcast shape
-        Not yet rounded to the pixel grid; azimuth not wrapped.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-
-    Notes
-    -----
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """
     width = finite("azimuth_width_rad", azimuth_width_rad)
@@ -171,27 +105,7 @@ def false_alarm_direction(
 
 
 def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float) -> Any:
-    """Return the signature that false alarms have: noise, given that it reaches the threshold.
-
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per false alarm.
-    threshold : float
-        The signature that is detected (eq. 19); noise below 0 is no signature, whatever it is.
-    noise : float
-        Standard deviation of the noise, above 0.
-
-    Returns
-    -------
-    array of the shape of `uniform`
-        In the unit of the threshold, never below it, nor below 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-    """
+    """Return the signature that false alarms have: noise, given that it reaches the threshold."""
     draws = _unit("uniform", uniform)
     level = max(float(finite("threshold", threshold)), 0.0)
     deviation = float(positive("noise", noise))
@@ -246,15 +160,6 @@ class AddedFalseAlarms:
     signature as a target's do; where targets are seen without noise, it has the contrast of one of
     them. Detections of a frame stand by what was measured of them. With ``marked_false_alarms`` a
     false alarm comes last, with a confidence of 0 and no pixels.
-
-    Parameters
-    ----------
-    block : Camera
-
-    Raises
-    ------
-    ValueError
-        If more than 1e5 are expected in a frame.
     """
 
     def __init__(self, block: Any) -> None:

@@ -29,27 +29,6 @@ def centroid_variance(
 ) -> FloatArray:
     """Return the variance of a target's centre along one axis of the picture.
 
-    Parameters
-    ----------
-    pixels : (n,) array
-        Pixels that the target covers, 0 or more; less than 1 is a target smaller than a pixel.
-    contrast_to_noise : (n,) array
-        Signal of a pixel that it fills over the noise of a pixel, 0 or more.
-    blur_pixels : float
-        Standard deviation of the blur of optics and motion, above 0.
-
-    Returns
-    -------
-    (n,) array, pixels²
-        At most that of a centre that may be anywhere on the target: (pixels + 1) / 12.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
     sigma² = 8 pi s⁴ / N², where N is the target's whole signal over the noise of a pixel and s²
     the variance of its picture: that of the blur, of a square of as many pixels, and of a pixel,
     1/12. Thompson, Larson & Webb, Precise nanometer localization analysis for individual
@@ -116,46 +95,20 @@ class CameraCalibration(Parameters):
 
 @dataclass(frozen=True)
 class CameraDetector:
-    """What a camera detects with.
+    """What a camera detects with."""
 
-    Parameters
-    ----------
-    threshold : float
-        Sample of a signature that is a detection.
-    noise : float
-        Standard deviation of the samples; 0 for a camera that sees signatures as they are.
-    alarm_noise : float
-        That of the samples that make false alarms; the same, where it is known.
-    places : int
-        Independent samples of noise in a frame.
-    false_alarms : float
-        Expected in a frame.
-    """
-
-    threshold: float
+    threshold: float  # Sample of a signature that is a detection
+    # Standard deviation of the samples; 0 for a camera that sees signatures as they are
     noise: float
-    alarm_noise: float
-    places: int
-    false_alarms: float
+    alarm_noise: float  # That of the samples that make false alarms; the same, where it is known
+    places: int  # Independent samples of noise in a frame
+    false_alarms: float  # Expected in a frame
 
 
 def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
     """Return a camera's detector: what the scene leaves open follows from what it states.
 
     Any two of threshold, noise, false alarms and a known range give the others.
-
-    Parameters
-    ----------
-    camera : Camera
-    places : int
-        Independent samples in a frame.
-    noise_of_contrast : float
-        Noise of a signature, for a pixel whose noise is as much as a contrast of 1.
-
-    Raises
-    ------
-    ValueError
-        If what is stated contradicts itself.
     """
     p = camera.p
     threshold, alarms, known = p.threshold, p.false_alarms_per_frame, p.calibrate
@@ -248,18 +201,7 @@ class _OneLook:
 
 
 def known_signature(camera: Any, known: CameraCalibration) -> float:
-    """Return the signature of the target whose probability of detection is known.
-
-    Parameters
-    ----------
-    camera : Camera
-    known : CameraCalibration
-
-    Raises
-    ------
-    ValueError
-        If there is none, or the visibility is not that of the camera's band.
-    """
+    """Return the signature of the target whose probability of detection is known."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
         area_m2 = known.area_m2 or 0.0
@@ -297,14 +239,6 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     Infinite where that is not so: where noise alone reaches the threshold more often than that,
     with a rate of the line of sight in the signature, with areas from a table, with effects that
     can add to area or contrast, or with targets that the camera was not told of.
-
-    Parameters
-    ----------
-    camera : Camera
-        After its effects were built.
-    areas, contrast : str
-        The roster's columns, ``"eo"`` or ``"ir"``, ``"contrast"`` or ``"contrast_ir"``; empty for
-        a camera that shows other areas.
     """
     rosters = known_targets(camera.context)
     adding = [

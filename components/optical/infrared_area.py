@@ -37,26 +37,6 @@ def plume_area(
     from us to it: 0 head-on, where the airframe hides the plume, half abeam, all of it from
     astern. The law and the shares are assumptions (the thesis gives the order of the engines and
     folds the plume into the areas of Tables 3.2 and 4.6).
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
-        As in `components.optical.silhouette.visible_area`.
-    back_m2 : array_like, m²
-        Back sphere.
-    engine : {"propeller", "turbofan", "turbojet"}
-        Selects the share; see `PLUME_SHARE_OF_BACK`.
-    plume_share_of_back : array_like, optional
-        Used instead of the engine's own share.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-
-    Raises
-    ------
-    ValueError
-        If the engine is unknown, or an argument is negative or not finite.
     """
     if engine not in PLUME_SHARE_OF_BACK:
         raise ValueError(
@@ -95,30 +75,6 @@ def infrared_area(
     The silhouette with separate front and back, plus the plume if an engine is named. Without an
     engine this is the thesis's model, whose tables already hold the doubled back (errata 23c):
     naming an engine adds to it, so pair it with a back that is not doubled.
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
-        As in `components.optical.silhouette.visible_area`.
-    front_m2, back_m2, side_m2, horizontal_m2 : array_like, m²
-        Table 3.2 (first) or Table 4.6 (refined), in `configs/aircraft/`.
-    engine : {"propeller", "turbofan", "turbojet"}, optional
-        Adds `plume_area`.
-    plume_share_of_back : array_like, optional
-        Used instead of the engine's own share.
-    model : {"exact", "thesis", "convex_hull"}
-        Rung of the silhouette.
-    validate : bool
-        False skips the silhouette's checks, see `visible_area`.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-
-    Raises
-    ------
-    ValueError
-        As `visible_area` and `plume_area`, or if a share is given without an engine.
     """
     area = visible_area(
         relative_heading_rad,

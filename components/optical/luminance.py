@@ -30,24 +30,16 @@ _SMALLEST_SINE = 1e-3
 
 @dataclass(frozen=True)
 class Sky:
-    """Hold one sky condition: how much light it passes, and how it spreads it.
+    """Hold one sky condition: how much light it passes, and how it spreads it."""
 
-    Parameters
-    ----------
-    beam_extinction : float or None
-        c of exp(-c · air mass) for the sun's beam; None when clouds hide the sun.
-    diffuse_lux : (float, float, float)
-        A, B, C of the horizontal illuminance A + B sin(sun elevation)^C.
-    gradation : (float, float)
-        a, b of the CIE gradation 1 + a exp(b / cos Z), Z the zenith angle.
-    indicatrix : (float, float, float)
-        c, d, e of the CIE indicatrix 1 + c (exp(d χ) - exp(d pi/2)) + e cos² χ, χ the angle
-        from the sun.
-    """
-
+    # c of exp(-c · air mass) for the sun's beam; None when clouds hide the sun
     beam_extinction: float | None
+    # (float, float, float): A, B, C of the horizontal illuminance A + B sin(sun elevation)^C
     diffuse_lux: tuple[float, float, float]
+    # (float, float): a, b of the CIE gradation 1 + a exp(b / cos Z), Z the zenith angle
     gradation: tuple[float, float]
+    # (float, float, float): c, d, e of the CIE indicatrix 1 + c (exp(d χ) - exp(d pi/2)) + e
+    # cos² χ, χ the angle from the sun
     indicatrix: tuple[float, float, float]
 
 
@@ -62,26 +54,14 @@ SKIES = {
 
 
 def find_sky(name: str) -> Sky:
-    """Give the sky condition of that name.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Give the sky condition of that name."""
     if name not in SKIES:
         raise ValueError(f"sky is {name!r}: it must be one of {', '.join(SKIES)}")
     return SKIES[name]
 
 
 def daylight_sun(sun_elevation_rad: ArrayLike) -> FloatArray:
-    """Check that the sun is up: the models here are for daylight.
-
-    Raises
-    ------
-    ValueError
-        If the sun's elevation is not above 0 and up to pi/2.
-    """
+    """Check that the sun is up: the models here are for daylight."""
     sun = angle("sun_elevation_rad", sun_elevation_rad)
     up = (sun > 0.0) & (sun <= 0.5 * np.pi + 1e-12)
     refuse("sun_elevation_rad", sun, ~up, "be above 0 and at most pi/2 (daylight models)")
@@ -93,23 +73,6 @@ def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
 
     127,500 lux · exp(-c / sin(elevation)); 0 under an overcast sky.
 
-    Parameters
-    ----------
-    sun_elevation_rad : array_like, rad
-        Above 0, at most pi/2.
-    sky : {"clear", "partly_cloudy", "overcast"}
-
-    Returns
-    -------
-    array of the same shape, lux
-
-    Raises
-    ------
-    ValueError
-        If the sun is not up or the sky is unknown.
-
-    Notes
-    -----
     IES RP-21 (1984), sea level.
     """
     extinction = find_sky(sky).beam_extinction
@@ -123,23 +86,6 @@ def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
 def sky_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
     """Give the illuminance of the whole sky on the level ground, without the sun's beam.
 
-    Parameters
-    ----------
-    sun_elevation_rad : array_like, rad
-        Above 0, at most pi/2.
-    sky : {"clear", "partly_cloudy", "overcast"}
-
-    Returns
-    -------
-    array of the same shape, lux
-
-    Raises
-    ------
-    ValueError
-        If the sun is not up or the sky is unknown.
-
-    Notes
-    -----
     IES RP-21 (1984): A + B sin(elevation)^C.
     """
     base, rise, exponent = find_sky(sky).diffuse_lux
@@ -161,25 +107,6 @@ def sky_luminance(
     The CIE standard general sky, scaled so that the whole sky gives `sky_illuminance`. The sun's
     disc itself is not part of it. Directions below the horizon get the horizon's luminance.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like, rad
-        Direction looked at.
-    sun_azimuth_rad, sun_elevation_rad : array_like, rad
-        Direction of the sun in the same frame.
-    sky : {"clear", "partly_cloudy", "overcast"}
-
-    Returns
-    -------
-    array of the broadcast shape, cd/m²
-
-    Raises
-    ------
-    ValueError
-        If an angle is not finite, the sun is not up or the sky is unknown.
-
-    Notes
-    -----
     CIE S 011/E:2003 = ISO 15469:2004. The scale is a table over the sun's elevation (1 degree,
     linear): worst error measured 4e-5.
     """
@@ -235,25 +162,7 @@ BACKGROUNDS = ("sky", "ground", "auto")
 
 
 def inherent_contrast(target_cd_m2: ArrayLike, background_cd_m2: ArrayLike) -> Any:
-    """Give the contrast at the target, |Lt - Lb| / Lb.
-
-    Parameters
-    ----------
-    target_cd_m2 : array_like, cd/m²
-        0 or more.
-    background_cd_m2 : array_like, cd/m²
-        Above 0.
-
-    Returns
-    -------
-    array of the broadcast shape
-        At most 1 for a target darker than its background, unlimited for a brighter one.
-
-    Raises
-    ------
-    ValueError
-        If a luminance is out of range or not finite.
-    """
+    """Give the contrast at the target, |Lt - Lb| / Lb."""
     target = not_negative("target_cd_m2", target_cd_m2)
     behind = positive("background_cd_m2", background_cd_m2)
     return np.abs(target - behind) / behind
@@ -280,29 +189,6 @@ def target_luminance(
     the second term being the light of an even sky from above and of the ground from below. No
     gloss, no glint, no own lights.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like, rad
-        Line of sight from us to the target.
-    sun_azimuth_rad, sun_elevation_rad : array_like, rad
-        Direction of the sun in the same frame.
-    paint_reflectance : array_like
-        In [0, 1].
-    ground_reflectance : array_like
-        In (0, 1].
-    sky : {"clear", "partly_cloudy", "overcast"}
-
-    Returns
-    -------
-    array of the broadcast shape, cd/m²
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite, or the sky is unknown.
-
-    Notes
-    -----
     Phase function of the Lambert sphere (classical, Lambert 1760), with the phase angle pi - χ.
     """
     paint = finite("paint_reflectance", paint_reflectance)
@@ -333,30 +219,7 @@ def background_luminance(
     sky: str = "clear",
     background: str = "auto",
 ) -> Any:
-    """Give the luminance of what lies behind the target, the sky or matt ground.
-
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like, rad
-        Line of sight from us to the target.
-    sun_azimuth_rad, sun_elevation_rad : array_like, rad
-        Direction of the sun in the same frame.
-    ground_reflectance : array_like
-        In (0, 1].
-    sky : {"clear", "partly_cloudy", "overcast"}
-    background : {"sky", "ground", "auto"}
-        ``auto``: sky from elevation 0 up, ground below it.
-
-    Returns
-    -------
-    array of the broadcast shape, cd/m²
-        Above 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite, or a name is unknown.
-    """
+    """Give the luminance of what lies behind the target, the sky or matt ground."""
     if background not in BACKGROUNDS:
         raise ValueError(
             f"background is {background!r}: it must be one of {', '.join(BACKGROUNDS)}"

@@ -42,32 +42,6 @@ def line_of_sight_rate(
     A target without a previous look has no rate: 0. The caller keeps the previous angles per
     target and drops them when the target leaves the field of view, so that it starts anew.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like, rad
-        Direction now. In a frame that does not turn (north-east-down) the rate is the target's
-        own; in body axes, as in the thesis, the ownship's turning is in it.
-    previous_azimuth_rad, previous_elevation_rad : array_like, rad
-        Direction at the previous look, same frame; anything, NaN included, where not seen before.
-    interval_s : array_like, s
-        Time since that look: after k missed frames it is k + 1 frame times. Anything where not
-        seen before.
-    seen_before : array_like of bool
-        Whether there was a previous look.
-    model : {"exact", "thesis"}
-
-    Returns
-    -------
-    array of the broadcast shape, rad/s
-
-    Raises
-    ------
-    ValueError
-        If the model is unknown, an angle that counts is not finite, or an interval that counts is
-        not above 0.
-
-    Notes
-    -----
     Thesis eq. 16-17, errata 11.
     """
     if model not in ("exact", "thesis"):
@@ -126,28 +100,6 @@ def pixels_covered(
 
     Q = area / (R² · pixel azimuth · pixel elevation), capped at the sensor's own pixel count
     (errata 10). At range 0 a target of any area fills the sensor.
-
-    Parameters
-    ----------
-    area_m2 : array_like, m²
-        Visible area.
-    range_m : array_like, m
-        Slant range, 0 or more.
-    pixel_azimuth_rad, pixel_elevation_rad : array_like, rad
-        Angular size of one pixel: field of view / number of pixels.
-    sensor_pixels : array_like
-        Pixels of the whole sensor (azimuth count times elevation count).
-
-    Returns
-    -------
-    array of the broadcast shape
-        Pixels, not rounded to whole ones.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, an area or range is negative, or a pixel size or count is
-        not above 0.
     """
     shape, (area, distance, across, upward, most) = broadcast_flat(
         area_m2=not_negative("area_m2", area_m2),
@@ -217,21 +169,6 @@ def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
     """Give the margin of the signature over the threshold, C = E - threshold (thesis eq. 19).
 
     The target is detected when C >= 0 (errata 10). C is in the units of E: weighted pixels.
-
-    Parameters
-    ----------
-    signature : array_like
-        E of `total_signature`.
-    threshold : array_like
-
-    Returns
-    -------
-    array of the broadcast shape
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite.
     """
     return finite("signature", signature) - finite("threshold", threshold)
 
@@ -253,28 +190,6 @@ def detection_range(
     the speed alone reaches the threshold. With `sensor_pixels`, 0 where not even an image that
     fills the sensor is enough.
 
-    Parameters
-    ----------
-    area_m2 : array_like, m²
-    pixel_azimuth_rad, pixel_elevation_rad : array_like, rad
-    contrast_gain, static_weight, threshold : array_like
-        P, a and the threshold of eq. 18-19, each 0 or more.
-    dynamic_signature : array_like
-        b · V.
-    sensor_pixels : array_like, optional
-        Pixels of the whole sensor.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative or not finite, or a pixel has no size.
-
-    Notes
-    -----
     Thesis eq. 14, 15, 18 and 19 solved for R; errata 10 and 23.
     """
     pixels = np.float64(1.0) if sensor_pixels is None else positive("sensor_pixels", sensor_pixels)

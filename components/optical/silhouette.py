@@ -84,16 +84,6 @@ def front_and_back_area(
     (back - front)·(cos/2 + 1/2) + front: the back alone when the target flies away (cos = 1), the
     front alone when it comes head on (cos = -1). Written as a mean of the two so that it never
     leaves the interval between them by rounding.
-
-    Parameters
-    ----------
-    cos_off_nose : flat array
-        Cosine of the angle between the target's nose and the line of sight from us to it.
-    front_m2, back_m2 : flat arrays, m²
-
-    Returns
-    -------
-    flat array, m²
     """
     share_of_back = np.clip(0.5 * cos_off_nose + 0.5, 0.0, 1.0)
     return back_m2 * share_of_back + front_m2 * (1.0 - share_of_back)
@@ -113,15 +103,6 @@ def exact_area(
 
     front + side·|x_body × u| + horizontal·|u_z|, with u the line of sight in the target's body
     axes. With `back_m2` the sphere becomes the mix of eq. 20-21 with cos g = x_body·u.
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : flat arrays, rad
-    front_m2, side_m2, horizontal_m2, back_m2 : flat arrays, m²
-
-    Returns
-    -------
-    flat array, m²
     """
     u_x, _, u_z, sin_off_nose = line_of_sight_in_target_axes(
         relative_heading_rad, pitch_rad, roll_rad, elevation_rad
@@ -162,19 +143,6 @@ def union_area(
     With `back_m2` the radius follows eq. 21's mix for the direction looked along, the side area
     staying what it is. A front of 0 leaves no thickness to hide anything: the areas then add.
 
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : flat arrays, rad
-    front_m2, side_m2, horizontal_m2, back_m2 : flat arrays, m²
-    plate_aspect_ratio : float
-        Span over chord of the plate.
-
-    Returns
-    -------
-    flat array, m²
-
-    Notes
-    -----
     Shadows along u on the body's x-y plane are an affine picture of the silhouette, with area
     factor |u_z|. There the plate is itself, and the capsule is an ellipse swept along x. For a
     strip at y = y_max·t the capsule covers x from -R(-t) to R(t), the plate from -chord/2 to
@@ -275,15 +243,6 @@ def thesis_area(
     printed (eq. 13 put into eq. 12), and roll shares an axis with elevation only abeam: for
     attitudes other than level the exact model is the one to use. Magnitudes are taken, so the
     area is never negative.
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : flat arrays, rad
-    front_m2, side_m2, horizontal_m2, back_m2 : flat arrays, m²
-
-    Returns
-    -------
-    flat array, m²
     """
     theta_rad = elevation_rad - pitch_rad
     phi_rad = elevation_rad - roll_rad
@@ -334,44 +293,6 @@ def visible_area(
       `components.optical.mesh` for how and how exactly).
     - ``aspect_table``: `table` interpolated at the observer's direction seen from the target.
 
-    Parameters
-    ----------
-    relative_heading_rad : array_like, rad
-        The target's heading minus the bearing of the line of sight from us to it: 0 when it flies
-        away from us, pi when it comes towards us, pi/2 when it crosses to the right.
-    pitch_rad, roll_rad : array_like, rad
-        The target's own attitude (yaw-pitch-roll, ZYX): pitch is positive nose up, roll positive
-        right wing down.
-    elevation_rad : array_like, rad
-        Elevation of the line of sight from us to the target, positive when it is above us.
-    front_m2, side_m2, horizontal_m2 : array_like, m²
-        Front sphere, side of the cylinder, horizontal planes (Table 3.1). Needed by every model
-        but `aspect_table` and `convex_hull` with a mesh, which ignore them.
-    back_m2 : array_like, m², optional
-        Back sphere, for infrared (Table 3.2); equal to the front if not given.
-    model : {"exact", "thesis", "aspect_table", "convex_hull"}
-        Which rung.
-    table : SilhouetteTable, optional
-        For ``aspect_table``.
-    mesh : TriangleMesh, optional
-        For ``convex_hull``.
-    validate : bool
-        False skips the checks, for a caller that has flat contiguous arrays of one shape and knows
-        the areas to be there.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-        Never negative.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, an area is negative, the model is unknown, or the model lacks
-        its areas or its table.
-
-    Notes
-    -----
     Thesis eq. 9-13 and 20-21; errata 4, 8, 9 and 12.
     """
     if not validate and model in _PARAMETRIC and mesh is None:

@@ -40,31 +40,15 @@ def refuse_many_nodes(name: str, rows: int, columns: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class ElevationRaster:
-    """Heights at nodes, between which they are bilinear.
+    """Heights at nodes, between which they are bilinear."""
 
-    Parameters
-    ----------
-    south_deg, west_deg : float
-        Latitude of the first row, longitude of the first column.
-    lat_step_deg, lon_step_deg : float
-        Above 0.
-    height_m : (rows, columns)
-        Rows from south to north, columns from west to east; finite.
-    name : str
-        The file, for messages.
-
-    Raises
-    ------
-    ValueError
-        If there are holes, or the grid is none.
-    """
-
-    south_deg: float
+    south_deg: float  # Latitude of the first row, longitude of the first column
     west_deg: float
-    lat_step_deg: float
+    lat_step_deg: float  # Above 0
     lon_step_deg: float
+    # (rows, columns): rows from south to north, columns from west to east; finite
     height_m: npt.NDArray[np.floating[Any]]
-    name: str = "raster"
+    name: str = "raster"  # The file, for messages
 
     def __post_init__(self) -> None:
         rows, columns = self.height_m.shape
@@ -138,18 +122,7 @@ class ElevationRaster:
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return the heights of the ground (m) at some places, and which lie on the raster.
-
-        Parameters
-        ----------
-        lat_deg, lon_deg : arrays of one shape
-
-        Returns
-        -------
-        height_m : array
-            Bilinear between nodes; -inf beside the raster, where no ground is known.
-        inside : array of bool
-        """
+        """Return the heights of the ground (m) at some places, and which lie on the raster."""
         rows, columns = self.height_m.shape
         v, u = self.place(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
@@ -242,16 +215,9 @@ _PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
 
 @dataclass(frozen=True)
 class RasterOfFile:
-    """A raster that was read while the scene was checked; equal where the same file was read once.
+    """A raster read while the scene was checked; equal where the same file was read once."""
 
-    Parameters
-    ----------
-    paths : tuple of Path
-        Of one file, or of several that lie side by side.
-    raster : ElevationRaster
-    """
-
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  # Of one file, or of several that lie side by side
     raster: ElevationRaster
 
 

@@ -119,28 +119,16 @@ def earth_centred(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays from some places to others.
+    """Rays from some places to others."""
 
-    Parameters
-    ----------
-    start, step : three (n,) arrays, m
-        Where they start, Earth-centred, and from there to where they end.
-    length_m : (n,)
-        Of the chord.
-    start_alt_m, end_alt_m : (n,)
-    sag_m : (n,)
-        How far the ray's middle lies below the mean of its ends' heights.
-    arch_m : (n,)
-        How far the air lifts its middle above the chord's.
-    """
-
+    # three (n,) arrays, m: Where they start, Earth-centred, and from there to where they end
     start: Vector
     step: Vector
-    length_m: FloatArray
-    start_alt_m: FloatArray
+    length_m: FloatArray  # (n,): of the chord
+    start_alt_m: FloatArray  # (n,)
     end_alt_m: FloatArray
-    sag_m: FloatArray
-    arch_m: FloatArray
+    sag_m: FloatArray  # (n,): how far the ray's middle lies below the mean of its ends' heights
+    arch_m: FloatArray  # (n,): how far the air lifts its middle above the chord's
 
     def places(self, share: FloatArray, rays: Any = slice(None)) -> Vector:
         """Return latitude (rad), longitude (deg) and height (m) at shares of some rays' lengths."""
