@@ -155,7 +155,7 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
 
 
 def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
-    """Say which targets show the bodies of a camera that their areas were fitted to as a union."""
+    """Warn of targets whose areas were fitted as a union and that are shown as single bodies."""
     if silhouette not in ("exact", "thesis"):
         return []
     names = [
