@@ -213,8 +213,8 @@ class Stochastic(Component):
             self._minds[run] = mind
             if acts:
                 acting.append((place, mind))
-        told = self._told_at(alerts, acting)
-        return Manoeuvres.at_rows(wake.ticks, told)
+        manoeuvres = self._manoeuvres_at(alerts, acting)
+        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
 
     def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
         """Take in the highest level of an instant; return also whether the operator acts at it."""
@@ -250,7 +250,7 @@ class Stochastic(Component):
             draws = np.array([self._draw(mind, self._response, k) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
-    def _told_at(
+    def _manoeuvres_at(
         self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
     ) -> dict[int, Manoeuvre]:
         """Return what operators who act at some rows of the alerts steer, by row."""
