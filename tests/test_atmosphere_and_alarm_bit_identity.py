@@ -22,9 +22,9 @@ from components.atmosphere.visibility import (
 )
 from components.navigation.errors import attitude_with_error, position_with_error
 from components.optical.detection import detection_probability, false_alarm_direction
-from components.radar.beam_sweep import illumination_offset_s
-from components.radar.clutter import clutter_detection_probability
-from components.radar.false_alarms import (
+from components.radar.beam import illumination_offset_s
+from components.radar.detection.clutter import clutter_detection_probability
+from components.radar.detection.output import (
     false_alarm_count,
     false_alarm_snr,
 )

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.resolution import Grid, round_to_grid
+from components.sensor.grid import Grid, round_to_grid
 
 STEPS = st.sampled_from([0.0, math.radians(1.0), 6.25e-4, 76.2, 0.1, 1e-9])
 VALUES = st.lists(

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.resolution import round_to_grid
+from components.sensor.grid import round_to_grid
 
 sizes = st.floats(-1e9, 1e9)
 steps = st.floats(1e-6, 1e6)

@@ -1,18 +1,82 @@
-"""An aircraft as sensors see it: radar cross-section, silhouette areas, contrast."""
+"""The table files that an aircraft names, and their content."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from operator import attrgetter
-from typing import Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter
 
-from components.aircraft.table_files import RcsTableFile, SilhouetteTableFile
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Parameters
+from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.text.safe_text import shortened
 from dsa_des.time.randomness import target_keys
+
+#: A table of every degree in both angles is a hundredth of it.
+LARGEST_TABLE_BYTES = 64 * 1024 * 1024
+
+_PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
+
+
+@dataclass(frozen=True, eq=False)
+class TableFile:
+    """A table that was read while the scene was checked, so that a bad file stops no run half-way.
+
+    Parameters
+    ----------
+    path : Path
+    table : object
+        `components.aircraft.aspect_tables.RcsTable`, or `SilhouetteTable`.
+    """
+
+    path: Path
+    table: Any
+
+
+def _rcs(path: Path) -> Any:
+    from components.aircraft.aspect_tables import RcsTable
+
+    return RcsTable.from_csv(path)
+
+
+def _silhouette(path: Path) -> Any:
+    from components.aircraft.aspect_tables import read_aspect_table
+
+    return read_aspect_table(path)
+
+
+@lru_cache(maxsize=64)
+def _read(reader: Callable[[Path], Any], path: Path, changed_ns: int, size: int) -> TableFile:
+    # Aircraft that name the same file share one table, and are looked up in it together.
+    return TableFile(path, reader(path))
+
+
+def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
+    def validate(value: Any) -> TableFile:
+        if isinstance(value, TableFile):
+            return value
+        path = _PATH.validate_python(value)
+        name = shortened(str(path), 300)
+        try:
+            status = status_of(path, LARGEST_TABLE_BYTES)
+            return _read(reader, path, status.st_mtime_ns, status.st_size)
+        except InputFileError as error:
+            raise ValueError(f"must be a table that can be read: {name}: {error}") from None
+
+    return validate
+
+
+_AS_PATH = PlainSerializer(lambda file: str(file.path))
+
+#: A CSV file with the columns az_deg, el_deg and dbsm.
+RcsTableFile = Annotated[TableFile, PlainValidator(_validator(_rcs)), _AS_PATH]
+
+#: A CSV file with the columns az_deg, el_deg and an area.
+SilhouetteTableFile = Annotated[TableFile, PlainValidator(_validator(_silhouette)), _AS_PATH]
 
 
 class VisibleAreas(Parameters):
@@ -228,15 +292,6 @@ class ReplicaRoster(Roster):
 def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Roster | None:
     """Return the roster of all replicas, or None where they cannot have one.
 
-    Parameters
-    ----------
-    first : Roster
-        Of the first replica.
-    aircraft : sequence of (name, Aircraft)
-        Of all targets of the first replica, of the second, and so on.
-
-    Notes
-    -----
     Radar cross-sections may differ: how far a radar looks, and which physics it has, does not rest
     on how large they are. Whatever else differs may decide how far a sensor looks.
     """

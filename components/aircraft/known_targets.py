@@ -10,15 +10,9 @@ from dsa_des.block.component import Context
 class KnownTraffic:
     """What a traffic block offers: what its targets are, and where they can be.
 
-    Two offers are equal when their targets are and it was not asked where these can be.
-
-    Parameters
-    ----------
-    roster : Roster
-    envelope : callable or None
-        Gives, for a reach in m and the time in s that a look lasts, the
-        `components.traffic.envelope.TrafficEnvelope` of the run, once its length is known. None
-        where it depends on what will be sensed.
+    Two offers are equal when their targets are and it was not asked where these can be. `envelope`
+    gives, for a reach in m and the time in s that a look lasts, the run's
+    `components.flights.bounds.TrafficEnvelope`; None where it depends on what will be sensed.
     """
 
     def __init__(self, roster: Roster, envelope: Callable[[float, float], Any] | None) -> None:
@@ -48,20 +42,10 @@ class KnownTraffic:
 
 
 def known_targets(context: Context) -> tuple[Roster, ...]:
-    """Return the rosters that a block's producers offer it.
+    """Return the rosters that a block's producers offer it; none where targets may be anything.
 
     A traffic block offers its roster, alone or as `KnownTraffic`; the transform and the gate pass
     on what they were offered.
-
-    Parameters
-    ----------
-    context : Context
-        Of the block.
-
-    Returns
-    -------
-    tuple of Roster
-        Empty where it is not said what the targets are: they may then be anything.
     """
     offers = (
         offer.roster if isinstance(offer, KnownTraffic) else offer

@@ -20,8 +20,7 @@ from components.alert_configuration.conf_keys import (
     parse_value,
 )
 from components.alert_configuration.configuration import Alerter, Configuration, Level
-from components.traffic.text_rows import read_lines
-from components.traffic.traffic_file import MOST_OF_A_CELL, Problems, did_you_mean
+from components.formats.text_rows import MOST_OF_A_CELL, Problems, did_you_mean, read_lines
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.text.safe_text import shortened

@@ -6,7 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from components.alert_configuration.configuration import REGIONS
-from components.traffic.units import ANGLE_DEG, LENGTH_M, NO_UNIT, SPEED_MPS, TIME_S, clean_token
+from components.formats.text_rows import (
+    ANGLE_DEG,
+    LENGTH_M,
+    NO_UNIT,
+    SPEED_MPS,
+    TIME_S,
+    clean_token,
+)
 from dsa_des.errors import nearest
 from dsa_des.text.safe_text import shortened
 

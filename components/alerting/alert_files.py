@@ -13,8 +13,7 @@ from components.alerting.alert_figure import draw_alerts
 from components.alerting.alert_tables import alert_table, bands_table, without_memory
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
-from components.traffic.traffic_file import TrafficFileError
-from components.traffic.units import SPEED_MPS
+from components.formats.text_rows import SPEED_MPS, TrafficFileError
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file

@@ -8,13 +8,13 @@ import numpy as np
 from components.alert_configuration.configuration import Configuration
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
+from components.formats.text_rows import LENGTH_M, SPEED_MPS
 from components.guidance.bands import guidance_of_many
 from components.guidance.intervals import Band
 from components.guidance.kinds import KINDS
 from components.guidance.memory import GuidanceMemory
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
-from components.traffic.units import LENGTH_M, SPEED_MPS
 from components.well_clear.detection import some_bounds
 from components.well_clear.separation import separation
 from components.well_clear.tcas import TcasAdvisory

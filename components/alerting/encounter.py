@@ -8,10 +8,10 @@ import numpy as np
 
 from components.alert_configuration.configuration import Configuration, Deviations, largest, margins
 from components.alerting.levels import AlertPairs
+from components.formats.daa_file import EXTRA_HEADERS, read_daa_samples
+from components.formats.text_rows import Problems
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
-from components.traffic.daa_file import EXTRA_HEADERS, read_daa_samples
-from components.traffic.traffic_file import Problems
 from components.well_clear.detection import Bounds
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray

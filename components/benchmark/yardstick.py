@@ -17,8 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
-from components.radar.threshold import detection_threshold
+from components.geometry.ellipsoid import (
+    ECCENTRICITY_SQUARED,
+    FLATTENING,
+    SEMI_MAJOR_AXIS_M,
+)
+from components.radar.detection.threshold import detection_threshold
 from dsa_des.running.simulation import Simulation
 
 Position = tuple[float, float, float, float]

@@ -15,7 +15,7 @@ from components.messages.detections import Detections
 from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
 from components.messages.steering import Manoeuvres
 from components.metrics.true_states import TargetsInFrame
-from components.sensor.cut_off import END, START, in_scan
+from components.sensor.censored import END, START, in_scan
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.record.sinks import Observer

@@ -55,7 +55,7 @@ def risk(**options: Any) -> None:
 
     TABLE is a .csv or .parquet file, or the folder of a study.
     """
-    from components.encounters.risk_table import show_risk
+    from components.encounters.encounter_tables import show_risk
 
     show_risk(**options)
 
@@ -92,7 +92,7 @@ def risk(**options: Any) -> None:
 @plain_errors
 def sample(**options: Any) -> None:
     """Tracks of one aircraft each, sampled from an encounter model."""
-    from components.encounters.sample_command import sample_tracks
+    from components.encounters.model_commands import sample_tracks
 
     sample_tracks(**options)
 
@@ -138,7 +138,7 @@ def sample(**options: Any) -> None:
 @plain_errors
 def generate(**options: Any) -> None:
     """Make a set of weighted encounters from encounter models, or of some made by hand."""
-    from components.encounters.generate_command import generate_set
+    from components.encounters.model_commands import generate_set
 
     generate_set(**options)
 
@@ -160,7 +160,7 @@ def convert(**options: Any) -> None:
     FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat), one
     encounter each; files of one aircraft are taken two by two, the ownship's first.
     """
-    from components.encounters.convert_command import convert_sets
+    from components.encounters.set_commands import convert_sets
 
     convert_sets(**options)
 
@@ -182,7 +182,7 @@ def show(**options: Any) -> None:
 
     FILE is a set, or whatever `convert` reads.
     """
-    from components.encounters.show_command import show_set
+    from components.encounters.set_commands import show_set
 
     show_set(**options)
 
@@ -215,6 +215,6 @@ def show(**options: Any) -> None:
 @plain_errors
 def split(**options: Any) -> None:
     """Make a set in which encounters that matter stand more often, with weights that undo it."""
-    from components.encounters.split_command import split_encounters
+    from components.encounters.set_commands import split_encounters
 
     split_encounters(**options)

@@ -5,7 +5,7 @@ function of its number: the same in every scene and condition.
 """
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -15,23 +15,110 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from components.encounters.encounter_flights import (
-    MOST_FLOWN,
-    encounter_flights,
-    prepare_flights,
-)
-from components.encounters.encounter_set import EncounterSet
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
-from components.encounters.pair_sets import set_of_pairs
-from components.encounters.pairing import PairSampler
-from components.encounters.set_file import read_set
-from components.geometry import line_of_sight
+from components.encounters.pairing import PairSampler, set_of_pairs
+from components.flights.sampled_flight import CELLS_AT_ONCE, SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
+from components.formats.set_file import read_set
+from components.formats.text_rows import TrafficFile
+from components.geometry.ellipsoid import enu_to_geodetic, line_of_sight
 from components.traffic.files import FileParameters, RecordedTraffic
-from components.traffic.legs import ScriptedTrajectory
 from components.traffic.scripted import Ownship, flight_arguments
-from components.traffic.traffic_file import TrafficFile
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
+
+#: An encounter: its set, and its place there.
+Encounter = tuple[EncounterSet, int]
+#: Time (s), north, east and altitude (m) of aircraft that are known at the same times.
+_Paths = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+#: Flights that were flown last, with their sets.
+_FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = OrderedDict()
+#: So many encounters' flights are kept: a study asks for each of a chunk several times.
+MOST_FLOWN = 600
+
+
+def encounter_flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:
+    """Return the flights of an encounter, by its place in the set, the ownship's first."""
+    key = _key(found, place, dynamics)
+    if key not in _FLOWN:
+        (flights,) = flights_of([(found, place)], dynamics)
+        _keep(key, found, flights)
+    return _FLOWN[key][1]
+
+
+def prepare_flights(wanted: Iterable[Encounter], dynamics: str) -> None:
+    """Make the flights of many encounters, which will be asked for one after the other."""
+    new = {_key(*one, dynamics): one for one in wanted}
+    new = {key: one for key, one in new.items() if key not in _FLOWN}
+    encounters = list(new.values())[:MOST_FLOWN]
+    try:
+        flights = flights_of(encounters, dynamics)
+    except ValueError:  # of one of them, which says so when it is asked for
+        return
+    for key, (found, _), one in zip(new, encounters, flights, strict=False):
+        _keep(key, found, one)
+
+
+def flights_of(encounters: Sequence[Encounter], dynamics: str) -> list[list[SampledTrajectory]]:
+    """Return the flights of each encounter, to the bit as if it were asked for alone."""
+    aircraft = [
+        (found, row)
+        for found, place in encounters
+        for row in range(found.first_rows[place], found.first_rows[place + 1])
+    ]
+    alike: dict[Any, list[int]] = {}
+    for number, (found, row) in enumerate(aircraft):
+        lasts = number if found.kind == TRACKS else found.seconds(row)
+        alike.setdefault((found.kind, lasts, found.reference_deg), []).append(number)
+    made: dict[int, SampledTrajectory] = {}
+    for numbers in alike.values():
+        for some in _in_parts(numbers, len(_paths([aircraft[numbers[0]]], dynamics)[0])):
+            flights = _flown_alike([aircraft[number] for number in some], dynamics)
+            made.update(zip(some, flights, strict=True))
+    each = iter(range(len(aircraft)))
+    return [
+        [made[next(each)] for _ in range(found.first_rows[place], found.first_rows[place + 1])]
+        for found, place in encounters
+    ]
+
+
+def _in_parts(numbers: list[int], samples: int) -> list[list[int]]:
+    width = max(1, CELLS_AT_ONCE // samples)
+    return [numbers[first : first + width] for first in range(0, len(numbers), width)]
+
+
+def _paths(aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str) -> _Paths:
+    found, row = aircraft[0]
+    if found.kind != TRACKS:
+        return flown_events(aircraft, dynamics)
+    time_s, north, east, altitude = found.path(row)
+    return time_s, north[:, np.newaxis], east[:, np.newaxis], altitude[:, np.newaxis]
+
+
+def _flown_alike(aircraft: Sequence[Encounter], dynamics: str) -> list[SampledTrajectory]:
+    time_s, north, east, altitude = _paths(aircraft, dynamics)
+    origin = aircraft[0][0].reference_deg
+    lat, lon, _ = enu_to_geodetic(
+        east, north, 0.0,
+        reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
+    )  # fmt: skip
+    names = [found.names[row] for found, row in aircraft]
+    return SampledTrajectory.together(names, time_s, lat, lon, altitude)
+
+
+def _key(found: EncounterSet, place: int, dynamics: str) -> Any:
+    # Of a set put elsewhere what was read is the same: the arrays stand for it.
+    return id(found.starts), found.reference_deg, place, dynamics
+
+
+def _keep(key: Any, found: EncounterSet, flights: list[SampledTrajectory]) -> None:
+    _FLOWN[key] = found, flights
+    while len(_FLOWN) > MOST_FLOWN:
+        _FLOWN.popitem(last=False)
+
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
 _FARTHEST_M = 1e6
@@ -170,13 +257,7 @@ class ModelTraffic(_EncounterTraffic):
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter that a block's parameters name, and its place there.
-
-    Raises
-    ------
-    ValueError
-        If there is no such file, model or encounter.
-    """
+    """Return the set of an encounter that a block's parameters name, and its place there."""
     if issubclass(cls, ModelTraffic):
         return _made(_model_key(parameters), parameters.encounter), 0
     found = read_set(parameters.file, parameters.skip_damaged)

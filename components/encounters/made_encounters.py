@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from components.encounters.closest_geometry import (
-    SENSES,
-    Approach,
-    flown,
-    in_plane,
-    intruder_heading,
+from components.encounters.sampling import EncounterDraws
+from components.flights.closest_geometry import SENSES, Approach, flown, in_plane, intruder_heading
+from components.formats.encounter_set import (
+    LARGEST_WEIGHT,
+    NAMES,
+    TRACKS,
+    EncounterSet,
+    geometry_class,
 )
-from components.encounters.draws import EncounterDraws
-from components.encounters.encounter_set import LARGEST_WEIGHT, TRACKS, EncounterSet
-from components.encounters.pair_sets import NAMES, geometry_class
-from components.encounters.set_file import is_place
+from components.formats.set_file import is_place
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
@@ -96,13 +95,7 @@ class Recipe:
 
 
 def read_recipe(text: str) -> Recipe:
-    """Read a table of encounters.
-
-    Raises
-    ------
-    UsageError
-        With everything that is wrong.
-    """
+    """Read a table of encounters."""
     try:
         path = resolve_home(text)
         tables = parse_toml(read_input_text(path))
@@ -208,13 +201,7 @@ def _is_number(value: Any) -> bool:
 
 
 def made_set(recipe: Recipe) -> EncounterSet:
-    """Return the encounters of a recipe, combination after combination.
-
-    Raises
-    ------
-    UsageError
-        If an encounter cannot be as it is asked for, naming it.
-    """
+    """Return the encounters of a recipe, combination after combination."""
     total = recipe.count * len(recipe.fixed)
     combination = np.repeat(np.arange(len(recipe.fixed)), recipe.count)
     draws = EncounterDraws(recipe.seed, "made encounters")

@@ -4,12 +4,153 @@ Described in M. J. Kochenderfer, L. P. Espindle, J. K. Kuchar, J. D. Griffith, "
 encounter model of the National Airspace System", MIT Lincoln Laboratory, ATC-345, 2008.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from components.encounters.bayes_network import BayesNetwork
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+
+class NetworkError(ValueError):
+    """A network that cannot be: `variable` says which of its variables is wrong, if one is."""
+
+    def __init__(self, message: str, variable: str = "") -> None:
+        super().__init__(f"variable '{variable}': {message}" if variable else message)
+        self.variable = variable
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkNode:
+    """One variable given its parents.
+
+    Parameters
+    ----------
+    name : str
+    size : int
+        Number of bins.
+    parents : tuple of int
+        Their places in the network, ascending.
+    strides : tuple of int
+        What one bin more of a parent adds to the column.
+    counts : (columns, size)
+    """
+
+    name: str
+    size: int
+    parents: tuple[int, ...]
+    strides: tuple[int, ...]
+    counts: FloatArray
+
+    @cached_property
+    def totals(self) -> FloatArray:
+        """Sum of each column's counts."""
+        return self.counts.sum(axis=1)
+
+    @cached_property
+    def empty(self) -> BoolArray:
+        """Whether a column holds no count at all."""
+        return self.totals == 0.0
+
+    @cached_property
+    def probabilities(self) -> FloatArray:
+        """Probabilities, shape (columns, size); an empty column holds those of all columns."""
+        filled = np.where(self.empty[:, np.newaxis], self.counts.sum(axis=0), self.counts)
+        found: FloatArray = filled / filled.sum(axis=1, keepdims=True)
+        return found
+
+    @cached_property
+    def edges(self) -> FloatArray:
+        """Where each bin begins and the last one ends within [0, 1], shape (columns, size + 1)."""
+        summed = np.cumsum(self.probabilities, axis=1)
+        # Exactly 1 from the last bin on that can be drawn: rounding must not open a bin without
+        # any probability behind it.
+        last = self.size - 1 - np.argmax(self.probabilities[:, ::-1] > 0.0, axis=1)
+        summed[np.arange(self.size) >= last[:, np.newaxis]] = 1.0
+        return np.concatenate([np.zeros((len(summed), 1)), summed], axis=1)
+
+    @cached_property
+    def flat_edges(self) -> FloatArray:
+        """`edges`, row after row."""
+        return np.ascontiguousarray(self.edges).reshape(-1)
+
+    def column(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
+        """Return the column for the bins of all variables, each (n,)."""
+        found: AnyArray = np.zeros(np.shape(bins[0]), dtype=np.int64)
+        for parent, stride in zip(self.parents, self.strides, strict=True):
+            found += stride * bins[parent]
+        return found
+
+
+@dataclass(frozen=True)
+class BayesNetwork:
+    """Nodes in the file's order, and the order in which they can be drawn.
+
+    Parameters
+    ----------
+    labels : tuple of str
+    sizes : tuple of int
+    nodes : dict of int to NetworkNode
+        Place → node; of a transition network only what is drawn.
+    order : tuple of int
+        Places of all nodes, parents first.
+    """
+
+    labels: tuple[str, ...]
+    sizes: tuple[int, ...]
+    nodes: dict[int, NetworkNode]
+    order: tuple[int, ...]
+
+
+def make_network(
+    labels: Sequence[str],
+    sizes: Sequence[int],
+    arrows: IntArray,
+    counts: FloatArray,
+    drawn: Sequence[int],
+) -> BayesNetwork:
+    """Return a checked network; arrows are 1 where the row's variable is a parent of the column's.
+
+    Counts (m,) are those of all drawn variables, one behind the other, in the order of `drawn`.
+    """
+    nodes, start = {}, 0
+    for place in drawn:
+        parents = tuple(np.flatnonzero(arrows[:, place]).tolist())
+        strides, columns = [], 1
+        for parent in parents:
+            strides.append(columns)
+            columns *= sizes[parent]
+        needed = columns * sizes[place]
+        some = counts[start : start + needed]
+        if len(some) < needed:
+            raise NetworkError(
+                f"{needed} counts are needed ({sizes[place]} bins times {columns} combinations of "
+                f"its parents' bins), {len(some)} are left",
+                labels[place],
+            )
+        start += needed
+        table = some.reshape(columns, sizes[place])
+        if not table.any():
+            raise NetworkError("all its counts are 0", labels[place])
+        nodes[place] = NetworkNode(labels[place], sizes[place], parents, tuple(strides), table)
+    if start < len(counts):
+        raise NetworkError(f"{len(counts)} counts stand there, {start} are needed")
+    return BayesNetwork(tuple(labels), tuple(sizes), nodes, _order(labels, nodes))
+
+
+def _order(labels: Sequence[str], nodes: dict[int, NetworkNode]) -> tuple[int, ...]:
+    """Return the nodes with parents first, and otherwise in the file's order."""
+    left, done = list(nodes), []
+    while left:
+        ready = next((p for p in left if not any(q in left for q in nodes[p].parents)), None)
+        if ready is None:
+            names = ", ".join(repr(labels[p]) for p in left)
+            raise NetworkError(f"arrows form a circle among {names}")
+        left.remove(ready)
+        done.append(ready)
+    return tuple(done)
+
 
 #: Altitude layers of the models whose file gives none (``*``), ft above ground.
 LAYERS_FT = (500.0, 1200.0, 3000.0, 5000.0, 18000.0)

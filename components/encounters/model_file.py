@@ -13,8 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from components.encounters.bayes_network import BayesNetwork, NetworkError, make_network
-from components.encounters.model import Bins, EncounterModel
+from components.encounters.model import (
+    BayesNetwork,
+    Bins,
+    EncounterModel,
+    NetworkError,
+    make_network,
+)
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, read_input_text
@@ -38,17 +43,7 @@ class ModelFileError(ValueError):
 
 
 def read_model(path: Path) -> EncounterModel:
-    """Read and check a model file.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    ModelFileError
-        If it cannot be read, is cut short, or any part of it cannot be.
-    """
+    """Read and check a model file."""
     try:
         state = path.stat()
         return _read(path, (state.st_mtime_ns, state.st_size))

@@ -123,13 +123,6 @@ def speeds_over_directions(first: FloatArray, second: FloatArray, climb: FloatAr
     ∫ √(v₁² + v₂² - 2 v₁ v₂ cos ψ + Δḣ²) dψ over a full turn is 4 √A E(m) with A = (v₁ + v₂)² + Δḣ²
     and m = 4 v₁ v₂ / A, E the complete elliptic integral of the second kind of the *parameter* m.
     Upstream passes √m, the modulus, to a function that takes m: up to 8 % too low.
-
-    Parameters
-    ----------
-    first, second : (pairs,)
-        Horizontal speeds.
-    climb : (pairs,)
-        Difference of the vertical rates.
     """
     from scipy.special import ellipe
 

@@ -23,16 +23,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.encounters.draws import EncounterDraws
 from components.encounters.model import EncounterModel
-from components.encounters.motion import fly_euler, summed
-from components.encounters.pair_densities import (
-    REFERENCE_FT,
-    PairingRules,
-    speeds_over_directions,
-)
-from components.encounters.sampling import TrackSampler
+from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
+from components.encounters.sampling import EncounterDraws, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
+from components.flights.point_mass import fly_euler, summed
+from components.formats.encounter_set import EVENTS, NAMES, EncounterSet, geometry_class
+from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Pairs that are made together, and attempts of them that are looked at together.
@@ -91,19 +88,7 @@ class Pairs:
 
 
 class PairSampler:
-    """Makes encounters of two models by their numbers.
-
-    Parameters
-    ----------
-    own, intruder : EncounterModel
-    seed : int
-    rules : PairingRules
-
-    Raises
-    ------
-    TrackError
-        If tracks of a model cannot be flown.
-    """
+    """Makes encounters of two models by their numbers."""
 
     def __init__(
         self, own: EncounterModel, intruder: EncounterModel, seed: int, rules: PairingRules
@@ -122,19 +107,7 @@ class PairSampler:
             yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 
     def pairs(self, numbers: range, *, paths: bool = True) -> Pairs:
-        """Return the pairs with these numbers.
-
-        Parameters
-        ----------
-        numbers : range
-        paths : bool
-            Whether with their whole paths, or as `Pairs.at_start`.
-
-        Raises
-        ------
-        TrackError
-            If a pair is rejected time after time.
-        """
+        """Return the pairs with these numbers."""
         wanted = np.arange(numbers.start, numbers.stop, numbers.step)
         parts: list[Pairs] = []
         left, attempt = np.arange(len(wanted)), np.zeros(len(wanted), dtype=np.int64)
@@ -166,13 +139,8 @@ class PairSampler:
     def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
         """Return which proposals may be accepted by their first second alone.
 
-        Returns
-        -------
-        hopeful : (n,) of int
-        narrow : (n,) of int
-            Which aircraft's layer is the narrower one: its altitude is kept.
-        bound : (n,)
-            Chance with which they were let through.
+        With them go which aircraft's layer is the narrower one, whose altitude is kept, and the
+        chance with which they were let through.
         """
         both = [t.sample(numbers, 0, attempts) for t in self._tracks]
         good: BoolArray = np.ones(len(numbers), dtype=np.bool_)
@@ -357,3 +325,60 @@ def _course(
         if not left.any():
             break
     return found
+
+
+def set_of_pairs(
+    pairs: Pairs, closest_s: int, reference_deg: tuple[float, float], source: str
+) -> EncounterSet:
+    """Return a set with one encounter per pair."""
+    count = len(pairs.numbers)
+    commands = np.stack([pairs.climb_ft_s, pairs.turn_rad_s, pairs.acceleration_ft_s2])
+    # (quantity, pair, aircraft, second): rows of the file in their order.
+    commands = np.ascontiguousarray(commands.transpose(0, 3, 1, 2))
+    changed: AnyArray = np.ones(commands.shape[1:], dtype=np.bool_)
+    changed[..., 1:] = (np.diff(commands, axis=-1) != 0.0).any(axis=0)
+    # The last instant commands nothing any more.
+    changed[..., -1] = False
+    seconds = commands.shape[-1] - 1
+    starts = np.concatenate([[0], np.cumsum(changed.reshape(2 * count, -1).sum(axis=1))])
+    climb, turn, acceleration = (values[changed] for values in commands)
+
+    def both(values: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(values[:, 0].T).reshape(-1)
+
+    course = np.degrees(pairs.course_rad) % 360.0
+    north = pairs.north_ft[1, 0] - pairs.north_ft[0, 0]
+    east = pairs.east_ft[1, 0] - pairs.east_ft[0, 0]
+    bearing = np.degrees(np.arctan2(east, north) - pairs.heading_rad[0, 0]) % 360.0
+    return EncounterSet(
+        source,
+        EVENTS,
+        pairs.numbers,
+        pairs.weight,
+        2 * np.arange(count + 1),
+        NAMES * count,
+        {
+            "north_m": both(pairs.north_ft) * FOOT_M,
+            "east_m": both(pairs.east_ft) * FOOT_M,
+            "altitude_m": both(pairs.up_ft) * FOOT_M,
+            "speed_mps": both(pairs.speed_ft_s) * FOOT_M,
+            "heading_rad": both(pairs.heading_rad),
+            "duration_s": np.full(2 * count, float(seconds)),
+        },
+        starts,
+        {
+            "time_s": np.nonzero(changed)[-1].astype(float),
+            "climb_mps": climb * FOOT_M,
+            "turn_rad_s": turn,
+            "acceleration_mps2": acceleration * FOOT_M,
+        },
+        reference_deg,
+        {
+            "horizontal_miss_m": pairs.horizontal_ft * FOOT_M,
+            "vertical_miss_m": pairs.vertical_ft * FOOT_M,
+            "closest_s": np.full(count, float(closest_s)),
+            "course_deg": course,
+            "bearing_deg": bearing,
+            "geometry": geometry_class(course),
+        },
+    )

@@ -12,15 +12,54 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from components.encounters.pair_sets import GEOMETRIES, geometry_class
-from components.encounters.weight_metric import EncounterWeight, has_weights
+from components.encounters.encounter_traffic import chosen_encounter
+from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
 from components.metrics.flown_flights import read_flights
 from components.metrics.losses import nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight
+from components.metrics.separation import RelativeFlight, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, RATIO, Group, RatioOf, Result
+from dsa_des.studies.metric import CLASS, NUMBER, RATIO, Group, Metric, RatioOf, Result
+
+
+def has_weights(scene: Scene) -> bool:
+    """Return whether the traffic of a scene is one encounter of many, each with its weight."""
+    return hasattr(traffic_block(scene).parameters, "encounter")
+
+
+class EncounterWeight(Metric):
+    """Number and weight of the encounter of each run, for risk ratios over a study."""
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        if not has_weights(scene):
+            block = traffic_block(scene)
+            raise ValueError(
+                f"the traffic of the scene, {block.name!r}, has no encounters with weights: it "
+                "needs traffic.encounters or traffic.encounter_model"
+            )
+
+    def results(self) -> list[Result]:
+        """Return number, weight and family."""
+        return [
+            Result("encounter", NUMBER, "number of the encounter"),
+            Result("encounter_weight", NUMBER, "how often it happens in the airspace"),
+            Result("encounter_family", NUMBER, "encounter of which it is a copy, or itself"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all three for every replica."""
+        numbers, weights, families = np.empty((3, len(group)))
+        for row, scene in enumerate(group.scenes):
+            block = traffic_block(scene)
+            found, place = chosen_encounter(block.cls, block.parameters)
+            numbers[row], weights[row] = found.numbers[place], found.weights[place]
+            families[row] = found.extra.get(FAMILY, found.numbers)[place]
+        return {
+            "encounter": numbers, "encounter_weight": weights, "encounter_family": families,
+        }  # fmt: skip
+
 
 #: Sides from which an intruder closes in, by bearing from the ownship's course.
 BEARINGS = ("ahead", "right", "behind", "left")
@@ -96,18 +135,11 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
 
 
 def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return how the nearest intruder meets the ownship at the closest approach, degrees.
+    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
 
-    Parameters
-    ----------
-    runs : sequence of list of RelativeFlight
-
-    Returns
-    -------
-    (2, runs)
-        Course: the intruder's less the ownship's. Bearing from where the intruder closes in,
-        clockwise from the ownship's course: opposite to its velocity relative to the ownship. NaN,
-        both, where they never are there together.
+    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
+    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
+    never meet.
     """
     flights = [flight for run in runs for flight in run]
     distance_m, time_s = nearest_of(flights)

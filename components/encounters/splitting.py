@@ -14,32 +14,18 @@ splitting for estimating rare event probabilities", Operations Research 47, 1999
 
 import numpy as np
 
-from components.encounters.draws import EncounterDraws
-from components.encounters.encounter_set import EncounterSet
+from components.encounters.sampling import EncounterDraws
+from components.formats.encounter_set import FAMILY, EncounterSet
 from components.well_clear.volume import PRESETS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
-#: The column of a set that says of which encounter each is a copy.
-FAMILY = "family"
 _NMAC = PRESETS["nmac"]
 
 
 def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) -> FloatArray:
-    """Return in how many copies each encounter is expected.
+    """Return in how many copies each encounter is expected; less of a score is nearer.
 
-    Parameters
-    ----------
-    scores : (n,)
-        Less is nearer to the event.
-    levels : (k,)
-        Falling.
-    copies : (k + 1,)
-        From those of no stage (``score >= levels[0]``) to those of the last; above 0.
-
-    Raises
-    ------
-    ValueError
-        Where levels and copies do not fit, or a score is missing.
+    Levels (k,) fall; copies (k + 1,) go from those of no stage to those of the last.
     """
     if len(copies) != len(levels) + 1:
         raise ValueError(
@@ -65,16 +51,7 @@ def drawn_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray
 
 
 def split_set(found: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
-    """Return a set of copies, numbered from 0, that know their family.
-
-    Parameters
-    ----------
-    found : EncounterSet
-        Copies of copies keep their first family.
-    expected : (n,)
-        Copies of each.
-    seed : int
-    """
+    """Return a set of copies, numbered from 0, that know their family."""
     many = drawn_copies(found.numbers, expected, seed)
     places = np.repeat(np.arange(len(found)), many)
     counts = np.diff(found.first_rows)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.encounters.bayes_network import BayesNetwork
 from components.encounters.model import (
     ACCELERATION,
     AIRSPACE,
@@ -26,10 +25,11 @@ from components.encounters.model import (
     LAYERS_FT,
     SPEED,
     TURN,
+    BayesNetwork,
     EncounterModel,
 )
-from components.encounters.motion import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
 from components.encounters.sampling import SampledTracks, TrackSampler
+from components.flights.point_mass import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 
@@ -79,17 +79,7 @@ class Commands:
 
 
 class TrackRules:
-    """What a model's tracks command, and which of them are accepted.
-
-    Parameters
-    ----------
-    model : EncounterModel
-
-    Raises
-    ------
-    TrackError
-        If the model lacks a variable that a flight needs.
-    """
+    """What a model's tracks command, and which of them are accepted."""
 
     def __init__(self, model: EncounterModel) -> None:
         self.model = model
@@ -160,13 +150,7 @@ class TrackRules:
         return good & self.inside(flown.up_ft)
 
     def flies(self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray) -> BoolArray:
-        """Return which tracks keep the limits of speed (ft/s) and vertical rate.
-
-        Parameters
-        ----------
-        tracks : SampledTracks
-        climb_ft_s, speed : (instants, tracks)
-        """
+        """Return which tracks keep the limits of speed (ft/s) and vertical rate."""
         slowest, fastest = self._speed_ft_s[:, self._combination(tracks)]
         good: BoolArray = speed[0] > np.abs(climb_ft_s[0])
         good &= (speed.min(axis=0) >= slowest) & (speed.max(axis=0) <= fastest)
@@ -208,19 +192,9 @@ class TrackRules:
 
 
 def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArray:
-    """Return the exact distribution of a variable given some others, by enumeration.
+    """Return the exact distribution of a variable given some others, (combinations, bins).
 
-    Parameters
-    ----------
-    network : BayesNetwork
-    given : list of int
-        Places of the variables that are known; the last one runs fastest.
-    place : int
-
-    Returns
-    -------
-    (combinations, bins) array
-        Combinations that cannot be have the distribution over all of them.
+    The last one given runs fastest; combinations that cannot be have the distribution over all.
     """
     needed, todo = set(), [*given, place]
     while todo:
@@ -256,13 +230,7 @@ def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArr
 def accepted_tracks(
     sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[tuple[SampledTracks, FlownTracks]]:
-    """Give accepted tracks with their flights, in batches in order of their numbers.
-
-    Raises
-    ------
-    TrackError
-        If a track is rejected time after time.
-    """
+    """Give accepted tracks with their flights, in batches in order of their numbers."""
     for start in range(0, len(numbers), _TRACKS_AT_ONCE):
         some = numbers[start : start + _TRACKS_AT_ONCE]
         kept: SampledTracks | None = None

@@ -5,7 +5,7 @@ elevation upward.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, ClassVar
@@ -153,6 +153,15 @@ class SensorOffer:
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
     untold_across_m2: float = 0.0
+
+
+def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
+    """Return what sensors offer, by name, as the fusions among some producers hand it on."""
+    offers: dict[str, Any] = {}
+    for producer in producers:
+        if isinstance(producer.offer, dict):
+            offers |= producer.offer
+    return offers
 
 
 def pose_column(name: str) -> Any:

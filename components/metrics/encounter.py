@@ -23,14 +23,14 @@ from components.metrics.rows import (
     sensors_of,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
-from components.sensor.cut_off import END, START, in_scan, said
+from components.sensor.censored import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
 
-#: By what a closest approach may be censored, see `components.traffic.censored.end_of_look`.
+#: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
 #: The end of a run that a block ended before its time.
 _EARLY_END = "the early end of the run"

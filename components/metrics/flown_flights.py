@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.many_flights import ManyFlights, OwnFlights
+from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import RelativeFlight, separations, traffic_block
-from components.traffic.many_flights import ManyFlights
-from components.traffic.own_flights import OwnFlights
-from components.traffic.steered_flight import SteeredFlight
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group

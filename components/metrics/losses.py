@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import TrajectoryState, line_of_sight_ned
+from components.flights.closest_approach import Approaches, closest_approaches, end_of_look
+from components.flights.many_flights import ManyFlights
+from components.flights.sample_times import OwnTimes, RegularTimes, SampleTimes
+from components.flights.sampled_flight import CELLS_AT_ONCE
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry.state import TrajectoryState
 from components.metrics.separation import (
     RelativeFlight,
     distances_m,
     mean_states,
     position_of,
 )
-from components.traffic.censored import end_of_look
-from components.traffic.closest_approach import Approaches, closest_approaches
-from components.traffic.many_flights import ManyFlights
-from components.traffic.sample_times import OwnTimes, RegularTimes, SampleTimes
-from components.traffic.trajectory import CELLS_AT_ONCE
 from components.well_clear.separation import first_inside_cylinder
 from components.well_clear.volume import Volume, inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -29,7 +29,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 def closest(flight: RelativeFlight) -> tuple[float, float, str]:
     """Return the smallest range (m), its time (s), the first of several, and how it is censored.
 
-    See `components.traffic.censored.end_of_look`.
+    See `components.flights.closest_approach.end_of_look`.
     """
     best = (float("inf"), float("nan"))
     looked_s = np.full(2, np.nan)

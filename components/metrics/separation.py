@@ -12,14 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import line_of_sight, north_east_up
-from components.traffic.censored import present_together_s
-from components.traffic.sample_times import (
-    SampleTimes,
-    SharedTimes,
-    regular_count,
-    regular_times_s,
-)
+from components.flights.closest_approach import present_together_s
+from components.flights.sample_times import SampleTimes, regular_count, regular_times_s
+from components.geometry.ellipsoid import line_of_sight, north_east_up
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -173,7 +168,7 @@ class RelativeFlight:
 
     def _samples(self) -> list[SampleTimes]:
         every: list[SampleTimes] = self._source.sample_times()
-        return every or [SharedTimes(self._source.sample_times_s(self.target))]
+        return every
 
 
 def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> FloatArray:

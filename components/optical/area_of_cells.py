@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
 from components.optical.silhouette import PLATE_ASPECT_RATIO, union_area, visible_area

@@ -30,9 +30,8 @@ from components.optical.detector import (
 from components.optical.signature import DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import Visibility
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
-from components.sensor.error_parameters import GlintParameters
 from components.sensor.look import Cells, Look
-from components.sensor.parameters import SensorParameters
+from components.sensor.parameters import GlintParameters, SensorParameters
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.arguments.checks import finite
 from dsa_des.arrays.types import FloatArray
 from dsa_des.files.input_files import InputFileError, status_of

@@ -13,7 +13,7 @@ from components.geometry import sine_and_cosine
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
-    from components.aircraft.silhouette_table import SilhouetteTable
+    from components.aircraft.aspect_tables import SilhouetteTable
     from components.optical.mesh import TriangleMesh
 
 

@@ -1,148 +1,400 @@
-"""The number of false alarms of a radar scan, and their places.
-
-Pure functions of uniform numbers in [0, 1), which the block draws with its own keys.
-"""
-
-from __future__ import annotations
+"""False alarms: what noise alone, and clutter over a threshold set for noise, add to a report."""
 
 import math
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from components.arguments.checks import (
-    FloatArray,
-    as_numbers,
-    checked_probability,
-    checked_pulses,
-    refuse,
-    unflatten,
-)
-from components.radar.measured_snr import measured_snr
-from components.radar.resolution_cells import MOST_CELLS
-from components.radar.threshold import detection_threshold
+from components.geometry.angles import Vector
+from components.geometry.attitude import body_to_ned, unit_vector
+from components.messages.detections import Detections
+from components.messages.false_detections import in_measured_order
+from components.messages.targets import RelativeTargets
+from components.radar.detection.clutter import clutter_detection_probability
+from components.radar.detection.output import false_alarm_count, false_alarm_snr
+from components.radar.detection.threshold import Crossing
+from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, beamwidths_rad, terrain_of
+from components.radar.measurement import FAINTEST
+from components.radar.rain import RainClutter
+from components.radar.resolution import cells_of_radar
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
 
-MOST_FALSE_ALARMS = 1e7
+MOST_PER_SCAN = 1e5
+
+_NO_TARGET = np.uint64(0)
+#: Keys of false alarms within cue cones, beyond any number of those of a scan.
+_OF_CUED = 2**40
 
 
-def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability: float) -> Any:
-    """Return the number of false alarms of each scan: Binomial(cells, Pfa) from one uniform each.
+@dataclass(frozen=True, eq=False)
+class Alarms:
+    """What crossed a threshold without a target, in ascending order of the reports' rows.
 
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per scan.
-    cells : int
-        Resolution cells looked at in a scan, 0 or more.
-    false_alarm_probability : float
-        Per cell and look, in [0, 1].
-
-    Returns
-    -------
-    array of int64, the shape of `uniform`
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, or more than 1e7 false alarms are expected in a scan.
-
-    Notes
-    -----
-    The smallest count whose cumulative probability exceeds the uniform number. The probabilities
-    come from the most likely count outwards by exact ratios and are normalised by their own sum,
-    so that no factorial of a large number is needed; counts with a probability below 1e-20 of the
-    largest are left out. One table per (cells, Pfa), remembered.
+    `key` is that of its draws, `where` its place by quantity in the sensor's axes, `snr` how strong
+    it came out (linear, above 0) and `rate` a uniform number that says its range rate.
     """
-    number = _checked_cells(cells)
-    pfa = as_numbers("false_alarm_probability", false_alarm_probability)
-    refuse(
-        "false_alarm_probability",
-        pfa,
-        np.atleast_1d(~((pfa >= 0.0) & (pfa <= 1.0)) | (pfa.ndim > 0)),
-        "be one number in [0, 1]",
-    )
-    draws = _checked_uniform("uniform", uniform)
-    if number * float(pfa) > MOST_FALSE_ALARMS:
-        raise ValueError(
-            f"false_alarm_probability is {float(pfa):g}: with {number:g} cells it must be at most "
-            f"{MOST_FALSE_ALARMS / number:g}, for 1e7 false alarms in a scan"
+
+    row: IntArray
+    key: AnyArray
+    where: Mapping[str, FloatArray]
+    snr: FloatArray
+    rate: FloatArray
+
+
+def alarms_are_asked_for(parameters: Any) -> Verdict:
+    """Return whether a radar that is switched on has false alarms."""
+    if parameters.false_alarms and not parameters.enabled:
+        return Verdict(False, "enabled is false")
+    return Verdict.of_flag(parameters, "false_alarms")
+
+
+class FalseAlarms(Effect):
+    """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
+
+    Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
+    there. Every resolution cell from the minimum range to ``range_km`` may bring one. They are
+    reported as targets are, with no target and nothing true; detections of a scan stand by what
+    was measured of them. Where there are some, ``snr_db`` and ``confidence`` are of the output
+    that crossed the threshold, for targets too (`MeasuredStrength`), and
+    ``detection_probability`` is null for all (``looks`` has it).
+    """
+
+    lockstep = True
+    name = "false alarms"
+    acts_on = "report"
+    neutral = False
+    outside_the_proof = "a report without false alarms is what there is without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, and whether the radar is switched on."""
+        return alarms_are_asked_for(block.p)
+
+    def build(self, block: Any) -> "NoiseReports":
+        """Return what adds false alarms to a report."""
+        return NoiseReports(block)
+
+
+class NoiseReports:
+    """Draws each scan's false alarms with keys of their own.
+
+    Within cue cones, where a radar looks otherwise, noise crosses the threshold of there.
+    """
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        self._cells = cells_of_radar(block)
+        self._counts = block.stream("false alarms")
+        self._places = block.stream("false alarm places")
+
+    @cached_property
+    def _crossings(self) -> list[Crossing]:
+        """Thresholds elsewhere and, where it is another, within cue cones; known after setup."""
+        block = self._block
+        cued = block.cued_crossing() if block.built("cue") else None
+        return [block.crossing] + ([] if cued is None else [cued])
+
+    def refuse_too_many(self) -> None:
+        """Refuse a threshold that noise crosses too often, once it is known."""
+        block = self._block
+        for crossing in self._crossings:
+            expected = self._cells.count * crossing.false_alarm_probability
+            if expected > MOST_PER_SCAN:
+                raise ValueError(
+                    f"{block.noise_key()}: with {self._cells.count:,} "
+                    f"resolution cells that makes {expected:,.0f} false alarms by scan, and at "
+                    f"most {MOST_PER_SCAN:,.0f} are allowed; noise may cross the threshold with a "
+                    f"probability of at most {MOST_PER_SCAN / self._cells.count:.3g}"
+                )
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray
+    ) -> Detections:
+        """Return the report with the false alarms of its scans."""
+        for which, crossing in enumerate(self._crossings):
+            detections = self._with_alarms(detections, targets, rows, crossing, which)
+        return in_measured_order(detections)
+
+    def _with_alarms(
+        self,
+        detections: Detections,
+        targets: RelativeTargets,
+        rows: IntArray,
+        crossing: Crossing,
+        which: int,
+    ) -> Detections:
+        count = false_alarm_count(
+            self._counts.uniform(_NO_TARGET, detections.scan, which),
+            cells=self._cells.count,
+            false_alarm_probability=crossing.false_alarm_probability,
         )
-    first, cumulative = _binomial(number, float(pfa))
-    place = np.searchsorted(cumulative, draws.reshape(-1), side="right")
-    found = first + np.minimum(place, len(cumulative) - 1)
-    return unflatten(found.astype(np.int64), draws.shape)
+        row = np.repeat(np.arange(len(count)), count)
+        if len(row) == 0:
+            return detections
+        # Keyed by its number within the scan, where detections are keyed by target.
+        number = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        key = (number + which * _OF_CUED).astype(np.uint64)
+        scan = detections.scan[row]
+        across, upwards, outwards, power = (
+            self._places.uniform(key, scan, draw) for draw in range(4)
+        )
+        where = {
+            "azimuth": _between(across, self._cells.azimuth_rad),
+            "elevation": _between(upwards, self._cells.elevation_rad),
+            "range": _between(outwards, self._cells.range_m),
+        }
+        snr = false_alarm_snr(
+            power,
+            false_alarm_probability=crossing.false_alarm_probability,
+            pulses=crossing.pulses,
+            threshold=crossing.threshold,
+        )
+        rate = self._places.uniform(key, scan, 4)
+        alarms = Alarms(row, key, where, np.maximum(snr, FAINTEST), rate)
+        cued = bool(which) if len(self._crossings) > 1 else None
+        return self._block.with_noise_reports(detections, targets, rows, alarms, cued=cued)
 
 
-def false_alarm_snr(
-    uniform: ArrayLike,
-    *,
-    false_alarm_probability: float,
-    pulses: int = 1,
-    threshold: float | None = None,
-) -> Any:
-    """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
+def _between(uniform: Any, field: tuple[float, float]) -> Any:
+    start, width = field
+    return start + width * uniform
 
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per false alarm.
-    false_alarm_probability : float
-        Strictly between 0 and 1; it sets the threshold.
-    pulses : int
-        Pulses summed non-coherently.
-    threshold : float, optional
-        The threshold itself, where it is known.
 
-    Returns
-    -------
-    array, linear power ratio per pulse
-        Detector output over its mean, minus 1; never below 0.
+#: Keys of the ground's errors, beyond those of noise.
+_OF_GROUND = np.uint64(2**41)
 
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
+
+class ClutterAlarms(Effect):
+    """Reports of cells in which the ground crosses the threshold that noise does not.
+
+    With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
+    ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
+    be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
+    where the radar truly looks; behind a moving-target filter none is reported. Rain and what
+    sidelobes meet cross it in every cell.
     """
-    draws = _checked_uniform("uniform", uniform)
-    if threshold is None:
-        pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
-        threshold = float(detection_threshold(checked_pulses(pulses), pfa))
-    return measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses)
+
+    lockstep = True
+    name = "clutter false alarms"
+    acts_on = "report"
+    neutral = False
+    outside_the_proof = "a report without the ground is what there is without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
+        p = block.p
+        if not (p.false_alarms and p.enabled):
+            return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
+        if terrain_of(block) is None and not RainClutter().verdict(block).simulated:
+            return Verdict(False, "[terrain] height_m is not given, and rain has no echo")
+        if p.clutter_threshold != "noise":
+            return Verdict(False, "clutter_threshold is 'adaptive': they are as many as of noise")
+        if p.moving_target_filter != "none":
+            return Verdict(False, f"moving_target_filter is {p.moving_target_filter!r}")
+        return Verdict(True, "clutter_threshold is 'noise'")
+
+    def build(self, block: Any) -> "GroundReports":
+        """Return what adds the ground's false alarms to a report."""
+        return GroundReports(block)
 
 
-def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:
-    array = as_numbers(name, value)
-    refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "lie in [0, 1)")
-    return array
+class _CellsOf:
+    """Cells without a target as effects on the SNR ask for them."""
+
+    def __init__(
+        self, range_m: FloatArray, own_alt_m: float, elevation_rad: FloatArray, alt_m: FloatArray
+    ) -> None:
+        self.range_m, self.elevation_rad, self.alt_m = range_m, elevation_rad, alt_m
+        self._own_alt_m = own_alt_m
+
+    def __len__(self) -> int:
+        return len(self.range_m)
+
+    def of_row(self, name: str) -> AnyArray:
+        """Return the ownship's altitude for each cell."""
+        assert name == "own_alt_m"
+        return np.full(len(self), self._own_alt_m)
 
 
-def _checked_cells(cells: int) -> int:
-    if isinstance(cells, bool) or int(cells) != cells or not 0 <= cells <= MOST_CELLS:
-        raise ValueError(f"cells is {cells!r}: it must be a whole number from 0 to 1e15")
-    return int(cells)
+class GroundReports:
+    """Draws for every cell that holds ground, keyed by cell and scan."""
+
+    def __init__(self, block: Any) -> None:
+        self._block, self._terrain = block, terrain_of(block)
+        self._cells = cells = cells_of_radar(block)
+        self._beam_rad = beamwidths_rad(block)
+        self._draws = block.stream("clutter false alarms")
+        axes = (
+            (cells.azimuth_rad, cells.azimuth),
+            (cells.elevation_rad, cells.elevation),
+            (cells.range_m, cells.range),
+        )
+        #: Size of the cells, and their first edges.
+        self._size = [width / count for (_, width), count in axes]
+        self._start = [start for (start, _), _ in axes]
+        centres = [
+            start + (np.arange(count) + 0.5) * size
+            for ((start, _), count), size in zip(axes, self._size, strict=True)
+        ]
+        self._range_m = centres[2]
+        azimuth, elevation = (grid.ravel() for grid in np.meshgrid(*centres[:2], indexing="ij"))
+        self._beams = azimuth, elevation
+
+    @cached_property
+    def _crossing(self) -> Crossing:
+        """The threshold; known after setup."""
+        crossing: Crossing = self._block.crossing
+        return crossing
+
+    @cached_property
+    def _body(self) -> Vector:
+        """Where the beams truly point in body axes; the sensor's are known once all is built."""
+        x, y, z = unit_vector(*self._block.axes.pointing(*self._beams))
+        return x, y, z
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray
+    ) -> Detections:
+        """Return the report with the ground's false alarms of its scans."""
+        numbers = zip(rows.tolist(), detections.scan.tolist(), strict=True)
+        found = [self._of_scan(targets, row, scan) for row, scan in numbers]
+        counts = [len(cell) for cell, _ in found]
+        row = np.repeat(np.arange(len(found)), counts)
+        if len(row) == 0:
+            return detections
+        cell, cnr = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        scan, key = detections.scan[row], cell.astype(np.uint64)
+        beam, depth = np.divmod(cell, self._cells.range)
+        across, upwards = np.divmod(beam, self._cells.elevation)
+        where = {
+            name: start + (number + self._draws.uniform(key, scan, draw)) * size
+            for draw, (name, number, start, size) in enumerate(
+                zip(("azimuth", "elevation", "range"), (across, upwards, depth), self._start,
+                    self._size, strict=True), start=1,
+            )
+        }  # fmt: skip
+        # What lies beyond the threshold of an exponential power is exponential again.
+        beyond = -np.log1p(-self._draws.uniform(key, scan, 4)) * (1.0 + cnr)
+        snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
+        rate = self._draws.uniform(key, scan, 5)
+        alarms = Alarms(row, key + _OF_GROUND, where, snr, rate)
+        joined = self._block.with_noise_reports(detections, targets, rows, alarms)
+        # Without any here, the report is in that order already.
+        return in_measured_order(joined)
+
+    def _of_scan(
+        self, targets: RelativeTargets, row: int, scan: int
+    ) -> tuple[IntArray, FloatArray]:
+        """Return the cells that the ground crosses the threshold in, and their CNR."""
+        if targets.own_attitude is None:
+            raise ValueError("clutter's false alarms need to know how the ownship is turned")
+        own_alt_m = float(targets.own_alt_m[row])
+        turned = [
+            float(targets.own_attitude[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")
+        ]
+        elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
+        parts = [
+            (depth + beam * self._cells.range, *self._clutter(own_alt_m, depth, away))
+            for depth, beam, away in self._lit(own_alt_m, elevation_rad)
+        ]
+        if not parts:
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        cell, pfa, cnr = (np.concatenate(each) for each in zip(*parts, strict=True))
+        # Beyond noise, whose false alarms are reported anyway.
+        of_noise = self._crossing.false_alarm_probability
+        extra = (pfa - of_noise) / (1.0 - of_noise)
+        if (most := float(extra.sum())) > MOST_PER_SCAN:
+            raise ValueError(
+                f"clutter_threshold is 'noise': the ground makes {most:,.0f} false alarms in a "
+                f"scan, and at most {MOST_PER_SCAN:,.0f} are allowed; 'adaptive' keeps their number"
+            )
+        draw = self._draws.uniform(cell.astype(np.uint64), np.full(len(cell), scan), 0)
+        crossing = np.flatnonzero(draw < extra)
+        return cell[crossing], cnr[crossing]
+
+    def _lit(
+        self, own_alt_m: float, elevation_rad: FloatArray
+    ) -> Iterator[tuple[int, IntArray, FloatArray]]:
+        """Give each range cell with clutter, the beams that meet it, and where they point."""
+        if any(echo.diffuse for echo in self._block.echoes):
+            everywhere = np.arange(len(elevation_rad))
+            for depth in range(len(self._range_m)):
+                yield depth, everywhere, elevation_rad
+            return
+        height_m = own_alt_m - self._terrain.height_m
+        reach_rad = BEAM_REACH_BEAMWIDTHS * self._beam_rad[1]
+        for depth, range_m in enumerate(self._range_m.tolist()):
+            if range_m >= height_m:
+                off = elevation_rad + math.asin(height_m / range_m)
+                beam = np.flatnonzero(np.abs(off) <= reach_rad)
+                if len(beam):
+                    yield depth, beam, elevation_rad[beam]
+
+    def _clutter(
+        self, own_alt_m: float, depth: int, elevation_rad: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return how often the clutter in some cells crosses the threshold, and its CNR."""
+        range_m = np.full(len(elevation_rad), self._range_m[depth])
+        mean, diffuse = np.zeros(len(range_m)), np.zeros(len(range_m))
+        for echo in self._block.echoes:
+            alt_m = own_alt_m + range_m * np.sin(elevation_rad)
+            if not echo.diffuse:
+                alt_m = np.full(len(range_m), self._terrain.height_m)
+            cells: Any = _CellsOf(range_m, own_alt_m, elevation_rad, alt_m)
+            cnr = self._block.echo_snr(cells, echo(cells))
+            if echo.diffuse:
+                diffuse = diffuse + cnr
+            else:
+                mean = mean + cnr
+        pfa = clutter_detection_probability(
+            0.0,
+            mean,
+            false_alarm_probability=0.5,  # the threshold says more
+            diffuse_cnr=diffuse,
+            clutter=self._block.context.sections["terrain"].clutter_mean,
+            noise_threshold=self._crossing.threshold,
+        )
+        return pfa, mean + diffuse
 
 
-@lru_cache(maxsize=256)
-def _binomial(cells: int, probability: float) -> tuple[int, NDArray[np.float64]]:
-    """Return the first count that matters and the cumulative probabilities from it on."""
-    if cells == 0 or probability == 0.0:
-        return 0, np.array([1.0])
-    if probability == 1.0:
-        return cells, np.array([1.0])
-    mode = min(cells, int((cells + 1) * probability))
-    spread = math.sqrt(max(cells * probability * (1.0 - probability), 1.0))
-    reach = int(10.0 * spread) + 60
-    first, last = max(0, mode - reach), min(cells, mode + reach)
-    odds = probability / (1.0 - probability)
-    up = np.arange(mode, last, dtype=np.float64)
-    down = np.arange(mode, first, -1, dtype=np.float64)
-    with np.errstate(under="ignore"):  # the tails fade to 0
-        above = np.cumprod((cells - up) / (up + 1.0) * odds)
-        below = np.cumprod(down / ((cells - down + 1.0) * odds))
-        weight = np.concatenate((below[::-1], [1.0], above))
-        cumulative = np.cumsum(weight)
-    cumulative /= cumulative[-1]
-    cumulative.flags.writeable = False
-    return first, cumulative
+#: Noise above the threshold in one look of a hundred is more than any radar's operator bears.
+HIGH_FALSE_ALARM_PROBABILITY = 0.01
+
+
+#: A false alarm in a million scans is none in any run.
+NO_FALSE_ALARMS_PER_SCAN = 1e-6
+
+
+def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
+    """Say that a radar detects echoes below its noise, as so many false alarms are allowed."""
+    pfa = parameters.false_alarm_probability
+    if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
+        return []
+    by_default = "false_alarm_probability" not in parameters.model_fields_set
+    whose = "the thesis's, as the scene gives none" if by_default else "as the scene says"
+    return [
+        f"false_alarm_probability is {pfa:g} per look ({whose}): half of the looks at a target "
+        f"detect at an SNR of {snr_db:.1f} dB; with 1e-6, as radars have, it takes far more"
+    ]
+
+
+def unlikely_false_alarms(noise_key: str, pfa: float, cells: int, by_default: bool) -> list[str]:
+    """Say how many false alarms a scan has where there are many, or practically none."""
+    comes_to = (
+        f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"
+    )
+    if pfa >= HIGH_FALSE_ALARM_PROBABILITY:
+        whose = " (the thesis's, as the scene gives none)" if by_default else ""
+        return [
+            f"false_alarms is true and {noise_key}{whose}: {comes_to}, {pfa:.3g} in every cell; "
+            "radars have 1e-6 per cell or less"
+        ]
+    if cells * pfa < NO_FALSE_ALARMS_PER_SCAN:
+        return [
+            f"false_alarms is true and {noise_key}: {comes_to}, practically none; targets and "
+            "noise cross one threshold, and a lower one has both come more often"
+        ]
+    return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,10 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
+from components.radar.resolution import cell_size
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 # Ground farther from the beam's axis than this many beamwidths (two-way gain below -96 dB) is dark.
 BEAM_REACH_BEAMWIDTHS = 2.0
@@ -25,22 +30,7 @@ _LN_2 = math.log(2.0)
 
 
 def height_above_terrain_m(own_alt_m: ArrayLike, terrain_alt_m: ArrayLike) -> Any:
-    """Return the height above terrain, or refuse terrain above the ownship.
-
-    Parameters
-    ----------
-    own_alt_m, terrain_alt_m : array_like, m
-        Above sea level.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If the terrain is as high as the ownship or higher.
-    """
+    """Return the height above terrain, or refuse terrain as high as the ownship or higher."""
     shape, (own, terrain) = broadcast_flat(
         own_alt_m=finite("own_alt_m", own_alt_m),
         terrain_alt_m=finite("terrain_alt_m", terrain_alt_m),
@@ -67,42 +57,17 @@ def ground_clutter_rcs_m2(
 ) -> Any:
     """Return the RCS of the ground in the range cell of a target at which the beam points.
 
-    Parameters
-    ----------
-    range_m : array_like, m
-        Slant range of the target, so of its cell.
-    elevation_rad : array_like, rad
-        Elevation of the beam's axis above the local horizontal.
-    height_m : array_like, m
-        Height above terrain, above 0.
-    gamma_db : float, dB
-        Reflectivity γ of the terrain in σ0 = γ sin(grazing): about -20 for a smooth desert or
-        sea, -15 for farmland, -10 for woodland and -5 for a town, with ±5 dB between places.
-    azimuth_beamwidth_rad, elevation_beamwidth_rad : float, rad
-        One-way half-power beamwidths, above 0.
-    range_resolution_m : float, m
-        Depth of a range cell, above 0.
+    `gamma_db` is the reflectivity γ of σ0 = γ sin(grazing): about -20 for a smooth desert or sea,
+    -15 for farmland, -10 for woodland and -5 for a town, with ±5 dB between places. Beamwidths are
+    one-way half-power ones. The RCS goes into the radar equation as the target's, the beam's gain
+    towards the ground included; it is 0 where the cell holds no ground (nearer than the height) or
+    the ground is more than `BEAM_REACH_BEAMWIDTHS` beamwidths off the axis.
 
-    Returns
-    -------
-    array of the broadcast shape, m²
-        As the target's RCS goes into the radar equation, the beam's gain towards the ground
-        included. 0 where the cell holds no ground (nearer than the height) or the ground is more
-        than `BEAM_REACH_BEAMWIDTHS` beamwidths off the axis.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    σ = σ0 · A · g: constant-γ reflectivity (D. K. Barton, "Land clutter models for radar design
-    and analysis", Proc. IEEE 73(2), 1985); patch A = R θ_az · min(ΔR / cos ψ, R θ_el / sin ψ),
-    limited by the range cell or, looking steeply down, by the beam; two-way gain of a Gaussian
-    beam g = exp(-8 ln 2 (Δ/θ_el)²), Δ between the beam's axis and the ground at that range.
-    Sidelobes (`ground_ring_rcs_m2`) are left out, and the spread of the ground's depression over
-    the patch.
+    σ = σ0 · A · g: constant-γ reflectivity (D. K. Barton, "Land clutter models for radar design and
+    analysis", Proc. IEEE 73(2), 1985); patch A = R θ_az · min(ΔR / cos ψ, R θ_el / sin ψ), limited
+    by the range cell or, looking steeply down, by the beam; two-way gain of a Gaussian beam g =
+    exp(-8 ln 2 (Δ/θ_el)²), Δ between the beam's axis and the ground at that range. Sidelobes
+    (`ground_ring_rcs_m2`) are left out, and the spread of the ground's depression over the patch.
     """
     for name, value in (
         ("azimuth_beamwidth_rad", azimuth_beamwidth_rad),
@@ -138,20 +103,8 @@ def ground_ring_rcs_m2(
 ) -> Any:
     """Return the RCS of the ground at a slant range in all directions, which sidelobes meet.
 
-    Parameters
-    ----------
-    range_m, height_m : array_like, m
-        Slant range, and height above terrain, above 0.
-    gamma_db : float, dB
-        As for `ground_clutter_rcs_m2`.
-    range_resolution_m : float, m
-        Above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-        σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area
-        whatever the height. 0 nearer than the height.
+    σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area whatever
+    the height. 0 nearer than the height.
     """
     positive("range_resolution_m", range_resolution_m)
     shape, (distance, height) = broadcast_flat(
@@ -166,3 +119,215 @@ def ground_ring_rcs_m2(
 def _or_height(distance: Any, height: Any) -> Any:
     """Return the distance, or the height where the distance is 0 (no division by 0)."""
     return np.where(distance > 0.0, distance, height)
+
+
+Velocity = tuple[FloatArray, FloatArray, FloatArray]
+_CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
+
+
+class GroundClutter(Effect):
+    """Echo of flat terrain in the cell of each target, where the beam meets it.
+
+    The beam points at the target and is as wide as a resolution cell, unless the scene gives its
+    beamwidths; clutter more than two beamwidths off its axis is 0. The air takes from the echo of
+    the ground what it takes from the target's. What the threshold does there is said by
+    ``clutter_threshold``.
+    """
+
+    lockstep = True
+    name = "ground clutter"
+    acts_on = "clutter"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] height_m``."""
+        terrain = terrain_of(block)
+        if terrain is None:
+            return Verdict(False, "[terrain] height_m is not given")
+        return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
+
+    def build(self, block: Any) -> Echo:
+        """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
+        terrain = terrain_of(block)
+        if terrain is None:
+            return NoEcho(block)
+        for width, name in zip(cell_size(block.p), _CELL, strict=True):
+            if width == 0:
+                raise ValueError(
+                    f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
+                )
+        if block.p.pulses_summed > 1:
+            if block.p.budget == "dwell" and block.p.integration == "noncoherent":
+                raise ValueError(
+                    f"integration is 'noncoherent', which sums {block.p.pulses_summed} pulses: "
+                    "ground clutter is known for one look only; set it to 'coherent'"
+                )
+            raise ValueError(
+                f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
+                "set it to 1, with integration_gain_db for pulses integrated coherently"
+            )
+
+        if terrain.clutter_mean == "constant" and block.p.cfar_reference_cells is not None:
+            raise ValueError(
+                f"cfar_reference_cells is {block.p.cfar_reference_cells} and [terrain] "
+                "clutter_mean is 'constant': an average of cells is known for clutter that "
+                "fluctuates; leave one of them out"
+            )
+
+        return GroundEcho(block, terrain)
+
+
+@dataclass(frozen=True)
+class Clutter:
+    """Power over noise by the cells of a look: of the ground amid the beam, and of diffuse clutter.
+
+    Diffuse is what is more noise: rain, and what sidelobes meet.
+    """
+
+    mean: FloatArray
+    diffuse: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """Both together."""
+        return self.mean + self.diffuse
+
+    def of(self, chosen: Any) -> Clutter:
+        """Return that of some cells."""
+        return Clutter(self.mean[chosen], self.diffuse[chosen])
+
+
+class Echo:
+    """What gives an echo beside the target; called with cells, it returns its RCS in m²."""
+
+    #: Whether it adds to noise; else it is the mean that ``clutter_mean`` speaks of.
+    diffuse = True
+
+    def __init__(self, block: Any) -> None:
+        self.block = block
+        self.terrain = terrain_of(block)
+        *self.beam_rad, self.depth_m = cell_size(block.p)
+
+    def __call__(self, cells: Any) -> FloatArray:
+        """Return the RCS in each cell's resolution cell, m²."""
+        raise NotImplementedError
+
+    def range_rates(
+        self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return mean and standard deviation of its range rates in each cell, m/s.
+
+        `own_m_s` is the ownship's velocity over ground, `ground_m_s` the range rate of the ground
+        on the beam's axis.
+        """
+        raise NotImplementedError
+
+
+class GroundEcho(Echo):
+    """The patch of ground that beam and range cell share."""
+
+    diffuse = False
+
+    def __init__(self, block: Any, terrain: Any) -> None:
+        super().__init__(block)
+        self.terrain = terrain
+
+    def __call__(self, cells: Any) -> FloatArray:
+        """Return the RCS of the ground in each cell's resolution cell, m²."""
+        height_m = height_above_terrain_m(cells.of_row("own_alt_m"), self.terrain.height_m)
+        rcs = ground_clutter_rcs_m2(
+            cells.range_m,
+            cells.elevation_rad,
+            height_m,
+            gamma_db=self.terrain.clutter_gamma_db,
+            azimuth_beamwidth_rad=self.beam_rad[0],
+            elevation_beamwidth_rad=self.beam_rad[1],
+            range_resolution_m=self.depth_m,
+        )
+        return np.asarray(rcs)
+
+    def range_rates(
+        self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Spread by the beam's width across the ownship's course, and by the ground's own."""
+        speed_m_s = np.sqrt(sum(part * part for part in own_m_s))
+        platform = platform_spread_m_s(speed_m_s, ground_m_s, self.beam_rad[0])
+        return ground_m_s, np.hypot(self.terrain.clutter_motion_m_s, platform)
+
+
+class NoEcho(Echo):
+    """Nothing."""
+
+    def __call__(self, cells: Any) -> FloatArray:
+        """Return 0 for each cell."""
+        return np.zeros(len(cells))
+
+    def range_rates(
+        self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Of nothing: those of the ground."""
+        return ground_m_s, np.zeros(len(cells))
+
+
+class BoundaryClutter(GroundClutter):
+    """The same for a range boundary, which hears the ground if its cells have a size."""
+
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] height_m``, and for a cell."""
+        found = super().verdict(block)
+        zero = [name for width, name in zip(cell_size(block.p), _CELL, strict=True) if not width]
+        if found.simulated and zero:
+            return Verdict(False, f"{zero[0]} is 0: no cell, no ground in it")
+        return found
+
+    def build(self, block: Any) -> Echo:
+        """Return each cell's ground clutter; 0 where the verdict was that there is none."""
+        if not self.verdict(block).simulated:
+            return NoEcho(block)
+        return super().build(block)
+
+
+def beamwidths_rad(block: Any) -> tuple[float, float]:
+    """Return a radar's beamwidths in azimuth and elevation, rad; by default its resolution."""
+    azimuth_rad, elevation_rad, _ = cell_size(block.p)
+    return azimuth_rad, elevation_rad
+
+
+def terrain_of(block: Any) -> Any:
+    """Return the terrain of a block's scene, or None where there is none."""
+    terrain = block.context.sections.get("terrain")
+    return None if terrain is None or terrain.height_m is None else terrain
+
+
+#: Standard deviation over half-power width of a Gaussian beam's two-way pattern.
+_BEAM_DEVIATION = 1.0 / math.sqrt(16.0 * math.log(2.0))
+
+
+def platform_spread_m_s(
+    speed_m_s: ArrayLike, ground_rate_m_s: ArrayLike, beamwidth_rad: float
+) -> Any:
+    """Return the standard deviation of the ground's range rates over a moving radar's beam, m/s.
+
+    `ground_rate_m_s` is that of the ground on the beam's axis, -speed · cos(angle off the flight's
+    course). The result is 0.30 · speed · beamwidth · sin(angle), as a frequency 0.60 · speed ·
+    beamwidth / λ abeam: a Gaussian beam, seen twice, has the standard deviation beamwidth / sqrt(16
+    ln 2). Straight ahead the spread is of second order in the beamwidth and left out.
+    """
+    positive("beamwidth_rad", beamwidth_rad)
+    shape, (speed, rate) = broadcast_flat(
+        speed_m_s=not_negative("speed_m_s", speed_m_s),
+        ground_rate_m_s=finite("ground_rate_m_s", ground_rate_m_s),
+    )
+    across = np.sqrt(np.maximum((speed - rate) * (speed + rate), 0.0))
+    return unflatten(_BEAM_DEVIATION * float(beamwidth_rad) * across, shape)
+
+
+def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
+    """Say that clutter raises detections where the threshold stays at the noise."""
+    if terrain is None or parameters.clutter_threshold != "noise":
+        return []
+    return [
+        "clutter_threshold is 'noise': the echo of the ground counts as signal, so that clutter "
+        "raises detections; 'adaptive' keeps the probability of false alarm"
+    ]

@@ -1,4 +1,4 @@
-"""The link budget: the echo of a target of given RCS at a given range."""
+"""The radar equation and the link budget: the SNR of a target of given RCS at a given range."""
 
 from __future__ import annotations
 
@@ -10,24 +10,114 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
+    finite,
     not_negative,
     positive,
     refuse,
     unflatten,
 )
-from components.radar.radar_equation import (
-    SMALLEST_MINIMUM_RANGE_M,
-    checked_minimum_range,
-    echo_snr,
-    radar_constant,
-    snr,
-    wavelength,
-)
-from components.radar.required_snr import required_snr
+from components.radar.detection.probability import required_snr
+
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+BOLTZMANN_J_K = 1.380649e-23
+REFERENCE_TEMPERATURE_K = 290.0
+
+LARGEST_DB = 300.0
+_LARGEST = float(np.finfo(np.float64).max)
+SMALLEST_MINIMUM_RANGE_M = 1e-3
+
+
+def wavelength(frequency_hz: ArrayLike) -> Any:
+    """Return the wavelength in metres of a frequency in hertz."""
+    return SPEED_OF_LIGHT_M_S / positive("frequency_hz", frequency_hz)[()]
+
+
+def radar_constant(
+    *,
+    power_w: float,
+    antenna_gain_db: float,
+    wavelength_m: float,
+    bandwidth_hz: float,
+    integration_gain_db: float = 0.0,
+    noise_figure_db: float = 0.0,
+    losses_db: float = 0.0,
+) -> float:
+    """Return what RCS/range⁴ is multiplied with to give the SNR, in m².
+
+    Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis eq. 7
+    and 8, completed by the coherent integration gain G_I, the noise figure F and the losses L,
+    which Table 2.2 lists (G_I, F) or forgets (L). Pulses that G_I counts are not to be counted
+    again as `pulses`.
+    """
+    quantities = {
+        "power_w": power_w,
+        "wavelength_m": wavelength_m,
+        "bandwidth_hz": bandwidth_hz,
+    }
+    for name, value in quantities.items():
+        positive(name, value)
+    decibels = {
+        "antenna_gain_db": antenna_gain_db,
+        "integration_gain_db": integration_gain_db,
+        "noise_figure_db": noise_figure_db,
+        "losses_db": losses_db,
+    }
+    for name, value in decibels.items():
+        if not abs(float(finite(name, value))) <= LARGEST_DB:
+            raise ValueError(f"{name} is {value:g}: it must lie in ±{LARGEST_DB:g} dB")
+    total_db = 2.0 * antenna_gain_db + integration_gain_db - noise_figure_db - losses_db
+    noise_w = BOLTZMANN_J_K * REFERENCE_TEMPERATURE_K * bandwidth_hz
+    return (
+        power_w
+        * wavelength_m
+        * wavelength_m
+        * 10.0 ** (total_db / 10.0)
+        / ((4.0 * math.pi) ** 3 * noise_w)
+    )
+
+
+def checked_minimum_range(minimum_range_m: float) -> float:
+    """Return the minimum range as a float, or refuse one below 1 mm."""
+    nearest = float(positive("minimum_range_m", minimum_range_m))
+    if nearest < SMALLEST_MINIMUM_RANGE_M:
+        raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
+    return nearest
+
+
+def snr(
+    range_m: ArrayLike, rcs_m2: ArrayLike, *, constant_m2: float, minimum_range_m: float
+) -> Any:
+    """Return the SNR per look (linear), or 0 closer than the minimum range.
+
+    Closer than `minimum_range_m`, at least 1 mm, the far-field equation does not hold and the
+    receiver is still blind from its own pulse: no echo is processed, and the SNR is 0. So range 0
+    is finite.
+    """
+    constant_m2 = float(positive("constant_m2", constant_m2))
+    nearest = checked_minimum_range(minimum_range_m)
+    shape, (distance, rcs) = broadcast_flat(
+        range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
+    )
+    return unflatten(echo_snr(distance, rcs, constant_m2, nearest), shape)
+
+
+def echo_snr(
+    distance: FloatArray, rcs: FloatArray, constant_m2: float, nearest: float
+) -> FloatArray:
+    """`snr` for flat contiguous arrays of one shape, all arguments checked."""
+    near = distance < nearest
+    safe = np.where(near, nearest, distance)
+    # Both factors are divided by the square: neither the fourth power of a large range nor their
+    # product overflows on the way. An echo from the end of the number range is 0.
+    with np.errstate(under="ignore", over="ignore"):
+        square = safe * safe
+        echo = (constant_m2 / square) * (rcs / square)
+    return np.where(near, 0.0, np.minimum(echo, _LARGEST))
+
 
 __all__ = [
     "LinkBudget",
@@ -42,27 +132,12 @@ __all__ = [
 
 @dataclass(frozen=True)
 class LinkBudget:
-    """Describe one radar's link budget; all gains in dB, everything else in SI units.
+    """One radar's link budget; all gains in dB, everything else in SI units.
 
-    Parameters
-    ----------
-    power_w, antenna_gain_db, bandwidth_hz
-        As for `radar_constant`.
-    wavelength_m, frequency_hz : float, optional
-        Exactly one of the two.
-    integration_gain_db, noise_figure_db, losses_db
-        As for `radar_constant`; 0 dB each unless given.
-    minimum_range_m : float, optional
-        Closer than this no echo is processed (SNR 0). Unless given, the start of the antenna's
-        far field, 2 D²/λ with D the diameter of a circular aperture of this gain:
-        2 G λ / pi², 1.5 m for the 29.5 dB antenna at 35 GHz. A pulse radar is blind up to half
-        its pulse length, which is usually farther: set it then.
-
-    Raises
-    ------
-    ValueError
-        If a quantity is not above 0 or not finite, or not exactly one of wavelength and frequency
-        is given.
+    Exactly one of wavelength and frequency is given. Closer than `minimum_range_m` no echo is
+    processed (SNR 0): unless given, the start of the antenna's far field, 2 D²/λ with D the
+    diameter of a circular aperture of this gain: 2 G λ / pi², 1.5 m for the 29.5 dB antenna at 35
+    GHz. A pulse radar is blind up to half its pulse length, which is usually farther: set it then.
     """
 
     power_w: float
@@ -116,7 +191,7 @@ class LinkBudget:
         return max(far_field_m, SMALLEST_MINIMUM_RANGE_M)
 
     def snr(self, range_m: ArrayLike, rcs_m2: ArrayLike) -> Any:
-        """Return the SNR at a slant range for an RCS; see `components.radar.radar_equation.snr`."""
+        """Return the SNR at a slant range for an RCS; see `components.radar.link_budget.snr`."""
         return snr(range_m, rcs_m2, constant_m2=self.constant_m2, minimum_range_m=self.nearest_m)
 
     def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
@@ -127,22 +202,6 @@ class LinkBudget:
         """Return the slant range in metres at which the radar equation gives an SNR.
 
         The equation alone: where the result is below `nearest_m`, the radar processes no echo.
-
-        Parameters
-        ----------
-        snr : array_like
-            Linear power ratio, above 0.
-        rcs_m2 : array_like, m²
-            0 or more; broadcasts with `snr`.
-
-        Returns
-        -------
-        array of the broadcast shape, m
-
-        Raises
-        ------
-        ValueError
-            If an argument is out of range.
         """
         shape, (ratio, rcs) = broadcast_flat(
             snr=positive("snr", snr), rcs_m2=not_negative("rcs_m2", rcs_m2)
@@ -164,33 +223,8 @@ def calibrated_bandwidth(
 ) -> float:
     """Return the bandwidth in hertz with which the radar has Pd `pd` for a target at a range.
 
-    The thesis gives no bandwidth; it follows from one known detection range. The budget's own
-    bandwidth does not matter; `with_bandwidth` puts the result in.
-
-    Parameters
-    ----------
-    budget : LinkBudget
-    rcs_dbsm : float, dB above 1 m²
-    range_km : float, km
-        Not closer than the budget's minimum range.
-    pd : float
-        Above the false-alarm probability, below 1.
-    pulses, false_alarm_probability, model
-        As for `components.radar.detection.detection_probability`.
-
-    Returns
-    -------
-    float
-        Hz
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    The SNR required comes from `required_snr` (root finding); SNR times bandwidth is a constant.
+    The thesis gives no bandwidth; it follows from one known detection range, as SNR times bandwidth
+    is a constant. The budget's own bandwidth does not matter; `with_bandwidth` puts the result in.
     """
     range_m = float(positive("range_km", range_km)) * 1000.0
     if range_m < budget.nearest_m:
@@ -218,25 +252,7 @@ def detection_range(
     false_alarm_probability: float,
     model: str = "swerling1",
 ) -> Any:
-    """Return the slant range in metres at which a target of given RCS has Pd `pd`.
-
-    Parameters
-    ----------
-    budget : LinkBudget
-    rcs_m2 : array_like, m²
-        Above 0.
-    pd, pulses, false_alarm_probability, model
-        As for `calibrated_bandwidth`.
-
-    Returns
-    -------
-    array of the shape of `rcs_m2`, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
+    """Return the slant range in metres at which a target of given RCS has Pd `pd`."""
     rcs = positive("rcs_m2", rcs_m2)
     needed = required_snr(
         pd, pulses=pulses, false_alarm_probability=false_alarm_probability, model=model
@@ -249,3 +265,42 @@ def detection_range(
         f"be large enough to have Pd {pd:g} beyond the minimum range, {budget.nearest_m:g} m",
     )
     return distance[()]
+
+
+#: Key → least and largest value of radars that were built, and the unit.
+_RANGES = {
+    "frequency_hz": (3e6, 3e11, "Hz"),
+    "wavelength_m": (1e-3, 100.0, "m"),
+    "power_w": (1e-4, 1e8, "W"),
+    "antenna_gain_db": (-3.0, 75.0, "dB"),
+    "noise_figure_db": (0.0, 30.0, "dB"),
+    "losses_db": (0.0, 50.0, "dB"),
+    "integration_gain_db": (0.0, 70.0, "dB"),
+    "bandwidth_hz": (1.0, 2e10, "Hz"),
+}
+
+
+_PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
+
+
+def implausible(parameters: Any) -> list[str]:
+    """Say which values of a link budget no radar has, by their own names."""
+    found = []
+    for key, (low, high, unit) in _RANGES.items():
+        value = getattr(parameters, key)
+        if value is None or low <= value <= high:
+            continue
+        text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
+        found.append(text + _other_unit(value, low, high, unit))
+    return found
+
+
+def _other_unit(value: float, low: float, high: float, unit: str) -> str:
+    """Name a multiple of the unit in which the number would be plausible."""
+    if unit == "dB":
+        return ""
+    for factor in (1e9, 1e6, 1e3, 1e-3, 1e-6):
+        # Amid the range, not just inside it.
+        if value > 0 and 10.0 * low <= value * factor <= high:
+            return f" (is it {value:g} {_PREFIXES[factor]}{unit}, {value * factor:g} {unit}?)"
+    return ""

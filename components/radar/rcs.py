@@ -1,12 +1,16 @@
-"""The radar cross-section: constant, fluctuating, or from a table over aspect."""
+"""The radar cross-section: its mean over aspect, its fluctuation, and how long that lasts."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.aircraft.aircraft import Aircraft
+from components.aircraft.known_targets import known_targets
 from components.arguments.checks import (
     broadcast_flat,
     checked_model,
@@ -15,38 +19,23 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
+from components.geometry.attitude import aspect_angles, unit_vector
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Context
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.gauss_markov import GaussMarkov
+from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import first_scan
 
 
 def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> Any:
-    """Return sampled RCS from uniform draws by the inverse of the distribution's function.
+    """Return sampled RCS (m²) from uniform draws by the inverse of the distribution's function.
 
-    Parameters
-    ----------
-    mean_rcs_m2 : array_like, m²
-        Mean RCS, 0 or more.
-    uniforms : array_like
-        Draws in [0, 1), made by the caller. ``swerling1`` and ``swerling3``: one per scan, any
-        shape that broadcasts with the mean. ``swerling2`` and ``swerling4``: one per pulse, with
-        the pulses along the last axis; the mean broadcasts with the axes before it.
-        ``swerling0`` ignores their values.
-    model : str
-        ``swerling0`` (steady; also ``swerling5``), ``swerling1`` and ``swerling2`` (exponential),
-        ``swerling3`` and ``swerling4`` (Erlang of order 2).
-
-    Returns
-    -------
-    array, m²
-        Of the broadcast shape; its mean over the draws is `mean_rcs_m2`. Larger draws give larger
-        RCS.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the shapes do not fit.
-
-    Notes
-    -----
-    Thesis eq. 22 with N = 1 (eq. 23: the exponential in power, Rayleigh in amplitude) and N = 2.
+    Of ``swerling1`` and ``swerling3`` there is one draw per scan; of ``swerling2`` and
+    ``swerling4`` one per pulse, along the last axis, with which the mean broadcasts before it.
+    Larger draws give larger RCS. Thesis eq. 22 with N = 1 (eq. 23: the exponential in power,
+    Rayleigh in amplitude) and N = 2.
     """
     name = checked_model(model)
     mean, draw = not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
@@ -63,3 +52,333 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     from scipy.special import gammaincinv
 
     return unflatten(mean * (0.5 * np.asarray(gammaincinv(2.0, draw))), shape)
+
+
+def scan_rcs(
+    mean_rcs_m2: FloatArray,
+    draw: Callable[[int], FloatArray],
+    *,
+    pulses: int,
+    model: str,
+) -> FloatArray:
+    """Return the RCS that a scan's pulses show on average, sampled, m².
+
+    One draw per scan for ``swerling1`` and ``swerling3``; one per pulse for ``swerling2`` and
+    ``swerling4``, whose RCS are averaged (thesis §4.1.2). `draw` gives uniform numbers in [0, 1) by
+    the number of the pulse. That average is all a square-law detector needs: with a steady echo in
+    each pulse the sum of n pulses depends only on the sum of their SNR. So a steady target's Pd at
+    the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
+    """
+    name = checked_model(model)
+    if name == "swerling0":
+        return np.array(mean_rcs_m2)
+    if name in ("swerling1", "swerling3"):
+        return np.asarray(fluctuating_rcs(mean_rcs_m2, draw(0), name))
+    # Pulse after pulse, so that an element's sum has one order in any array.
+    total = np.zeros_like(mean_rcs_m2)
+    for pulse in range(pulses):
+        total += fluctuating_rcs(mean_rcs_m2, draw(pulse)[:, np.newaxis], name)[:, 0]
+    return total / pulses
+
+
+def mean_rcs_m2(cells: Cells) -> FloatArray:
+    """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
+    rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
+    tables, place = cells.roster.tables("rcs_table")
+    if not tables:
+        return rcs
+    # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
+    # heading.
+    azimuth, elevation = aspect_angles(
+        np.zeros(len(cells)),
+        cells.elevation_rad,
+        cells.relative_heading_rad,
+        cells.target_pitch_rad,
+        cells.target_roll_rad,
+    )
+    which = place[cells.craft]
+    for index, table in enumerate(tables):
+        chosen = np.flatnonzero(which == index)
+        rcs[chosen] = table.rcs_m2(azimuth[chosen], elevation[chosen])
+    return rcs
+
+
+#: Swerling models with the cells that each holds for.
+ModelsOfCells = Callable[[Cells], list[tuple[int, Any]]]
+
+_UNKNOWN = "the targets are not known before the run"
+
+
+class RcsFluctuation(Effect):
+    """Swerling fluctuation I to IV (thesis §4.1.2); without it every target is steady."""
+
+    lockstep = True
+    name = "RCS fluctuation"
+    acts_on = "RCS"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask the radar's ``swerling``, and where it has none each target's."""
+        if block.p.swerling is not None:
+            return Verdict(block.p.swerling not in (0, 5), f"swerling is {block.p.swerling}")
+        if not known_targets(block.context):
+            return Verdict(True, _UNKNOWN)
+        found = [(name, craft) for name, craft in _crafts(block.context) if craft.swerling % 5]
+        if not found:
+            return Verdict(False, "every target has swerling 0 or 5")
+        return Verdict(True, f"{_first(found)} swerling {found[0][1].swerling}{_more(found)}")
+
+    def build(self, block: Any) -> ModelsOfCells:
+        """Return what tells each cell's fluctuation model."""
+        return models_of(block.p.swerling)
+
+
+class AspectRcs(Effect):
+    """Mean RCS from a table over the direction from which the radar sees the aircraft."""
+
+    lockstep = True
+    name = "aspect RCS"
+    acts_on = "mean RCS"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
+        if not block.p.aspect_rcs:
+            return Verdict(False, "aspect_rcs is false")
+        if not known_targets(block.context):
+            return Verdict(True, _UNKNOWN)
+        found = [(name, craft) for name, craft in _crafts(block.context) if craft.rcs_table]
+        if not found:
+            return Verdict(False, "no target has an rcs_table")
+        return Verdict(True, f"{_first(found)} an rcs_table{_more(found)}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return each cell's mean RCS; a target without a table has its constant."""
+        return mean_rcs_m2
+
+
+def models_of(swerling: int | None) -> ModelsOfCells:
+    """Return what tells each cell's fluctuation model: one for all, or each target its own.
+
+    It gives pairs of a model (5 written as 0) and the cells that it holds for.
+    """
+    if swerling is not None:
+        return lambda cells: [(swerling % 5, slice(None))]
+
+    def models(cells: Cells) -> list[tuple[int, Any]]:
+        known = cells.roster.swerling_models
+        if len(known) == 1:
+            return [(known[0], slice(None))]
+        of_cell = cells.of_target(cells.roster.swerling)
+        found = [(model, np.flatnonzero(of_cell == model)) for model in known]
+        return [(model, chosen) for model, chosen in found if len(chosen)]
+
+    return models
+
+
+def steady(cells: Cells) -> list[tuple[int, Any]]:
+    """Return the fluctuation model of cells that are all steady."""
+    return [(0, slice(None))]
+
+
+def constant_rcs_m2(cells: Cells) -> FloatArray:
+    """Return each cell's RCS where no target has a table, m²."""
+    rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
+    return rcs
+
+
+def _crafts(context: Context) -> Iterable[tuple[str, Aircraft]]:
+    for roster in known_targets(context):
+        yield from zip(roster.names, roster.aircraft, strict=True)
+
+
+def _first(found: list[tuple[str, Aircraft]]) -> str:
+    return f"target {found[0][0]!r} has"
+
+
+def _more(found: list[tuple[str, Aircraft]]) -> str:
+    return "" if len(found) == 1 else f" (and {len(found) - 1} more like it)"
+
+
+#: Scatterers of an echo whose strengths are fixed, and of one whose strengths change with time.
+#: Gaussian strengths make the power exponential for any number, over targets; over all aspects of
+#: one target it has that target's own mean, which varies by 1 / sqrt(number) (0.6 dB), unless
+#: strengths change.
+FIXED, CHANGING = 48, 8
+
+
+class Scatterers:
+    """Scatterers at fixed places of each target's body, evenly spread over a ball of `extent_m`.
+
+    An echo that goes to a scatterer at r and back has the phase 4π r·u / λ for the direction u to
+    the radar. The sum of many with complex Gaussian strengths is a complex Gaussian amplitude; over
+    targets its correlation between two aspects Δ apart is that of the ball, 3 (sin x - x cos x) /
+    x³ with x = 2π Δ extent / λ: half of it is left at Δ = 0.40 λ / extent, nothing at 0.72 λ /
+    extent. For the usual estimate λ / (2 extent): D. K. Barton, *Modern Radar System Analysis*,
+    1988, section 2.4; M. I. Skolnik, *Introduction to Radar Systems*, 3rd ed., section 2.8.
+    """
+
+    def __init__(
+        self, stream: Stream, extent_m: float, wavelength_m: float, count: int = FIXED
+    ) -> None:
+        self._stream, self._count = stream, count
+        self._reach = 2.0 * math.pi * extent_m / wavelength_m
+
+    def echo(
+        self,
+        keys: Any,
+        aspect: tuple[FloatArray, FloatArray, FloatArray],
+        which: int,
+        strengths: Callable[[int], tuple[FloatArray, FloatArray]] | None = None,
+        replica: IntArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return real and imaginary part of the amplitude of echoes, each of variance 1.
+
+        `aspect` is the unit vector to the radar in the target's body axes, `which` the number of a
+        target's independent echo, and `strengths` gives standard normal numbers by a scatterer's
+        number; by default they are fixed to the target. `replica` says whose the targets are where
+        replicas run in lock step.
+        """
+        whose = np.zeros(len(keys), dtype=np.uint64) if replica is None else replica
+        pairs = np.stack([keys, whose.astype(np.uint64)])
+        (targets, runs), of_target = np.unique(pairs, axis=1, return_inverse=True)
+        of_target = of_target.reshape(-1)
+        begin = runs.astype(np.int64) * first_scan(1)
+        real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
+        for number in range(which * self._count, (which + 1) * self._count):
+            numbers = begin + number
+            place = self._places(targets, numbers)
+            # One after the other, so that an element's sum has one order in any array.
+            phase = np.zeros(len(keys))
+            for along, component in zip(place, aspect, strict=True):
+                phase += along[of_target] * component
+            if strengths is None:
+                normal = (self._stream.normal(targets, numbers, draw) for draw in (2, 3))
+                a, b = (value[of_target] for value in normal)
+            else:
+                a, b = strengths(number)
+            cosine, sine = np.cos(phase), np.sin(phase)
+            real += a * cosine - b * sine
+            imaginary += a * sine + b * cosine
+        scale = 1.0 / math.sqrt(self._count)
+        return scale * real, scale * imaginary
+
+    def _places(self, targets: Any, numbers: IntArray) -> list[FloatArray]:
+        """Return where a scatterer is along each axis, as phase per unit of aspect."""
+        # One draw number is two uniforms (`Stream.uniform`), so 0 and 1 are the first of them.
+        out, up, around = (self._stream.uniform(targets, numbers, draw) for draw in (0, 1, 2))
+        radius = self._reach * np.cbrt(out)
+        z = 2.0 * up - 1.0
+        level = np.sqrt(1.0 - z * z)
+        turn = 2.0 * math.pi * around
+        return [radius * level * np.cos(turn), radius * level * np.sin(turn), radius * z]
+
+
+#: (cells, chosen of them, Swerling model) → power of each echo over its mean.
+Fading = Callable[[Cells, Any, int], FloatArray]
+
+
+def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
+    """Return the power of an echo over its mean from independent standard normal amplitudes.
+
+    Two of them (real and imaginary part) for exponential power (one complex amplitude of many
+    scatterers, Swerling I and II), four for chi-square of 4 degrees of freedom (two such
+    amplitudes, III and IV). Where they are correlated with ρ, the power is with ρ². P. Swerling,
+    "Probability of detection for fluctuating targets", IRE Trans. IT-6(2), 1960.
+    """
+    total = np.zeros_like(amplitudes[0])
+    for part in amplitudes:
+        total += part * part
+    return total / len(amplitudes)
+
+
+class LastingFluctuation(Effect):
+    """Echoes whose complex amplitude lasts: in time, and in the aspect that the radar has.
+
+    With ``fluctuation_correlation_s`` the amplitude of each target is a Gauss-Markov process: its
+    correlation falls as exp(-|dt|/τ), that of the power as exp(-2 |dt|/τ), whenever the radar
+    looks. With ``scintillation_extent_m`` it is that of scatterers on the target's body
+    (`components.radar.rcs`), which changes as the target turns or passes; with both, the
+    correlations multiply. A look is detected with a steady target's Pd at the power it meets; over
+    many looks far apart that is the Swerling model's own Pd. Where pulses are summed, Swerling II
+    and IV change from pulse to pulse and do not last.
+
+    An aspect table's mean is multiplied by it.
+    """
+
+    lockstep = True
+    name = "lasting fluctuation"
+    acts_on = "fading"
+    neutral = False
+    outside_the_proof = "without it every scan draws a fade of its own"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for the two keys, and whether anything fluctuates."""
+        lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
+        if lasts_s is None and extent_m is None:
+            return Verdict(
+                False, "fluctuation_correlation_s and scintillation_extent_m are not given"
+            )
+        fluctuates = RcsFluctuation().verdict(block)
+        if not fluctuates.simulated:
+            return Verdict(False, fluctuates.because)
+        said = []
+        if lasts_s is not None:
+            said.append(
+                f"fluctuation_correlation_s is {lasts_s:g}: the power of looks {lasts_s / 2:g} s "
+                "apart is correlated with 0.368"
+            )
+        if extent_m is not None:
+            apart_deg = np.degrees(0.5 * block.budget.wavelength / extent_m)
+            said.append(
+                f"scintillation_extent_m is {extent_m:g}: aspects {apart_deg:.2g} deg apart fade "
+                "each by itself"
+            )
+        return Verdict(True, "; ".join(said))
+
+    def build(self, block: Any) -> Fading:
+        """Return each echo's power over its mean, at the instant of its look."""
+        lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
+        process = None if lasts_s is None else GaussMarkov(block.stream("fading"), lasts_s)
+        scatterers = None
+        if extent_m is not None:
+            scatterers = Scatterers(
+                block.stream("scatterers"),
+                extent_m,
+                block.budget.wavelength,
+                FIXED if process is None else CHANGING,
+            )
+
+        def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
+            keys = cells.roster.keys_of(cells.target)[chosen]
+            instant_ns, replica = cells.instant_ns[chosen], cells.replica[chosen]
+
+            def pair(number: int) -> tuple[FloatArray, FloatArray]:
+                assert process is not None
+                real, imaginary = (
+                    process(keys, instant_ns, 2 * number + part, replica) for part in (0, 1)
+                )
+                return real, imaginary
+
+            amplitudes: list[FloatArray] = []
+            for which in range(2 if model in (3, 4) else 1):
+                if scatterers is None:
+                    amplitudes += pair(which)
+                    continue
+                aspect = _aspect(cells, chosen)
+                strengths = None if process is None else pair
+                amplitudes += scatterers.echo(keys, aspect, which, strengths, replica)
+            return fading_power(amplitudes)
+
+        return fading
+
+
+def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the unit vector from each target to the radar in the target's body axes."""
+    azimuth, elevation = aspect_angles(
+        np.zeros(len(cells)),
+        cells.elevation_rad,
+        cells.relative_heading_rad,
+        cells.target_pitch_rad,
+        cells.target_roll_rad,
+    )
+    x, y, z = unit_vector(azimuth[chosen], elevation[chosen])
+    return x, y, z

@@ -7,19 +7,24 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.radar.clutter import clutter_detection_probability
-from components.radar.clutter_effects import Clutter, terrain_of
-from components.radar.detection import detection_probability, probability_of_cells
-from components.radar.detection_rung import ExactDetection, picked_method
-from components.radar.fading import Fading, LastingFluctuation
+from components.radar.detection.clutter import clutter_detection_probability
+from components.radar.detection.ladder import ExactDetection, picked_method
+from components.radar.detection.probability import detection_probability, probability_of_cells
+from components.radar.detection.threshold import Crossing
+from components.radar.ground_clutter import Clutter, terrain_of
+from components.radar.measurement import heard, noise_at_targets
 from components.radar.parameters import LinkBudgetParameters
-from components.radar.plausible import noise_at_targets
-from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
-from components.radar.sampled_rcs import scan_rcs
-from components.radar.signal_errors import heard
-from components.radar.threshold import Crossing
+from components.radar.rcs import (
+    Fading,
+    LastingFluctuation,
+    ModelsOfCells,
+    RcsFluctuation,
+    models_of,
+    scan_rcs,
+    steady,
+)
 from components.radar.threshold_radar import LinkBudgetRadar
-from components.radar.weather_effects import WEATHER_EFFECTS
+from components.radar.weather import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
@@ -141,7 +146,7 @@ class SwerlingRadar(LinkBudgetRadar):
     One keyed uniform draw per target and scan decides. With fluctuation 'probability' Pd is that
     of the fluctuating target at its mean SNR; with 'sampled' further keyed draws sample the RCS of
     the scan, and Pd is a steady target's at the SNR it gives. So it is where fluctuation lasts
-    (`components.radar.fading`). Confidence is the SNR (mean, or of the scan) above the SNR at which
+    (`components.radar.rcs`). Confidence is the SNR (mean, or of the scan) above the SNR at which
     that Pd is `reference_pd`, in dB.
 
     The approximations of Shnidman and Albersheim are no choice for `detection`: they hold for part

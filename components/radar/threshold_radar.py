@@ -12,43 +12,40 @@ from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
-from components.radar.aspect_rcs import mean_rcs_m2
-from components.radar.beam_effects import BeamShape, BeamSweep
-from components.radar.cfar_effects import Averaging, CellAveraging
-from components.radar.clutter_alarms import ClutterAlarms
-from components.radar.clutter_effects import (
+from components.radar.beam import BeamShape, BeamSweep, beam_against_gain
+from components.radar.detection.cfar import Averaging, CellAveraging
+from components.radar.detection.ladder import DETECTION, RCS
+from components.radar.detection.probability import detection_probability, required_snr
+from components.radar.detection.threshold import Crossing
+from components.radar.doppler import DopplerFilter
+from components.radar.false_alarms import (
+    Alarms,
+    ClutterAlarms,
+    FalseAlarms,
+    high_false_alarms,
+    unlikely_false_alarms,
+)
+from components.radar.ground_clutter import (
     Clutter,
     Echo,
     GroundClutter,
-    RainClutter,
-    SidelobeClutter,
+    clutter_as_signal,
     terrain_of,
 )
-from components.radar.cued_parameters import dwell_factor
-from components.radar.detection import detection_probability
-from components.radar.doppler_effects import DopplerFilter
-from components.radar.false_alarm_effects import Alarms, FalseAlarms
-from components.radar.field_of_view import cells_of_radar
-from components.radar.ladder import DETECTION, RCS
-from components.radar.measured_strength import MeasuredStrength
-from components.radar.parameters import LinkBudgetParameters, budget_report
-from components.radar.plausible import (
-    beam_against_gain,
-    clutter_as_signal,
-    high_false_alarms,
-    implausible,
+from components.radar.link_budget import implausible
+from components.radar.measurement import MeasuredStrength, heard, signal_variances
+from components.radar.parameters import (
+    LinkBudgetParameters,
+    budget_report,
+    dwell_factor,
     moved_threshold,
-    unlikely_false_alarms,
 )
-from components.radar.radar_block import Radar
-from components.radar.range_effects import BlindRange
-from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
-from components.radar.required_snr import required_snr
-from components.radar.resolution_effects import OneReportByCell
-from components.radar.signal_errors import heard, signal_variances
-from components.radar.threshold import Crossing
-from components.radar.time_effects import TimeBudget, time_report
-from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out, said_of_rain
+from components.radar.radar import Radar
+from components.radar.rain import RainClutter, SidelobeClutter
+from components.radar.rcs import AspectRcs, constant_rcs_m2, mean_rcs_m2
+from components.radar.resolution import OneReportByCell, cells_of_radar
+from components.radar.timing import TimeBudget, time_report
+from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, said_of_rain
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -234,15 +231,7 @@ class LinkBudgetRadar(Radar):
     ) -> Detections:
         """Return a report with what is not there beside, reported as if it were.
 
-        Parameters
-        ----------
-        detections : Detections
-        targets : RelativeTargets
-        rows : (scans,) of int
-            As every report is given them.
-        alarms : Alarms
-        cued : bool, optional
-            Whether only those that are reported inside cue cones are kept, or those outside.
+        `cued` says whether only those inside cue cones are kept, or those outside; None keeps all.
         """
         where, row = dict(alarms.where), alarms.row
         if self.p.measures_range_rate:

@@ -10,8 +10,7 @@ from components.estimation.measurement import axis_in_body
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
-from components.sensor.believed_pose import believed_pose
-from components.sensor.sensor import Sensor
+from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.ports import Input
@@ -51,20 +50,7 @@ class ConesAhead:
         self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
-        """Return which targets lie in a cone at each scan, (scans, targets); None for none at all.
-
-        Parameters
-        ----------
-        targets : RelativeTargets
-        rows : (scans,)
-            Row of `targets` at each scan.
-        wake : Wake
-
-        Raises
-        ------
-        ValueError
-            If the targets came without the ownship's pose.
-        """
+        """Return which targets lie in a cone at each scan, (scans, targets), or None for none."""
         self._cones = None
         held = wake.held(PORT)
         if held is None:
@@ -126,14 +112,7 @@ class ConesAhead:
     def in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
-        """Return which directions in body axes lie in a cone of their scan.
-
-        Parameters
-        ----------
-        row : (n,) of int
-            Which of the scans of the last call.
-        azimuth_rad, elevation_rad : (n,)
-        """
+        """Return which directions in body axes lie in a cone of their row in the last call."""
         inside = np.zeros(len(row), dtype=bool)
         if self._cones is None:
             return inside

@@ -1,24 +1,28 @@
-"""Declaration of targets: after m detections in the last n looks.
+"""Declaration of targets by m detections in n looks: at one target, or at one measured place.
 
 Looks before the first one count as misses.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
-BoolArray = NDArray[np.bool_]
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.geometry.attitude import body_to_ned, unit_vector
+from components.messages.detections import Detections
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.timeline import split_scans
+
+if TYPE_CHECKING:
+    from components.sensor.look import Cells, Look
 
 
 def no_looks_yet(n: int, targets: int) -> BoolArray:
-    """Return the memory before the first look: shape (targets, n - 1), all misses.
-
-    Raises
-    ------
-    ValueError
-        If `n` is not a whole number from 1 on, or `targets` is negative.
-    """
+    """Return the memory before the first look: shape (targets, n - 1), all misses."""
     _checked_rule(1, n)
     if targets < 0:
         raise ValueError(f"targets is {targets}: it must be 0 or more")
@@ -28,26 +32,10 @@ def no_looks_yet(n: int, targets: int) -> BoolArray:
 def declare(detected: ArrayLike, m: int, n: int, memory: BoolArray) -> tuple[BoolArray, BoolArray]:
     """Say at which looks targets are declared, when every target is looked at in every scan.
 
-    Parameters
-    ----------
-    detected : (scans, targets) array_like of bool
-        Whether a target was detected in a scan; scans in order of time.
-    m, n : int
-        A target is declared at a look if m or more of the last n looks (this one included)
-        detected it, 1 <= m <= n.
-    memory : (targets, n - 1) array of bool
-        The looks before, oldest first; `no_looks_yet`, or what the last call returned.
-
-    Returns
-    -------
-    declared : (scans, targets) array of bool
-    memory : (targets, n - 1) array of bool
-        To hand in with the next scans: any division into calls gives the same declarations.
-
-    Raises
-    ------
-    ValueError
-        If m or n is out of range or the shapes do not fit.
+    `detected` is (scans, targets) in order of time. A target is declared at a look if m or more of
+    the last n looks, this one included, detected it. The memory (targets, n - 1), oldest look
+    first, is `no_looks_yet` or what the last call returned beside the declarations: any division
+    into calls gives the same ones.
     """
     looks = np.asarray(detected, dtype=bool)
     if looks.ndim != 2:
@@ -63,26 +51,8 @@ def declare_looks(
 ) -> tuple[BoolArray, BoolArray]:
     """Say at which looks targets are declared, when not every scan looks at every target.
 
-    Only looks count: a scan that did not look at a target neither helps nor ages its detections.
-
-    Parameters
-    ----------
-    target : (looks,) array_like of int
-        Number of the target of each look, 0 to targets - 1.
-    detected : (looks,) array_like of bool
-        Each target's looks in order of time.
-    m, n, memory
-        As for `declare`.
-
-    Returns
-    -------
-    declared : (looks,) array of bool
-    memory : (targets, n - 1) array of bool
-
-    Raises
-    ------
-    ValueError
-        If m or n is out of range, the shapes do not fit or a target is outside the memory.
+    Only looks count, each target's in order of time: a scan that did not look at a target neither
+    helps nor ages its detections. The memory is that of `declare`.
     """
     _checked_rule(m, n)
     past = np.asarray(memory, dtype=bool)
@@ -121,3 +91,266 @@ def _checked_rule(m: int, n: int) -> None:
             raise ValueError(f"{name} is {value!r}: it must be a whole number of 1 or more")
     if m > n:
         raise ValueError(f"m is {m}: it must be at most n, {n}")
+
+
+class DeclarationRule(Effect):
+    """Marks the detections of declared targets; without a rule every detection declares."""
+
+    name = "declaration"
+    acts_on = "declaration"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``declare_m`` and ``declare_n``."""
+        m, n = block.p.declare_m, block.p.declare_n
+        if m is None:
+            return Verdict(False, "declare_m and declare_n are not given")
+        if block.p.declares_by == "place":
+            return Verdict(False, "places are declared, not targets")
+        return Verdict(True, f"declare_m is {m} and declare_n is {n}")
+
+    def build(self, block: Any) -> Declarations:
+        """Return what judges the looks of this sensor; 1 of 1 where it has no rule."""
+        if block.p.declares_by == "place":  # built all the same, it declares whatever is reported
+            return Declarations(1, 1)
+        return Declarations(block.p.declare_m or 1, block.p.declare_n or 1)
+
+
+class Declarations:
+    """Remembers each target's last n looks and when it was first declared.
+
+    A look is a scan that had the target in reach: a scan that skipped it neither helps nor counts
+    as a miss.
+    """
+
+    def __init__(self, m: int, n: int) -> None:
+        self.m, self.n = m, n
+        self._names: tuple[str, ...] = ()
+        #: Of all targets of the first replica, of the second, and so on.
+        self._memory: BoolArray = no_looks_yet(n, 0)
+        self._first_tick: IntArray = np.empty(0, dtype=np.int64)
+        self._first_range_m: FloatArray = np.empty(0)
+
+    def __call__(self, cells: Cells, look: Look) -> Look:
+        """Return the look with a column ``declared``."""
+        self._names = cells.roster.names
+        who = cells.replica * len(self._names) + cells.target
+        replicas = int(cells.replica.max(initial=0)) + 1
+        if len(self._memory) < replicas * len(self._names):
+            self._remember(replicas * len(self._names))
+        declared, self._memory = declare_looks(who, look.detected, self.m, self.n, self._memory)
+        self._note_first(cells, who, np.flatnonzero(declared))
+        if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
+            return look
+        return replace(look, extras={**look.extras, "declared": declared})
+
+    def _remember(self, count: int) -> None:
+        """Remember so many targets."""
+        more = count - len(self._memory)
+        self._memory = np.concatenate([self._memory, no_looks_yet(self.n, more)])
+        self._first_tick = np.append(self._first_tick, np.full(more, -1))
+        self._first_range_m = np.append(self._first_range_m, np.full(more, np.nan))
+
+    def _note_first(self, cells: Cells, who: IntArray, declared: IntArray) -> None:
+        target, place = np.unique(who[declared], return_index=True)
+        new = self._first_tick[target] < 0
+        first = declared[place[new]]
+        self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]
+        self._first_range_m[target[new]] = cells.range_m[first]
+
+    def first(self, ticks_per_s: int) -> dict[str, dict[str, float] | None]:
+        """Return by target when it was first declared and its true range then, or None."""
+        return {
+            name: None if tick < 0 else {"time_s": tick / ticks_per_s, "range_m": range_m}
+            for name, tick, range_m in zip(
+                self._names, self._first_tick.tolist(), self._first_range_m.tolist(), strict=True
+            )
+        }
+
+
+#: How far apart two measurements of one place are taken to lie, in standard deviations.
+GATE_DEVIATIONS = 3.0
+# Pairs that are compared at a time: some 100 MB of intermediate arrays.
+_MOST_PAIRS = 2_000_000
+
+
+@dataclass(frozen=True)
+class SeenPlaces:
+    """Detections as a rule of declaration by place sees them, ascending in scan.
+
+    `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
+    NaN where none is measured, and a variance of NaN counts as 0.
+    """
+
+    scan: IntArray
+    time_s: FloatArray
+    direction: FloatArray
+    range_m: FloatArray
+    angle_variance_rad2: FloatArray
+    range_variance_m2: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.scan)
+
+    def take(self, which: IntArray | BoolArray) -> SeenPlaces:
+        """Return some of them."""
+        return SeenPlaces(*(values[which] for values in vars(self).values()))
+
+    def then(self, later: SeenPlaces) -> SeenPlaces:
+        """Return these and later ones."""
+        both = zip(vars(self).values(), vars(later).values(), strict=True)
+        return SeenPlaces(*(np.concatenate(pair) for pair in both))
+
+
+def scans_with_company(
+    places: SeenPlaces, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
+) -> IntArray:
+    """Return in how many of the last n scans, its own included, there was a detection at its place.
+
+    Of the entries that are `asked` about, 1 to n each. Two detections have one place where
+    direction and, if both have one, range differ by no more than a target may have moved between
+    them (`speed_m_s` along the line of sight, `rate_rad_s` across it), and three standard
+    deviations of their difference.
+    """
+    count = np.ones(len(asked), dtype=np.int64)
+    if len(places) == 0:
+        return count
+    for lag in range(1, n):
+        wanted = places.scan[asked] - lag
+        first = np.searchsorted(places.scan, wanted, side="left")
+        number = np.searchsorted(places.scan, wanted, side="right") - first
+        start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
+        while start < len(asked):
+            part = slice(start, start + most)
+            start += most
+            here = np.repeat(np.arange(len(asked))[part], number[part])
+            place = np.cumsum(number[part]) - number[part]
+            there = np.arange(len(here)) + np.repeat(first[part] - place, number[part])
+            near = _near(places, asked[here], there, speed_m_s, rate_rad_s)
+            count += np.bincount(here[near], minlength=len(asked)) > 0
+    return count
+
+
+def _near(
+    places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
+) -> BoolArray:
+    """Say which pairs of entries have one place."""
+    apart_s = np.abs(places.time_s[one] - places.time_s[other])
+    variance = np.nan_to_num(places.range_variance_m2)
+    gate_m = speed_m_s * apart_s + GATE_DEVIATIONS * np.sqrt(variance[one] + variance[other])
+    # Where either has no range the difference is NaN, and the gate is open.
+    near: BoolArray = ~(np.abs(places.range_m[one] - places.range_m[other]) > gate_m)
+    near_ones = np.flatnonzero(near)
+    one, other = one[near_ones], other[near_ones]
+    variance = np.nan_to_num(places.angle_variance_rad2)
+    gate_rad = rate_rad_s * apart_s[near_ones]
+    gate_rad += GATE_DEVIATIONS * np.sqrt(variance[one] + variance[other])
+    chord = np.linalg.norm(places.direction[one] - places.direction[other], axis=-1)
+    near[near_ones] = chord <= 2.0 * np.sin(np.minimum(0.5 * gate_rad, 0.5 * np.pi))
+    return near
+
+
+class DeclarationByPlace(Effect):
+    """Marks detections whose place had others in m of the last n scans, targets or false alarms.
+
+    Nothing but measured values decides; places are compared in north-east-down by what the
+    ownship believes of its attitude, so that its own turns move nothing.
+    """
+
+    name = "declaration by place"
+    acts_on = "report"
+    lockstep = True
+    neutral = False
+    outside_the_proof = "without it whatever is reported is declared"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``declare_m``, ``declare_n`` and ``declare_by``."""
+        p = block.p
+        if p.declare_m is None:
+            return Verdict(False, "declare_m and declare_n are not given")
+        because = "the sensor has false alarms, and declare_by is not 'target'"
+        if p.declare_by is not None:
+            because = f"declare_by is '{p.declare_by}'"
+        elif p.declares_by == "target":
+            because = "without false alarms all that is detected are targets"
+        return Verdict(p.declares_by == "place", because)
+
+    def build(self, block: Any) -> DeclaredPlaces:
+        """Return what judges the reports of this sensor."""
+        return DeclaredPlaces(block)
+
+
+class DeclaredPlaces:
+    """Remembers the last scans' detections, and when each target was first declared."""
+
+    def __init__(self, block: Any) -> None:
+        p = block.p
+        self.m, self.n = p.declare_m, p.declare_n
+        self._speed_m_s = p.declare_speed_m_s
+        self._rate_rad_s = np.radians(p.declare_rate_deg_s)
+        self._block = block
+        self._ticks_per_s = block.context.ticks_per_s
+        self._memory: SeenPlaces | None = None
+        self._first: dict[str, tuple[int, float]] = {}
+        self._names: tuple[str, ...] = ()
+
+    def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
+        """Return the report with a column ``declared``."""
+        new = self._places(detections)
+        known, asked = new, np.arange(len(new))
+        if self._memory is not None:
+            known = self._memory.then(new)
+            order = np.argsort(known.scan, kind="stable")  # replicas come back one after the other
+            known, asked = known.take(order), np.flatnonzero(order >= len(self._memory))
+        company = scans_with_company(
+            known, asked, self.n, speed_m_s=self._speed_m_s, rate_rad_s=self._rate_rad_s
+        )
+        declared = company >= self.m
+        if len(detections):
+            self._memory = known.take(known.scan > self._last_scans(detections, known) - self.n + 1)
+        if not self._block.span_ticks:
+            self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
+        return replace(detections, extras={**detections.extras, "declared": declared})
+
+    def _last_scans(self, detections: Detections, known: SeenPlaces) -> IntArray:
+        """Return the last scan of each one's replica, its own where this report has none of it."""
+        replica, _ = split_scans(detections.scan)
+        place = np.searchsorted(replica, split_scans(known.scan)[0], side="right") - 1
+        last = detections.scan[np.maximum(place, 0)]
+        return np.where(split_scans(last)[0] == split_scans(known.scan)[0], last, known.scan)
+
+    def _places(self, detections: Detections) -> SeenPlaces:
+        counts = np.diff(detections.offsets)
+        direction = unit_vector(detections.azimuth_rad, detections.elevation_rad)
+        own = detections.pose_columns()
+        if own:
+            turned = (own[f"own_{name}_rad"] for name in ("heading", "pitch", "roll"))
+            direction = body_to_ned(*direction, *turned)
+        level = np.cos(detections.elevation_rad)
+        measured, span = detections.measured_ticks(), self._block.span_ticks
+        return SeenPlaces(
+            scan=np.repeat(detections.scan, counts),
+            time_s=(measured % span if span else measured) / self._ticks_per_s,
+            direction=np.stack(direction, axis=-1),
+            range_m=detections.range_m,
+            angle_variance_rad2=detections.azimuth_variance_rad2 * level**2
+            + detections.elevation_variance_rad2,
+            range_variance_m2=detections.range_variance_m2,
+        )
+
+    def _note_first(self, detections: Detections, declared: IntArray) -> None:
+        self._names = detections.roster.names
+        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
+        target, place = np.unique(detections.target[declared], return_index=True)
+        for index, entry in zip(target.tolist(), declared[place].tolist(), strict=True):
+            tick = int(detections.tick[row[entry]])
+            self._first.setdefault(
+                self._names[index], (tick, float(detections.true_range_m[entry]))
+            )
+
+    def first(self, ticks_per_s: int) -> dict[str, dict[str, float] | None]:
+        """Return by target when it was first declared and its true range then, or None."""
+        found: dict[str, dict[str, float] | None] = dict.fromkeys(self._names)
+        for name, (tick, range_m) in self._first.items():
+            found[name] = {"time_s": tick / ticks_per_s, "range_m": range_m}
+        return found

@@ -55,12 +55,7 @@ class Glint(Effect):
 
 
 class Wander:
-    """Moves lines of sight, and says by how much they are uncertain.
-
-    Parameters
-    ----------
-    block : Sensor
-    """
+    """Moves lines of sight, and says by how much they are uncertain."""
 
     def __init__(self, block: Any) -> None:
         self._share = block.p.glint_share
@@ -86,15 +81,7 @@ class Wander:
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> Place:
-        """Return where some cells' targets seem to be, in body axes.
-
-        Parameters
-        ----------
-        cells : Cells
-        found : (n,) of int
-        azimuth_rad, elevation_rad, range_m : (n,)
-            Where they are.
-        """
+        """Return where some cells' targets seem to be, in body axes, from where they are."""
         keys = cells.roster.keys_of(cells.target[found])
         when, replica = cells.instant_ns[found], cells.replica[found]
         extent_m = cells.roster.extents_m[cells.craft[found]]
@@ -135,14 +122,8 @@ class Wander:
     ) -> dict[str, FloatArray]:
         """Return what wander adds to the variances, by quantity, in the sensor's axes.
 
-        Parameters
-        ----------
-        values : mapping of (n,)
-            What is measured.
-        signal : mapping of (n,)
-            As in `Look.signal`.
-        pixel_rad : (width, height), or None
-            Of a sensor that measures a target's size instead of its range.
+        `pixel_rad` is the width and height of a pixel of a sensor that measures a target's size
+        instead of its range.
         """
         share2 = self._share**2
         level = np.maximum(np.cos(values["elevation"]), _LEAST_COS)

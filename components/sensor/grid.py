@@ -1,15 +1,216 @@
-"""The grid on which a sensor reports lines of sight, and the variance of rounding to it."""
+"""The grid on which a sensor reports: rounding to it, and the variance that it leaves."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
+from math import copysign, fmod
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from components.geometry import rising_sector
 from components.geometry.angles import TWO_PI, past, wrap_pi
-from components.sensor.resolution import Grid
+from components.geometry.field_of_view import rising_sector
 from dsa_des.arrays.types import FloatArray
+
+# A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
+# times one degree in radians and 110 degrees in radians differ in the last bit.
+_LIMIT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
+
+# From 2^50 steps on the grid is hardly wider than the spacing of doubles, and beyond 1e300 the next
+# grid point may not exist: such values stay as they are.
+_COUNTABLE = 2.0**-50
+_LARGEST = 1e300
+
+# Up to this many values Python's numbers take less time than the calls of NumPy do.
+_FEW = 6
+
+
+def round_to_grid(
+    value: ArrayLike,
+    step: ArrayLike,
+    *,
+    limit_low: ArrayLike | None = None,
+    limit_high: ArrayLike | None = None,
+) -> Any:
+    """Round to the nearest multiple of `step` (0: no rounding), ties to the even multiple.
+
+    The decision is exact for the doubles given: which of two grid points is nearer follows from the
+    exact remainder (fmod), not from value / step, whose own rounding can move a value across a cell
+    edge. Exactly half-way means that 2·value is an odd multiple of `step` as doubles; then the even
+    multiple is taken. The result is that multiple, rounded once. Rounding is symmetric about 0: the
+    grid of -value is minus the grid of value, and 0 is never negative. Values of more than 2^50
+    steps or beyond 1e300 are returned as they are.
+
+    With limits (the edges of the field of view) a grid point beyond a limit is replaced by the
+    outermost one inside, so a report never leaves the field of view; a limit within 4 last places
+    of a grid point counts as that grid point, and the report is then the limit itself if the grid
+    point would stick out. Angles that wrap are the caller's to wrap, before and after. Thesis
+    §3.5.1: the vector is rounded to the nearest point in the resolution grid.
+    """
+    values = _finite("value", value)
+    steps = _finite("step", step)
+    if np.any(steps < 0.0):
+        raise ValueError(f"step is {float(steps.min())}: it must be 0 or more")
+    lows = None if limit_low is None else _finite("limit_low", limit_low)
+    highs = None if limit_high is None else _finite("limit_high", limit_high)
+    if lows is not None and highs is not None and np.any(lows > highs):
+        raise ValueError(
+            f"limit_low is {float(np.max(lows))}: it must not be above limit_high, "
+            f"{float(np.min(highs))}"
+        )
+    result = np.copysign(_nearest(np.abs(values), steps), values)
+    if highs is not None:
+        highest = _outermost(highs, steps)
+        result = np.minimum(result, highest)
+    if lows is not None:
+        lowest = -_outermost(-lows, steps)
+        result = np.maximum(result, lowest)
+        if highs is not None and np.any(lowest > highest):
+            raise ValueError(
+                f"step is {float(np.max(steps))}: at least one of its multiples must lie between "
+                "limit_low and limit_high"
+            )
+    # Adding 0 turns -0 into 0.
+    return (result + 0.0)[()]
+
+
+class Grid:
+    """The grid of one quantity that a sensor reports, made once and used at every scan."""
+
+    def __init__(
+        self, step: float, *, limit_low: float | None = None, limit_high: float | None = None
+    ) -> None:
+        round_to_grid(0.0, step, limit_low=limit_low, limit_high=limit_high)  # checks them
+        self.step = float(step)
+        self._countable = min(self.step, 1e200) / _COUNTABLE
+        low = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
+        high = None if limit_high is None else _outermost(np.float64(limit_high), step)
+        self._lowest = None if low is None else float(low)
+        self._highest = None if high is None else float(high)
+
+    def round(self, values: FloatArray) -> FloatArray:
+        """Round finite values, bit for bit as `round_to_grid` does; they are not checked."""
+        if self.step == 0.0:
+            result = values
+        elif values.size <= _FEW and values.ndim == 1:
+            return np.array(self._round_few(values.tolist()))
+        else:
+            size = np.abs(values)
+            # NaN, and what cannot be counted in steps, take the general way.
+            simple = size.size and float(size.max()) < self._countable
+            result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
+            np.copysign(result, values, out=result)
+        if self._highest is not None:
+            result = np.minimum(result, self._highest)
+        if self._lowest is not None:
+            result = np.maximum(result, self._lowest)
+        return result + 0.0  # adding 0 turns -0 into 0
+
+    def _round_few(self, values: list[float]) -> list[float]:
+        """Round single values with the floating-point steps of `_nearest_countable`."""
+        step, countable, low, high = self.step, self._countable, self._lowest, self._highest
+        results = []
+        for value in values:
+            size = abs(value)
+            if size < countable:
+                rest = fmod(size, step)
+                whole = round((size - rest) / step)
+                other = step - rest
+                if rest > other or (rest == other and whole % 2 == 1):
+                    whole += 1
+                result = whole * step
+            else:
+                result = float(_nearest(np.float64(size), step))
+            result = copysign(result, value)
+            if high is not None and result > high:
+                result = high
+            if low is not None and result < low:
+                result = low
+            results.append(result + 0.0)
+        return results
+
+
+def _finite(name: str, value: ArrayLike) -> Any:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"{name} is {value!r}: it must be a number or an array of numbers"
+        ) from error
+    if not np.isfinite(array).all():
+        bad = array[~np.isfinite(array)].flat[0]
+        raise ValueError(f"{name} is {bad}: it must be finite (no NaN, no infinity)")
+    return array
+
+
+def _whole_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
+    """Split size >= 0 exactly into whole steps and a remainder; say where that makes sense."""
+    counts = (steps > 0.0) & (size * _COUNTABLE < steps) & (size < _LARGEST)
+    spacing = np.where(counts, steps, 1.0)
+    size = np.where(counts, size, 0.0)
+    rest = np.fmod(size, spacing)
+    return counts, np.rint((size - rest) / spacing), rest
+
+
+def _nearest(size: Any, steps: Any) -> Any:
+    """Round size >= 0 to the grid."""
+    counts, whole, rest = _whole_steps(size, steps)
+    return np.where(counts, (whole + _goes_up(whole, rest, steps)) * steps, size)
+
+
+def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
+    """Round sizes >= 0 of which all can be counted in steps."""
+    rest = np.fmod(size, step)
+    whole = size - rest
+    whole /= step
+    np.rint(whole, out=whole)
+    whole += _goes_up(whole, rest, step)
+    whole *= step
+    return whole
+
+
+def _goes_up(whole: Any, rest: Any, steps: Any) -> Any:
+    """Say where the next grid point is nearer; half-way it is the even one."""
+    # rest and steps - rest are compared without rounding: below half a step rest is subtracted
+    # from the larger, above it the subtraction is exact (Sterbenz).
+    other = steps - rest
+    up = rest > other
+    halfway = rest == other
+    if halfway.any():
+        up |= halfway & (np.fmod(whole, 2.0) == 1.0)
+    return up
+
+
+def _outermost(limit: Any, steps: Any) -> Any:
+    """Find the largest grid point that is not above the limit (nor outside by a last place)."""
+    size = np.abs(limit)
+    counts, whole, rest = _whole_steps(size, steps)
+    above = limit >= 0.0
+    # Going down from a negative limit is going up in size.
+    near_next = (steps - rest) <= size * _LIMIT_TOLERANCE
+    near_this = rest <= size * _LIMIT_TOLERANCE
+    inside = np.where(above, whole + near_next, -np.where(near_this, whole, whole + 1.0))
+    return np.where(counts, np.minimum(inside * steps, limit), limit)
+
+
+_SMALLEST = 64
+
+
+def constant_column(value: float, count: int) -> FloatArray:
+    """Return a read-only column that holds one value; others hold it too."""
+    size = _SMALLEST if count <= _SMALLEST else 1 << (count - 1).bit_length()
+    return _whole(value, size)[:count]
+
+
+@lru_cache(maxsize=256)
+def _whole(value: float, size: int) -> FloatArray:
+    column = np.full(size, value)
+    column.flags.writeable = False
+    return column
+
 
 #: Columns of `Detections` that hold variances, by measured quantity.
 VARIANCE_OF = {
@@ -33,15 +234,9 @@ def variance_of_step(step: float) -> float:
 
 
 class SensorGrid:
-    """The grid of what a sensor measures, within its field of view.
+    """The grid of what a sensor measures, within its field of view in its own axes.
 
-    Parameters
-    ----------
-    azimuth_field_rad, elevation_field_rad : (first, last)
-        Field of view in the sensor's axes, azimuth clockwise from the first.
-    steps : mapping
-        Of ``azimuth`` and ``elevation`` (rad), and of ``range`` (m) and ``range_rate`` (m/s) where
-        they are measured.
+    Steps of azimuth and elevation are in rad, those of range in m and of range rate in m/s.
     """
 
     def __init__(
@@ -61,13 +256,7 @@ class SensorGrid:
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight to the grid and the field of view (thesis §3.5.1).
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : arrays
-            Range is NaN where none is measured.
-        """
+        """Round a line of sight to the grid and the field of view (§3.5.1); range may be NaN."""
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:

@@ -46,21 +46,10 @@ def over_cells(
     *,
     out_of_range: float = np.nan,
 ) -> dict[str, FloatArray]:
-    """Return what a function of cells gives at every (scan, target).
+    """Return what a function of cells gives by name at every (scan, target).
 
-    Parameters
-    ----------
-    sensor : Sensor
-    wake : Wake
-    values : callable
-        From cells to arrays by name.
-    out_of_range : float
-        Value where the target was not looked at because it is too far away.
-
-    Returns
-    -------
-    dict of (scans, targets) arrays
-        NaN where the target was not looked at for any other reason.
+    `out_of_range` where the target was not looked at because it is too far away, NaN where it was
+    not for any other reason.
     """
     held = wake.held("targets")
     if held is None:

@@ -1,24 +1,77 @@
-"""Errors of measured values as an effect: stated ones, and those that follow from the signal."""
+"""Errors of measured values: a bias, a part that lasts, one new at every look, and the signal's."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart
-from components.sensor.constant_columns import constant_column
-from components.sensor.error_parameters import StatedError
-from components.sensor.grid import VARIANCE_OF, variance_of_step
+from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_of_step
 from components.sensor.look import Cells, Look
-from components.sensor.quantity_error import QuantityError, mean_square
-from components.sensor.resolution import Grid
+from components.sensor.parameters import StatedError
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.recorded_columns import nothing_in
+from dsa_des.time.gauss_markov import GaussMarkov
+from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import first_scan
+
+_NOBODY = np.uint64(0)
+_OWN, _OF_SIGNAL = 0, 1
+
+
+def mean_square(stated: StatedError, drawn_bias: bool) -> float:
+    """Return the mean square of what is stated, over all runs where the bias is drawn."""
+    return stated.deviation**2 + stated.bias**2 / (3.0 if drawn_bias else 1.0)
+
+
+class QuantityError:
+    """Draws the errors of one quantity, in its own unit.
+
+    A drawn bias is uniform between minus and plus the stated one, once for each run.
+    """
+
+    def __init__(
+        self, stated: StatedError, *, drawn_bias: bool, stream: Callable[[str], Stream], name: str
+    ) -> None:
+        self._deviation, self._bias, self._drawn = stated.deviation, stated.bias, drawn_bias
+        self._biases, self._looks = stream(f"bias of {name}"), stream(f"error of {name}")
+        self._lasting: GaussMarkov | None = None
+        if stated.correlation_time_s is not None:
+            lasting = stream(f"lasting error of {name}")
+            self._lasting = GaussMarkov(lasting, stated.correlation_time_s)
+
+    def __call__(
+        self,
+        keys: npt.ArrayLike,
+        scan: IntArray,
+        instant_ns: IntArray,
+        replica: IntArray,
+        variance: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the errors of looks; `variance` is of what the signal adds at each."""
+        error = self._bias_of(replica) if self._bias else np.zeros(len(scan))
+        if self._lasting is not None:
+            error = error + self._deviation * self._lasting(keys, instant_ns, replica=replica)
+        elif self._deviation:
+            error = error + self._deviation * self._looks.normal(keys, scan, _OWN)
+        if variance is not None:
+            error = error + np.sqrt(variance) * self._looks.normal(keys, scan, _OF_SIGNAL)
+        return error
+
+    def _bias_of(self, replica: IntArray) -> FloatArray:
+        if not self._drawn:
+            return np.full(len(replica), self._bias)
+        runs, place = np.unique(replica, return_inverse=True)
+        begin = runs * first_scan(1)
+        drawn = self._biases.uniform(np.full(len(runs), _NOBODY), begin)
+        return (self._bias * (2.0 * drawn - 1.0))[place]
+
 
 # A range that comes out below this, a millimetre, is no range.
 _NEAREST_M = 1e-3
@@ -46,12 +99,7 @@ class MeasurementErrors(Effect):
 
 
 class Erring:
-    """Measures with errors; called in place of the sensor's grid.
-
-    Parameters
-    ----------
-    block : Sensor
-    """
+    """Measures with errors; called in place of the sensor's grid."""
 
     def __init__(self, block: Any) -> None:
         p = block.p
@@ -74,16 +122,9 @@ class Erring:
     def __call__(
         self, cells: Cells, found: IntArray, look: Look, true: Mapping[str, FloatArray]
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-        """Return what is measured of some cells, and its variances by column.
+        """Return what is measured of some cells (`found`), and its variances by column.
 
-        Parameters
-        ----------
-        cells : Cells
-        found : (n,) of int
-            Those that are detected.
-        look : Look
-        true : mapping of (n,)
-            The truth by quantity, in the sensor's axes.
+        `true` is the truth by quantity, in the sensor's axes.
         """
         signal = {name: all_[found] for name, all_ in look.signal.items()}
         of_signal = self._of_signal(signal)
@@ -137,10 +178,7 @@ class Erring:
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Return how something that is not there is reported: as what is there would be.
 
-        Parameters
-        ----------
-        where, signal : mappings of (n,)
-        drawn : (keys, scan, instant_ns, replica) or None
+        `drawn` holds keys, scan, instant and replica by which errors are drawn, or is None.
         """
         of_signal = self._of_signal(signal)
         if drawn is not None:
@@ -201,28 +239,14 @@ class Erring:
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return the variances that all detections of a sensor share, by column; none by signal.
-
-    Parameters
-    ----------
-    p : ErrorParameters
-    steps : mapping
-        Grid step of each measured quantity.
-    """
+    """Return the variances that all detections of a sensor share, by column; none by signal."""
     if p.errors == "signal":
         return {}
     return {VARIANCE_OF[name]: v for name, v in _mean_squares(p, _steps(p, steps)).items()}
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
-    """Return what of a sensor's errors lasts from look to look, by quantity.
-
-    Parameters
-    ----------
-    p : ErrorParameters
-    steps : mapping
-        Grid step of each measured quantity.
-    """
+    """Return what of a sensor's errors lasts from look to look, by quantity."""
     found = {}
     for name, step in _steps(p, steps).items():
         stated = _stated(p, name)

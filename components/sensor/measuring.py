@@ -6,8 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from components.messages.reach import Reach
-from components.sensor.constant_columns import constant_column
-from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
+from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -20,12 +19,7 @@ Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
 
 
 class Measuring(Component):
-    """A block that measures where targets are, in axes and on a grid of its own.
-
-    Parameters
-    ----------
-    parameters : SensorParameters
-    """
+    """A block that measures where targets are, in axes and on a grid of its own."""
 
     #: Whether detections carry a range.
     measures_range = False
@@ -63,13 +57,7 @@ class Measuring(Component):
     def measure(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : arrays
-            Range is NaN when the sensor measures none.
-        """
+        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1)."""
         return self.grid.round(azimuth_rad, elevation_rad, range_m)
 
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
@@ -77,13 +65,7 @@ class Measuring(Component):
         return None
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return what signals add to the variances, by quantity, in the sensor's axes.
-
-        Parameters
-        ----------
-        signal : mapping of (n,)
-            As in `Look.signal`.
-        """
+        """Return what `Look.signal` adds to the variances, by quantity, in the sensor's axes."""
         raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
 
     @property
@@ -124,24 +106,12 @@ class Measuring(Component):
         signal: Mapping[str, FloatArray],
         drawn: Any = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return how something that is not there is reported, as if it were.
+        """Return how something that is not there is reported, in body axes, as if it were.
 
-        Parameters
-        ----------
-        where : mapping of (n,)
-            By quantity, in the sensor's axes.
-        signal : mapping of (n,)
-            As in `Look.signal`.
-        drawn : (keys, scan, instant_ns, replica), optional
-            Arrays (n,) by which errors are drawn, as a target's are: without them a place by the
-            edge of the field of view would never be reported beyond it.
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : (n,) arrays
-            In body axes.
-        measured : dict of (n,) arrays
-            The other measured columns of `Detections`.
+        `where` is its place by quantity in the sensor's axes, `signal` as in `Look.signal`. `drawn`
+        holds keys, scan, instant and replica by which errors are drawn, as a target's are: without
+        them a place by the edge of the field of view would never be reported beyond it. The last
+        value holds the other measured columns of `Detections`.
         """
         if self._erring:
             return self._in_body(*self._erring[0].of_noise(where, signal, drawn))

@@ -56,11 +56,8 @@ class BodyAxes:
 class MountedAxes(BodyAxes):
     """The axes of a sensor that is turned against the ownship's body axes.
 
-    Parameters
-    ----------
-    true_rad, believed_rad : (azimuth, elevation, roll)
-        Rotation from body axes to the sensor's, about z, y and x in that order: as it is, and as
-        the conversion of its measurements believes it to be.
+    Rotations (azimuth, elevation, roll) from body axes to the sensor's, about z, y and x in that
+    order: as it is, and as the conversion of its measurements believes it to be.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearised
-from components.messages.detections import SensorOffer
+from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
@@ -208,9 +208,9 @@ class StoneSoupTracker(Component):
         self._origin: FloatArray | None = None
         self._newest = -1
         self._count = LookCount()
-        self._wait_ticks = int(
-            latest_s(self._offers(), self.context.producers) * self.context.ticks_per_s
-        )
+        producers = self.context.producers
+        wait_s = latest_s(sensor_offers(producers), producers)
+        self._wait_ticks = int(wait_s * self.context.ticks_per_s)
         self._masks: dict[str, int] = {}
         self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
         self._repeatable = Repeatable(
@@ -221,7 +221,7 @@ class StoneSoupTracker(Component):
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
         said = []
-        for name, offer in sorted(self._offers().items()):
+        for name, offer in sorted(sensor_offers(self.context.producers).items()):
             lasting = offer.lasting if isinstance(offer, SensorOffer) else None
             if lasting is None or lasting:
                 what = (
@@ -232,13 +232,6 @@ class StoneSoupTracker(Component):
                 said.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
                              "too sure where errors are the same again")  # fmt: skip
         return super().warnings() + said
-
-    def _offers(self) -> dict[str, Any]:
-        offers: dict[str, Any] = {}
-        for producer in self.context.producers:
-            if isinstance(producer.offer, dict):
-                offers |= producer.offer
-        return offers
 
     def _built(self) -> Any:
         name = self.p.builder

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
+from components.radar.detection import required_snr
 from components.radar.link_budget import LinkBudget, with_bandwidth
-from components.radar.required_snr import required_snr
 from components.radar.swerling import SwerlingParameters
 from components.thesis.drawing import BLUE, GREY, ORANGE, legend_below, panels
 from components.thesis.radar import CLASSES, pd_at

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.rcs_table import dbsm_to_m2
-from components.radar.detection import detection_probability
-from components.radar.detection_table import detection_table
+from components.aircraft.aspect_tables import dbsm_to_m2
+from components.radar.detection import detection_probability, required_snr
+from components.radar.detection.approximations import detection_table
 from components.radar.link_budget import LinkBudget, detection_range
-from components.radar.required_snr import required_snr
 from components.radar.swerling import SwerlingParameters
 from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, legend_below, panels
 from components.thesis.rows import Cells, Made, Printed, Row, calibrated, predicted

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.arguments.checks import FloatArray
 from components.optical.silhouette import visible_area
 from dsa_des.errors import OutputError, UsageError
@@ -295,7 +295,7 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
         models[name] = _silhouette(model=name, **areas)
     references: dict[str, Silhouette] = {}
     if options.reference is not None:
-        from components.aircraft.silhouette_table import read_aspect_table
+        from components.aircraft.aspect_tables import read_aspect_table
 
         try:
             table = read_aspect_table(options.reference)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from components.estimation.motion import ConstantVelocity
-from components.messages.detections import SensorOffer
+from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_tracks import (
@@ -147,7 +147,7 @@ class CovarianceIntersection(Component):
     def setup(self) -> None:
         """Start with no tracks, and learn which trackers send them."""
         self.trackers = tuple(sorted(producer.block for producer in self.context.producers))
-        offers = self._offers()
+        offers = sensor_offers(self.context.producers)
         ranged = {n for n, o in offers.items() if isinstance(o, SensorOffer) and o.measures_range}
         self.sensors = tuple(sorted(offers, key=lambda name: (name not in ranged, name)))
         self._rules = MatchRules(
@@ -163,16 +163,9 @@ class CovarianceIntersection(Component):
         self._local = LocalTracks.none()
         self._reported = no_fused_tracks()
 
-    def _offers(self) -> dict[str, Any]:
-        offers: dict[str, Any] = {}
-        for producer in self.context.producers:
-            if isinstance(producer.offer, dict):
-                offers |= producer.offer
-        return offers
-
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name."""
-        return self._offers()
+        return sensor_offers(self.context.producers)
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what the trackers report, instant by instant, and report the fused tracks."""

@@ -9,7 +9,7 @@ from components.estimation.batched import selected
 from components.estimation.estimator import Estimator, ExtendedKalmanFilter
 from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
-from components.messages.detections import SensorOffer
+from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
@@ -77,12 +77,13 @@ class Tracker(Component):
 
     def setup(self) -> None:
         """Start with no tracks."""
-        if len(self._offers()) > MOST_SENSORS:
+        offers = sensor_offers(self.context.producers)
+        if len(offers) > MOST_SENSORS:
             raise ValueError(
-                f"a tracker takes at most {MOST_SENSORS} sensors, and {len(self._offers())} lead "
-                "to it: let several trackers share them"
+                f"a tracker takes at most {MOST_SENSORS} sensors, and {len(offers)} lead to it: "
+                "let several trackers share them"
             )
-        for name, offer in sorted(self._offers().items()):
+        for name, offer in sorted(offers.items()):
             for column, key in _EXACT.items():
                 if isinstance(offer, SensorOffer) and getattr(offer, column) == 0.0:
                     quantity = key.rpartition("_")[0].replace("_resolution", "")
@@ -101,7 +102,7 @@ class Tracker(Component):
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
-        self._remembers = may_come_late(self._offers(), self.context.producers)
+        self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
 
     def goes_side_by_side(self) -> bool:
@@ -111,16 +112,18 @@ class Tracker(Component):
     def _lag_s(self) -> Fraction:
         if self.p.lag_s is not None:
             return Fraction(self.p.lag_s)
-        return max(Fraction(1), latest_s(self._offers(), self.context.producers))
+        producers = self.context.producers
+        return max(Fraction(1), latest_s(sensor_offers(producers), producers))
 
     def warnings(self) -> list[str]:
         """Say whose looks will be left out as too late, and how many."""
         lag_s, why = self._lag_s(), f"lag_s is {float(self._lag_s()):g}"
         if self.p.late == "drop":
             lag_s, why = Fraction(0), "late is 'drop'"
-        shares = left_out(self._offers(), lag_s, self.context.duration_s)
+        offers = sensor_offers(self.context.producers)
+        shares = left_out(offers, lag_s, self.context.duration_s)
         found = [warning(n, share, why) for n, share in shares.items()]
-        for name, offer in sorted(self._offers().items()):
+        for name, offer in sorted(offers.items()):
             if not isinstance(offer, SensorOffer) or offer.lasting is None:
                 found.append(
                     f"{name} does not say what of its errors lasts from look to look "
@@ -129,20 +132,13 @@ class Tracker(Component):
                 )
         return super().warnings() + found
 
-    def _offers(self) -> dict[str, Any]:
-        offers: dict[str, Any] = {}
-        for producer in self.context.producers:
-            if isinstance(producer.offer, dict):
-                offers |= producer.offer
-        return offers
-
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name."""
-        return self._offers()
+        return sensor_offers(self.context.producers)
 
     def left_out(self) -> list[str]:
         """Say whose range rates are not used, and why."""
-        offers = self._offers()
+        offers = sensor_offers(self.context.producers)
         return [
             f"range rates of {name}: {why}"
             for name, offer in sorted(offers.items())
@@ -162,8 +158,9 @@ class Tracker(Component):
         if self.rules is None or fused.sensors != self._sensors:
             self._sensors = fused.sensors
             self.rules = TrackerRules.of(
-                self.p, self._estimator, self._offers(), fused.sensors, self.context.ticks_per_s
-            )
+                self.p, self._estimator, sensor_offers(self.context.producers), fused.sensors,
+                self.context.ticks_per_s,
+            )  # fmt: skip
             self._store = self._no_tracks(len(fused.sensors))
         came = scans_of(fused)
         self._early += int((came.tick > wake.ticks[came.row]).sum())

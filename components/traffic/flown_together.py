@@ -7,66 +7,167 @@ through: those of the first replica, then those of the second, and so on.
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any, Self, cast
 
 import numpy as np
 
-from components.aircraft.aircraft import Roster
+from components.aircraft.aircraft import Aircraft, Roster, joint_roster
+from components.flights.bounds import intervals_present_s, max_speeds_mps
+from components.flights.culling import (
+    NearIntervals,
+    closing_speeds_mps,
+    epochs_of,
+    near_intervals,
+    within_of,
+)
+from components.flights.fleet import fleet_of
+from components.flights.many_flights import Fleet, OwnFlights
 from components.geometry.ellipsoid import line_of_sight
+from components.geometry.state import TrajectoryState
+from components.messages.known_flights import flat
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
-from components.traffic.near_intervals import NearIntervals, near_intervals
-from components.traffic.own_flights import OwnFlights
-from components.traffic.row_flights import AskedFlights, RowFlights
-from components.traffic.steered_culling import closing_speeds_mps, epochs_of, within_of
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.replica_runs import ReplicaRuns
 from dsa_des.block.wake import Wake
 
-_TOLD = Manoeuvre._fields
+
+class RowFlights:
+    """The flights of all aircraft as each row of a message knows them, for the truth.
+
+    As `components.messages.known_flights.KnownFlights` of `TrueFlights`: `known` says how many
+    manoeuvres of its replica's ownship each row knows.
+    """
+
+    def __init__(
+        self, own: OwnFlights, targets: Any, width: int, replica: IntArray, known: IntArray
+    ) -> None:
+        self._own, self._targets, self._width = own, targets, width
+        self._replica, self._known = replica, known
+
+    def __len__(self) -> int:
+        return len(self._replica)
+
+    def __call__(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the ownships' states (rows, 1) and the targets' (rows, n) at times (rows, 1)."""
+        shape = len(time_s), len(columns)
+        target = self._replica[:, np.newaxis] * self._width + columns
+        times = np.repeat(time_s, len(columns), axis=1).reshape(-1)
+        others = self._targets.each(target.reshape(-1), times).reshaped(shape)
+        own = self._own.each(self._replica, time_s.reshape(-1), self._known)
+        return own.reshaped(time_s.shape), others
+
+    def take_rows(self, rows: slice | IntArray) -> Self:
+        """Return the flights of some rows."""
+        found = copy(self)
+        found._replica, found._known = self._replica[rows], self._known[rows]
+        return found
+
+    @classmethod
+    def join_rows(cls, parts: Sequence[Self]) -> Self:
+        """Return the flights of the rows of all parts, in the order given."""
+        found = copy(parts[0])
+        found._replica = np.concatenate([part._replica for part in parts])
+        found._known = np.concatenate([part._known for part in parts])
+        return found
 
 
-class AllFlown:
-    """The flights of all replicas, as arrays.
+class AskedFlights(RowFlights):
+    """The same for who must know other instants, each aircraft at a time of its own.
 
-    Parameters
-    ----------
-    own, targets : Fleet
-        The ownship of each replica, and all targets of the first one, of the second, and so on.
-    own_speed_mps, target_speed_mps : (replicas,) and (replicas * targets,)
-        Largest speeds.
-    own_present_s, target_present_s : (replicas, 2) and (replicas * targets, 2)
-        First and last time at which each may be there.
-    roster : Roster
-        What the targets are.
+    As `components.messages.known_flights.KnownFlights` of a traffic source's flights: targets are
+    there while they are near, and positions are those of the last publication where there is a
+    rate.
     """
 
     def __init__(
         self,
-        own: Any,
-        targets: Any,
-        own_speed_mps: FloatArray,
-        target_speed_mps: FloatArray,
-        own_present_s: FloatArray,
-        target_present_s: FloatArray,
-        roster: Roster,
+        *of_rows: Any,
+        intervals: NearIntervals | None,
+        rates_hz: FloatArray | None,
     ) -> None:
-        self.own, self.targets, self.roster = own, targets, roster
-        self.own_speed_mps, self.target_speed_mps = own_speed_mps, target_speed_mps
-        self.own_present_s, self.target_present_s = own_present_s, target_present_s
+        super().__init__(*of_rows)
+        self._intervals, self._rates_hz = intervals, rates_hz
+        self._seen: tuple[Callable[..., Any], ...] = ()
+
+    def __call__(self, columns: IntArray, time_s: FloatArray) -> Any:
+        """Return what the flights give at times (rows, columns), as each row knows them."""
+        row = np.repeat(np.arange(len(self)), time_s.shape[1])
+        column = np.broadcast_to(columns, time_s.shape).reshape(-1)
+        return self._states(row, column, time_s, 0.0)
+
+    def each(
+        self, row: IntArray, column: IntArray, time_s: FloatArray, ahead_s: FloatArray
+    ) -> Mapping[str, AnyArray]:
+        """Return what is seen of single targets, each as its own row knows it.
+
+        See `KnownFlights.each`.
+        """
+        return flat(self._states(row, column, time_s[np.newaxis], ahead_s))
+
+    def _states(
+        self, row: IntArray, column: IntArray, time_s: FloatArray, ahead_s: FloatArray | float
+    ) -> Any:
+        """Return ownships and targets of rows and columns (n,) at times of as many elements."""
+        replica = self._replica[row]
+        if self._rates_hz is not None:
+            rate = self._rates_hz[replica].reshape(time_s.shape)
+            time_s = np.floor(time_s * rate) / rate
+        time_s = time_s + ahead_s
+        times = time_s.reshape(-1)
+        target = replica * self._width + column
+        others = self._targets.each(target, times)
+        if self._intervals is not None:
+            near = self._intervals.holds(target, times, times)
+            others = replace(others, present=others.present & near)
+        own = self._own.each(replica, times, self._known[row])
+        found: Any = own.reshaped(time_s.shape), others.reshaped(time_s.shape)
+        for seen in self._seen:
+            found = seen(*found)
+        return found
+
+    def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> AskedFlights:
+        """Return the same for who looks at the states through `seen`, which takes both."""
+        found = copy(self)
+        found._seen = (*self._seen, seen)
+        return found
+
+
+_TOLD = Manoeuvre._fields
+
+
+@dataclass(frozen=True)
+class AllFlown:
+    """The flights of all replicas: an ownship each, and the targets of all one after the other."""
+
+    own: Fleet
+    targets: Fleet
+    own_speed_mps: FloatArray
+    target_speed_mps: FloatArray
+    own_present_s: FloatArray
+    target_present_s: FloatArray
+    roster: Roster
+
+    @classmethod
+    def of(
+        cls, fleets: Sequence[Fleet], flights: Sequence[Sequence[Any]], roster: Roster
+    ) -> AllFlown:
+        """Return ownships and targets, as fleets and one by one, with their speeds and times."""
+        (own_fleet, target_fleet), (own, targets) = fleets, flights
+        return cls(
+            own_fleet, target_fleet, max_speeds_mps(own), max_speeds_mps(targets),
+            intervals_present_s(own), intervals_present_s(targets), roster,
+        )  # fmt: skip
 
 
 class FlownTogether:
-    """Handles the wakes of a traffic source for all replicas.
-
-    Parameters
-    ----------
-    face : TrafficSource
-        The source as the first replica has it, set up.
-    flown : AllFlown
-    rates_hz : (replicas,) or None
-        As often positions are published, if not always.
-    """
+    """Handles the wakes of a traffic source for all replicas."""
 
     def __init__(self, face: Any, flown: AllFlown, rates_hz: FloatArray | None) -> None:
         self._flown, self._roster = flown, flown.roster
@@ -164,13 +265,7 @@ class FlownTogether:
         )  # fmt: skip
 
     def _steer(self, wake: Wake, replica: IntArray) -> IntArray:
-        """Let ownships fly what has come for them.
-
-        Returns
-        -------
-        (rows,) of int
-            How many manoeuvres of its ownship each row knows.
-        """
+        """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
             self._told += zip(new.tick.tolist(), manoeuvres, strict=True)
@@ -214,15 +309,7 @@ def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray
 
 
 class _Epochs:
-    """Who may come in reach of an ownship that is steered; see `SteeredCulling`.
-
-    Parameters
-    ----------
-    flights : FlownTogether
-    flown : AllFlown
-    width : int
-    reach_m : float
-    """
+    """Who may come in reach of an ownship that is steered; see `SteeredCulling`."""
 
     def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
         self._flights, self._width = flights, width
@@ -258,3 +345,31 @@ class _Epochs:
         closing = closing_speeds_mps(self._speeds_mps[of], fastest[first][:, np.newaxis])
         near = found <= within_of(closing, self._reach_m, self._epoch_s[of][:, np.newaxis])
         return np.asarray(near[np.cumsum(begins) - 1])
+
+
+def flown_by(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
+    """Return the flights of all replicas, or None where they cannot be put together."""
+    type(face).prepare(replicas.parameters)
+    parameters = getattr(face, "flown_of", None)
+    found: AllFlown | None = None if parameters is None else parameters(replicas.parameters)
+    return _made_one_by_one(face, replicas) if found is None else found
+
+
+def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
+    own, targets = [], []
+    aircraft: list[tuple[str, Aircraft]] = []
+    for number in range(len(replicas)):
+        source = replicas.make(number)
+        own.append(source.own)
+        targets += list(source.targets)
+        aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
+    roster = joint_roster(face.roster, aircraft)
+    if roster is None:
+        return None
+    fleets: list[Fleet] = []
+    for flights in (own, targets):
+        fleet = fleet_of(flights)
+        if fleet is None:
+            return None
+        fleets.append(fleet)
+    return AllFlown.of(fleets, (own, targets), roster)

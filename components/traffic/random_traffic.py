@@ -11,21 +11,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
+from components.flights.fleet import ScriptedFleet
+from components.flights.sample_times import RegularTimes, SampleTimes
+from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
 from components.geometry.ellipsoid import enu_to_geodetic
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.flight_protocols import Trajectory
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.sample_times import (
-    RegularTimes,
-    SampleTimes,
-    regular_count,
-    regular_times_s,
-)
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource
-from components.traffic.straight_flights import Starts, flights_of
 from components.traffic.wind_effect import CrabAngles
-from dsa_des.arrays.types import FloatArray
 from dsa_des.time.randomness import target_keys
 
 
@@ -94,11 +86,6 @@ class RandomTraffic(TrafficSource):
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(name, p.aircraft) for name in names])
-
-    def sample_times_s(self, target: Trajectory) -> FloatArray:
-        """Return a regular grid over the run."""
-        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
-        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

@@ -9,22 +9,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
+from components.flights import legs
+from components.flights.attitude import Wind, ground_speed_mps
+from components.flights.fleet import ScriptedFleet
+from components.flights.sample_times import RegularTimes, SampleTimes
+from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
 from components.geometry.ellipsoid import enu_to_geodetic
-from components.traffic import leg_types
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.flight_protocols import Trajectory
 from components.traffic.flown_together import AllFlown
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.replica_flights import flown
-from components.traffic.sample_times import (
-    RegularTimes,
-    SampleTimes,
-    regular_count,
-    regular_times_s,
-)
 from components.traffic.source import SourceParameters, TrafficSource
-from components.traffic.straight_flights import Starts, flights_of
-from components.traffic.wind import Wind, ground_speed_mps
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
@@ -205,12 +197,8 @@ class ScriptedTraffic(TrafficSource):
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         ownships = flights_of(_starts(own, places, None))
         targets = flights_of(_starts(crafts, _known(crafts, references), None)) if crafts else []
-        return flown(ScriptedFleet(ownships), ScriptedFleet(targets), ownships, targets, roster)
-
-    def sample_times_s(self, target: Trajectory) -> FloatArray:
-        """Return a regular grid over the run."""
-        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
-        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+        fleets = ScriptedFleet(ownships), ScriptedFleet(targets)
+        return AllFlown.of(fleets, (ownships, targets), roster)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""
@@ -218,13 +206,7 @@ class ScriptedTraffic(TrafficSource):
 
 
 def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
-    """Return a flight's ground speed at its start, given or from its airspeed and the wind.
-
-    Raises
-    ------
-    ValueError
-        If no heading keeps its track in this wind, naming the aircraft.
-    """
+    """Return a flight's ground speed at its start, given or from its airspeed and the wind."""
     if flight.airspeed_mps is None:
         return flight.speed_mps
     if wind is None:
@@ -254,9 +236,9 @@ def flight_arguments(
 def _leg(leg: Any) -> Any:
     values = leg.model_dump(exclude={"kind", "points"})
     if leg.kind == "waypoints":
-        points = tuple(leg_types.Waypoint(**point.model_dump()) for point in leg.points)
-        return leg_types.Waypoints(points, **values)
-    return getattr(leg_types, leg.kind.capitalize())(**values)
+        points = tuple(legs.Waypoint(**point.model_dump()) for point in leg.points)
+        return legs.Waypoints(points, **values)
+    return getattr(legs, leg.kind.capitalize())(**values)
 
 
 def _intruders(
@@ -270,13 +252,7 @@ def _intruders(
 
 
 def _known(crafts: Sequence[Intruder], references: FloatArray) -> list[tuple[float, float, float]]:
-    """Return where intruders start, each with its offset from a reference (n, 3) of its own.
-
-    Raises
-    ------
-    ValueError
-        If a start is given in part only, or twice.
-    """
+    """Return where intruders start, each with its offset from a reference (n, 3) of its own."""
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []
     for craft in crafts:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,26 +12,30 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import KnownTraffic
+from components.flights.attitude import Wind, scene_wind
+from components.flights.bounds import (
+    FlightAt,
+    TrafficEnvelope,
+    check_above_terrain,
+    check_on_raster,
+    max_speeds_mps,
+    traffic_envelope,
+)
+from components.flights.closest_approach import (
+    Approaches,
+    censored_approaches,
+    closest_approaches,
+    present_together_s,
+)
+from components.flights.culling import Culling, SteeredCulling
+from components.flights.many_flights import Fleet
+from components.flights.sample_times import SampleTimes
+from components.flights.steered_flight import Trajectory
+from components.geometry.state import TrajectoryState
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates
-from components.traffic.censored import censored_approaches, present_together_s
-from components.traffic.closest_approach import (
-    Approaches,
-    closest_approaches,
-    looked_at_one_by_one,
-)
-from components.traffic.culling import Culling
-from components.traffic.envelope import TrafficEnvelope, traffic_envelope
-from components.traffic.flight_limits import max_speeds_mps
-from components.traffic.flight_protocols import Trajectory
-from components.traffic.flown_together import FlownTogether
-from components.traffic.replica_flights import flown_by
-from components.traffic.sample_times import SampleTimes
-from components.traffic.steered_culling import SteeredCulling
-from components.traffic.steered_ownship import SteeredOwnship
-from components.traffic.terrain_check import FlightOf, check_above_terrain, check_on_raster
-from components.traffic.true_flights import truth_is_recorded
-from components.traffic.wind import Wind, scene_wind
+from components.traffic.flown_together import FlownTogether, flown_by
+from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -105,24 +110,24 @@ class TrafficSource(SteeredOwnship):
 
     def setup(self) -> None:
         """Learn how far sensors look; what stays beyond it is not moved."""
-        self._check_terrain(self.own)
+        self._check_terrain(self.own.at)
         self._all_columns = np.arange(len(self.roster))
         self._crabbing = self.built("attitude")
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
-        self._flights_asked_for = look.lasts_s > 0.0
+        self.flights_asked_for = look.lasts_s > 0.0
         if not self.context.simulate_everything and self.clock_of(self.p) is None:
             self._cull(look)
-        self._says_truth = truth_is_recorded(self.context, len(self.roster))
+        self.says_truth = truth_is_recorded(self.context, len(self.roster))
         self._be_steered()
 
-    def _check_terrain(self, own: Any) -> None:
+    def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
         terrain, end_s = self.context.sections.get("terrain"), float(self.context.duration_s)
         if terrain is not None and terrain.height_m is not None:
-            check_above_terrain(own, terrain.height_m, end_s)
+            check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_on_raster(own, terrain.raster.raster, terrain.raster_offset_m, end_s)
+            check_on_raster(own_at, terrain.raster.raster, terrain.raster_offset_m, end_s)
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where it is known how far sensors look."""
@@ -133,7 +138,7 @@ class TrafficSource(SteeredOwnship):
             self._culling = Culling(
                 self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
             )
-        elif not self._flights_asked_for:
+        elif not self.flights_asked_for:
             speed_mps: float = self.own.max_speed_mps
             self._steered_culling = SteeredCulling(
                 speed_mps, self.targets, self.fleet, look.range_m
@@ -142,16 +147,6 @@ class TrafficSource(SteeredOwnship):
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Do what can be done at once for blocks with these parameters, which will be made."""
-
-    @property
-    def says_truth(self) -> bool:
-        """Whether the truth is recorded."""
-        return self._says_truth
-
-    @property
-    def flights_asked_for(self) -> bool:
-        """Whether blocks ask for flights at other instants."""
-        return self._flights_asked_for
 
     def together(self, replicas: ReplicaRuns) -> FlownTogether | None:
         """Return what flies the flights of all replicas."""
@@ -167,7 +162,7 @@ class TrafficSource(SteeredOwnship):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(replicas)):
-            self._check_terrain(FlightOf(flown.own, number))
+            self._check_terrain(partial(_one_of, flown.own, number))
         rates = [p.update_rate_hz for p in replicas.parameters]
         published = None not in rates
         return FlownTogether(self, flown, np.array(rates, dtype=np.float64) if published else None)
@@ -225,17 +220,12 @@ class TrafficSource(SteeredOwnship):
         """Return what is recorded: the truth where a scene is small, or asks for it."""
         return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
 
-    def sample_times_s(self, target: Trajectory) -> FloatArray:
-        """Return the times at which the source itself knows this target and the ownship, s."""
-        raise TypeError(f"{type(self).__name__} does not say when its samples are")
-
     def sample_times(self) -> list[SampleTimes]:
-        """Return the times of `sample_times_s`, for all targets together.
+        """Return the times at which the source itself knows ownship and targets.
 
-        A source that says it this way is summed up faster, and in little memory however long the
-        run is: a target's times are those of all the items together.
+        A target's times are those of all the items together.
         """
-        return []
+        raise TypeError(f"{type(self).__name__} does not say when its samples are")
 
     def report(self) -> dict[str, Any]:
         """Return the closest approach of every target over the run.
@@ -264,13 +254,10 @@ class TrafficSource(SteeredOwnship):
         }
 
     def _closest_approaches(self, end_s: float) -> Approaches:
-        samples = self.sample_times()
-        if not samples:
-            return looked_at_one_by_one(self.own, self.targets, self.sample_times_s, end_s)
         best = Approaches.none(len(self.targets))
         speeds = max_speeds_mps(self.targets)
         present_s = present_together_s(self.own, self.targets, end_s)
-        for times in samples:
+        for times in self.sample_times():
             closest_approaches(
                 lambda _, time_s: self.own.at(time_s), self.fleet.each, times,
                 closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
@@ -278,16 +265,15 @@ class TrafficSource(SteeredOwnship):
         return best
 
 
+def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
+    """Return the states of one flight of many at times (n,)."""
+    return fleet.each(np.full(len(time_s), aircraft), time_s)
+
+
 def roster_of(
     names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
 ) -> Roster:
-    """Return the roster of named targets: `others` by name, `default` for the rest.
-
-    Raises
-    ------
-    ValueError
-        If `others` names an aircraft that is not a target.
-    """
+    """Return the roster of named targets: `others` by name, `default` for the rest."""
     for name in others:
         if name not in names:
             raise ValueError(f"aircraft.{name}: {what} has no such intruder"

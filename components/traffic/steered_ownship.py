@@ -1,22 +1,66 @@
 """The flights of a traffic source as they are known: its ownship flies what it is told to."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
+from components.flights.culling import Culling
+from components.flights.many_flights import Fleet
+from components.flights.steered_flight import SteeredFlight, Trajectory
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.steering import Manoeuvre, Manoeuvres
-from components.traffic.culling import Culling
-from components.traffic.flight_protocols import Fleet, Trajectory
-from components.traffic.steered_flight import SteeredFlight
-from components.traffic.true_flights import TrueFlights
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, Context
 from dsa_des.block.ports import Input
 from dsa_des.block.wake import Wake
+
+#: The truth is recorded without being asked for where aircraft times seconds, of all runs that are
+#: recorded together, are at most this: some ten thousand rows with the usual sensors.
+SMALL_S = 600.0
+_TABLE = "truth"
+
+
+def truth_is_recorded(context: Context, targets: int) -> bool:
+    """Return whether a scene records where all aircraft are.
+
+    Where tables are chosen, as a study chooses those that its metrics read, that one is among them
+    or it is not made.
+
+    How often sensors look does not count: replicas whose clocks differ record the same tables.
+    """
+    record = context.sections.get("record")
+    asked = "auto" if record is None else record.truth
+    if context.recorded_tables is not None:
+        return asked is not False and _TABLE in context.recorded_tables
+    if asked == "auto":
+        seconds = context.recorded_runs * float(context.duration_s)
+        return (1 + targets) * seconds <= SMALL_S
+    return bool(asked)
+
+
+class TrueFlights:
+    """The ownship's flight, as far as it is known, and those of all targets."""
+
+    def __init__(self, own: Any, fleet: Any, crabbing: Sequence[Any]) -> None:
+        self._own, self._fleet, self._crabbing = own, fleet, crabbing
+
+    def __call__(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the ownship's states (rows, 1) and the targets' (rows, n) at times (rows, 1)."""
+        times = np.repeat(time_s, len(columns), axis=1)
+        each = np.broadcast_to(columns, times.shape).reshape(-1)
+        others = self._fleet.each(each, times.reshape(-1)).reshaped(times.shape)
+        own = self._own.at(time_s.reshape(-1)).reshaped(time_s.shape)
+        for crabbing in self._crabbing:
+            own = crabbing.of_own(self._own, own, time_s)
+            others = crabbing.of_targets(columns, others, times)
+        return own, others
+
 
 _TOLD = Manoeuvre._fields
 
@@ -41,8 +85,8 @@ class SteeredOwnship(Component):
     _crabbing: list[Any]
     _culling: Culling | None = None
     #: Whether blocks ask for flights at other instants, and whether the truth is recorded.
-    _flights_asked_for = False
-    _says_truth = False
+    flights_asked_for = False
+    says_truth = False
 
     def serves_replicas(self) -> bool:
         """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
@@ -75,20 +119,8 @@ class SteeredOwnship(Component):
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
-        Parameters
-        ----------
-        own : Trajectory
-            The ownship's flight, as far as it is known.
-        columns : (targets,) of int
-        time_s : (rows, targets)
-            With an ``update_rate_hz``, the last publication up to then counts.
-        ahead_s : (rows, targets)
-            They are wanted so much later than that.
-
-        Returns
-        -------
-        own, others : TrajectoryState
-            Arrays (rows, targets).
+        With an ``update_rate_hz`` the last publication up to that time counts; they are wanted
+        `ahead_s` later.
         """
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
@@ -106,14 +138,10 @@ class SteeredOwnship(Component):
         return seen, others
 
     def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
-        """Steer the ownship at the times at which manoeuvres have come.
+        """Steer the ownship at the times at which manoeuvres have come; return flights and truth.
 
-        Returns
-        -------
-        flights, truth : KnownFlights or None
-            The flights as they are known at each row, where a block asks for them and where the
-            truth is recorded: a row knows the manoeuvres that have come by its own instant,
-            whatever came later in this wake.
+        A row knows the manoeuvres that have come by its own instant, whatever came later in this
+        wake; None stands for what no block asks for.
         """
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
@@ -130,16 +158,16 @@ class SteeredOwnship(Component):
             known.append(partial(self.flights, self.own))
             true.append(self._true_flights())
         self._flights_now, self._truth_now = known[-1], true[-1]
-        if not self._flights_asked_for and self._truth_now is None:
+        if not self.flights_asked_for and self._truth_now is None:
             return None, None
         # A manoeuvre has come before anything runs at its instant.
         came = np.array([tick for tick, _ in told], dtype=np.int64)
         of_row = np.searchsorted(came, wake.ticks, side="right")
         return (
-            KnownFlights(known, of_row) if self._flights_asked_for else None,
+            KnownFlights(known, of_row) if self.flights_asked_for else None,
             None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
         )
 
     def _true_flights(self) -> TrueFlights | None:
         """Return all flights as they are known now, if the truth is recorded."""
-        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None
+        return TrueFlights(self.own, self.fleet, self._crabbing) if self.says_truth else None

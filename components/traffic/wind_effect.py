@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.attitude import Wind, attitude_in_wind, scene_wind
+from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
+from components.flights.steered_flight import SteeredFlight
 from components.geometry.angles import FloatArray
 from components.geometry.state import TrajectoryState
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.steered_flight import SteeredFlight
-from components.traffic.straight_flights import StraightFlights
-from components.traffic.wind import Wind, attitude_in_wind, scene_wind
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -45,14 +44,7 @@ class CrabAngles(Effect):
 
 
 class Crabbing:
-    """Turns attitudes that follow from paths over the ground into those in wind.
-
-    Parameters
-    ----------
-    wind : Wind
-    targets : sequence of flights
-        All on the roster.
-    """
+    """Turns attitudes that follow from paths over the ground into those in wind."""
 
     def __init__(self, wind: Wind, targets: Sequence[Any]) -> None:
         self._wind, self._targets = wind, targets

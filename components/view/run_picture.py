@@ -12,9 +12,9 @@ import numpy as np
 from components.display.picture import TangentPlane, offset_positions, sights
 from components.display.recorded_run import RecordedTables, read_table
 from components.display.symbols import sensor_marks
+from components.formats.daa_file import read_daa_samples
+from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
-from components.traffic.daa_file import read_daa_samples
-from components.traffic.traffic_file import TrafficFileError
 from components.view.page import RunPicture, page_text
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark

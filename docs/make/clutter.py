@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from components.radar.cfar import cfar_loss_db
-from components.radar.moving_target_filter import MovingTargetFilter
-from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
-from components.radar.volume_clutter import rain_reflectivity_per_m, rain_volume_m3
+from components.radar.detection.cfar import cfar_loss_db
+from components.radar.doppler import MovingTargetFilter
+from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.rain import rain_reflectivity_per_m, rain_volume_m3
 from components.thesis.drawing import BLUE, GREY, PINK, legend_below, panels
 from components.thesis.drawing import RADAR as RADAR_COLOUR
 from dsa_des.files.output_file import write_file

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.checks import FloatArray
-from components.radar.cumulative_detection import first_declared
-from components.radar.detection import detection_probability
+from components.radar.detection import detection_probability, first_declared
 from components.thesis.drawing import BLUE, GREEN, GREY, legend_below, panels
 from dsa_des.library.study import study
 

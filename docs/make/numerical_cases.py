@@ -15,7 +15,7 @@ from components.geometry import (
     sensor_angles,
 )
 from components.high_precision.multiprecision import multiprecision
-from components.sensor.resolution import round_to_grid
+from components.sensor.grid import round_to_grid
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
 
 DIGITS = 12

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from components.traffic.columns import csv_columns, daa_columns
+from components.formats.csv_file import csv_columns
+from components.formats.daa_file import daa_columns
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING

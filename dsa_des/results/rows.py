@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.results.folder import StudyFolder
 from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
 from dsa_des.results.record import CRASHED, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.statistics import (
@@ -26,8 +27,6 @@ from dsa_des.results.statistics import (
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from dsa_des.results.folder import StudyFolder
-
 
 #: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
 _MOST_HELD_BYTES = 2**27
@@ -36,6 +35,8 @@ MOST_FAILED = 50
 _PLACE = ("cell", "replica")
 #: Columns that stand in no statistics.
 _ABOUT = ("status", "error", "command")
+#: Sets that are drawn for a bootstrap interval of a ratio.
+_RESAMPLES = 2000
 
 
 class StoredRows:
@@ -49,7 +50,7 @@ class StoredRows:
         If there are none, or if a part is damaged or of another study.
     """
 
-    def __init__(self, folder: "StudyFolder", before_round: int | None = None) -> None:
+    def __init__(self, folder: StudyFolder, before_round: int | None = None) -> None:
         self._folder, self._before_round = folder, before_round
         schema = folder.record.schema_of_parts()
         self.names = [field.name for field in schema if field.name not in _ABOUT]
@@ -126,20 +127,14 @@ def _codes(values: "pa.Array") -> Any:
 
 
 def _joined(pieces: list[Any]) -> AnyArray:
-    if not pieces or isinstance(pieces[0], np.ndarray):
-        return np.concatenate(pieces) if pieces else np.empty(0)
-    texts: dict[str, str] = {}
-    found = []
-    for piece in pieces:
-        names = [texts.setdefault(name, name) for name in piece.dictionary.to_pylist()]
-        place = piece.indices.fill_null(len(names)).to_numpy(zero_copy_only=False)
-        found.append(np.array([*names, None], dtype=object)[place])
-    joined: AnyArray = np.concatenate(found)
+    import pyarrow as pa
+
+    if isinstance(pieces[0], np.ndarray):
+        return np.concatenate(pieces)
+    whole = pa.chunked_array(pieces).unify_dictionaries().combine_chunks()
+    texts = np.array([*whole.dictionary.to_pylist(), None], dtype=object)
+    joined: AnyArray = texts[whole.indices.fill_null(len(texts) - 1).to_numpy()]
     return joined
-
-
-#: Sets that are drawn for a bootstrap interval of a ratio.
-_RESAMPLES = 2000
 
 
 class Rows:

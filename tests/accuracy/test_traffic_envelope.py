@@ -6,13 +6,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from components.geometry import line_of_sight
+from components.flights.bounds import attitude_extremes_rad, traffic_envelope
+from components.flights.fleet import SampledFleet, ScriptedFleet
+from components.flights.legs import Climb, Straight, Turn
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.geometry.ellipsoid import line_of_sight
 from components.messages.reach import FarthestLook, Reach, farthest_look
 from components.sensor.mounting import MountedAxes
-from components.traffic.envelope import attitude_extremes_rad, traffic_envelope
-from components.traffic.fleet import SampledFleet, ScriptedFleet
-from components.traffic.legs import Climb, ScriptedTrajectory, Straight, Turn
-from components.traffic.trajectory import SampledTrajectory
 
 
 def flight(draw: Random, name: str) -> ScriptedTrajectory:

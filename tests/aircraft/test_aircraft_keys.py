@@ -13,7 +13,7 @@ from covering import covers
 from wired import Row, chain, decided, run, sensor
 
 import dsa_des
-from components.encounters.set_file import read_set
+from components.formats.set_file import read_set
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import warnings_of
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.traffic.traffic_file import TrafficFileError
+from components.formats.text_rows import TrafficFileError
 from tests.alerting.conf_text import CONF
 
 LINES = CONF.splitlines()

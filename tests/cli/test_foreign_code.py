@@ -26,7 +26,7 @@ CLASS = """
 import sys
 from fractions import Fraction
 from pydantic import field_validator
-from components.radar.range_boundary import RangeBoundary
+from components.radar.radar import RangeBoundary
 from dsa_des import Component, Parameters
 
 class Plain(RangeBoundary): pass

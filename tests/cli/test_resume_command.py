@@ -11,6 +11,9 @@ from click.testing import CliRunner
 import dsa_des
 from dsa_des.cli import main
 from dsa_des.results.folder import StudyFolder
+from tests.studies.conftest import small
+
+__all__ = ["small"]
 
 STUDY = """
 scene = "small.toml"

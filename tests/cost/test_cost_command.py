@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from components.line_of_sight.transform import EARTH
-from components.radar.ladder import DETECTION
+from components.radar.detection.ladder import DETECTION
 from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
 from dsa_des.commands.cost import ladders_to_climb

@@ -10,7 +10,7 @@ from components.display import symbols as module
 from components.display.symbols import Labels, by_target, evenly, staggered, styles_of
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
-from components.radar.range_boundary import RangeBoundary
+from components.radar.radar import RangeBoundary
 from components.radar.swerling import SwerlingRadar
 from components.sensor import marks
 from components.tracking.stub import TrackerStub

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.resolution import Grid, round_to_grid
+from components.sensor.grid import Grid, round_to_grid
 from dsa_des.time.randomness import Stream
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.encounters.public_formats import read_paired_text
-from components.encounters.set_file import read_set
-from components.encounters.show_command import closest_approaches
+from components.encounters.set_commands import closest_approaches
+from components.formats.set_file import read_set
+from components.formats.track_files import read_paired_text
 from tests.encounters.reference_data import reference_file
 from tests.encounters.test_set_file import call
 

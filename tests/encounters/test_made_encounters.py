@@ -8,10 +8,10 @@ import pymap3d
 import pytest
 from geographiclib.geodesic import Geodesic
 
-from components.encounters.encounter_flights import encounter_flights
-from components.encounters.encounter_set import EncounterSet
+from components.encounters.encounter_traffic import encounter_flights
 from components.encounters.made_encounters import made_set, read_recipe
-from components.encounters.set_file import read_set
+from components.formats.encounter_set import EncounterSet
+from components.formats.set_file import read_set
 from dsa_des.errors import UsageError
 from tests.encounters.test_set_file import call
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.encounters.bayes_network import NetworkError, make_network
+from components.encounters.model import NetworkError, make_network
 from components.encounters.model_file import ModelFileError, read_model
 from tests.encounters.model_text import small_model
 from tests.encounters.reference_data import reference_file

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from components.encounters.draws import EncounterDraws
 from components.encounters.model_file import ModelFileError, read_model
-from components.encounters.sampling import TrackSampler
+from components.encounters.sampling import EncounterDraws, TrackSampler
 from tests.encounters.model_text import marginals, next_chances, slow_reading
 from tests.encounters.test_set_file import call
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from components.encounters import generate_command
+from components.encounters import model_commands
 from components.encounters.command import encounters
 from components.encounters.model_file import read_model
 from components.encounters.track_rules import TrackRules, conditional
@@ -119,8 +119,8 @@ def test_what_cannot_end_is_refused_and_what_takes_long_is_told(
         assert "TB" in done.stderr and "at most 11.6 days and 1 TB" in done.stderr
     words = ("--model", model, "--count", 100_000_000, "--out", tmp_path / "s.parquet")
     told: list[str] = []
-    monkeypatch.setattr(generate_command, "say", lambda text, err: told.append(text))
-    monkeypatch.setattr(generate_command, "PairSampler", lambda *_: (_ for _ in ()).throw(OSError))
+    monkeypatch.setattr(model_commands, "say", lambda text, err: told.append(text))
+    monkeypatch.setattr(model_commands, "PairSampler", lambda *_: (_ for _ in ()).throw(OSError))
     CliRunner().invoke(encounters, ["generate", *map(str, words)])
     assert told == ["note: --count 100000000: about 1.16 days of a processor and 90 GB"]
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import chdtrc
 
-from components.encounters.draws import EncounterDraws
 from components.encounters.model_file import read_model
-from components.encounters.sampling import SampledTracks, TrackSampler
+from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from tests.encounters.model_text import Slow, marginals, next_chances, slow_reading, small_model
 from tests.encounters.reference_data import reference_file
 

@@ -9,13 +9,12 @@ import pytest
 from click.testing import CliRunner, Result
 
 from components.encounters.command import encounters
-from components.encounters.encounter_flights import encounter_flights
-from components.encounters.encounter_set import NoSuchEncounter
+from components.encounters.encounter_traffic import encounter_flights
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
-from components.encounters.pair_sets import geometry_class
 from components.encounters.pairing import PairSampler
-from components.encounters.set_file import EncounterSetError, read_set
+from components.formats.encounter_set import NoSuchEncounter, geometry_class
+from components.formats.set_file import EncounterSetError, read_set
 from tests.encounters.test_pairing import TURNS
 
 FOOT = 0.3048

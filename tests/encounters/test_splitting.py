@@ -7,8 +7,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from components.encounters.set_file import read_set
 from components.encounters.splitting import drawn_copies, expected_copies, nearness, split_set
+from components.formats.set_file import read_set
 from components.metrics.risk import risk_ratio
 from tests.encounters.test_set_file import call
 from tests.encounters.test_studies_of_encounters import made

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from components.encounters.set_file import read_set
+from components.formats.set_file import read_set
 from dsa_des.studies.draws import parse_draw
 from tests.encounters.test_pairing import TURNS
 from tests.encounters.test_set_file import call

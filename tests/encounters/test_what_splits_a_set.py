@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from components.encounters.set_file import read_set
 from components.encounters.splitting import nearness
+from components.formats.set_file import read_set
 from dsa_des.cli import main
 from tests.encounters.test_risk_of_a_set import SCENE, table
 from tests.encounters.test_set_file import call

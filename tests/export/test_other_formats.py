@@ -23,7 +23,7 @@ from components.display.recorded_run import RecordedTables
 from components.export.command import export
 from components.export.exported import daa_text
 from components.export.globe import czml_text, kml_text
-from components.traffic.daa_file import read_daa
+from components.formats.daa_file import read_daa
 from components.view.command import view
 from tests.view.test_page import SCENE
 

@@ -10,11 +10,11 @@ import pytest
 from one_state import GuidedIntruder, guidance
 
 from components.alert_configuration.conf_file import read_conf
+from components.formats.daa_file import read_daa_samples
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.bands import guidance_of_many, resolution
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
-from components.traffic.daa_file import read_daa_samples
 from tests.alerting.reference_data import reference_file
 
 UNITS = {"hdir": math.pi / 180, "hs": 1852 / 3600, "vs": 0.3048 / 60, "alt": 0.3048}

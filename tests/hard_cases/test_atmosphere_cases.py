@@ -18,9 +18,9 @@ from components.atmosphere.slant_path import (
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
 from components.navigation.errors import position_with_error
-from components.radar.beam_sweep import illumination_offset_s
-from components.radar.clutter import clutter_detection_probability
-from components.radar.false_alarms import false_alarm_count
+from components.radar.beam import illumination_offset_s
+from components.radar.detection.clutter import clutter_detection_probability
+from components.radar.detection.output import false_alarm_count
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from components.aircraft.rcs_table import RcsTable, dbsm_to_m2
+from components.aircraft.aspect_tables import RcsTable, dbsm_to_m2
 from components.geometry.field_of_view import inside
 from components.radar.detection import (
     detection_probability,

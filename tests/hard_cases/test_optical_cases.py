@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import table_from_nodes
+from components.aircraft.aspect_tables import table_from_nodes
 from components.optical.mesh import TriangleMesh
 from components.optical.signature import (
     confidence,
@@ -13,7 +13,7 @@ from components.optical.signature import (
     total_signature,
 )
 from components.optical.silhouette import visible_area
-from components.sensor.resolution import round_to_grid
+from components.sensor.grid import round_to_grid
 
 PI = np.pi
 DEG = np.pi / 180.0
@@ -281,7 +281,7 @@ BAD_INPUT = [
     ),
     ("area negative", lambda: visible_area(0, 0, 0, 0, **{**BEECH, "front_m2": -1}), "0 or more"),
     ("angle NaN", lambda: visible_area(0, np.nan, 0, 0, **BEECH), "pitch_rad is nan"),
-    ("table with a hole", _table_with_a_hole, "hole: no area for the node az_deg 90, el_deg 0"),
+    ("table with a hole", _table_with_a_hole, "hole: no value at az_deg 90, el_deg 0"),
     ("mesh not closed", _open_mesh, "the mesh is not closed"),
     ("negative range", lambda: pixels_covered(1, -1, **AFRL, sensor_pixels=9), "range_m is -1"),
     ("negative step", lambda: round_to_grid(1.0, -0.1), "step is -0.1"),

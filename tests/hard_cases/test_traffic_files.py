@@ -11,8 +11,9 @@ import pickle
 import numpy as np
 import pytest
 
-from components.traffic.csv_file import read_csv
-from components.traffic.daa_file import TrafficFileError, read_daa
+from components.formats.csv_file import read_csv
+from components.formats.daa_file import read_daa
+from components.formats.text_rows import TrafficFileError
 
 H = "NAME lat lon alt trk gs vs time\n"
 U = "[none] [deg] [deg] [ft] [deg] [knot] [fpm] [s]\n"

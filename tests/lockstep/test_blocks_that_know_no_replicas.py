@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components.radar.swerling import SwerlingRadar
-from components.radar.weather_effects import Rain
+from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input

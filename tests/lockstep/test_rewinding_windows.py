@@ -61,7 +61,7 @@ def test_windows_are_few_when_what_comes_back_is_regular():
 
 def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
     """A block that only fails on a path that is not flown does not fail."""
-    from components.traffic.steered_flight import SteeredFlight
+    from components.flights.steered_flight import SteeredFlight
 
     scene = load_scene(SCENE, sets=["blocks.traffic.intruders=30"], duration_s="90")
     _, expected = run(scene)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.radar.cumulative_detection import first_declared
+from components.radar.detection import first_declared
 from docs.make import scan_rate as page
 from docs.make.declaration_ranges import certain_range_m, mean_range_m
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.aircraft.silhouette_table import (
+from components.aircraft.aspect_tables import (
     SilhouetteTable,
     read_aspect_table,
     table_from_nodes,
@@ -113,8 +113,8 @@ def without(rows, test):
         (lambda r: without(r, lambda x: x[1] == 30), "hole: el_deg .*between 0 and 60.*30"),
         (lambda r: without(r, lambda x: x[1] == 90), "hole.*from -90 to 60"),
         (lambda r: without(r, lambda x: 180 < x[0] < 360), "hole: az_deg"),
-        (lambda r: [*r, (30, 0, 1.0)], "two areas for the node az_deg 30, el_deg 0"),
-        (lambda r: [*r[:-1], (360, 90, 5.0)], "two areas.*0 and 360 are one node"),
+        (lambda r: [*r, (30, 0, 1.0)], "area_m2 is 1 and .* at az_deg 30, el_deg 0"),
+        (lambda r: [*r[:-1], (360, 90, 5.0)], "must be one value.*0 and 360 are one node"),
         (
             lambda r: [*r[:5], (150, -90, "wide"), *r[6:]],
             "line 7: it must have a number in each of the columns az_deg",

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import read_aspect_table, table_from_nodes
+from components.aircraft.aspect_tables import read_aspect_table, table_from_nodes
 from components.optical.silhouette import visible_area
 from components.thesis.scenes import aircraft
 from components.thesis.silhouette_comparison import main

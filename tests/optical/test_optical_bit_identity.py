@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.contrast import contrast_gain
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
 from components.optical.signature import detection_range, line_of_sight_rate, pixels_covered
 from components.optical.silhouette import visible_area
-from components.sensor.resolution import round_to_grid
+from components.sensor.grid import round_to_grid
 
 COUNT = 10_000
 AREAS = {"front_m2": 12.0, "side_m2": 30.0, "horizontal_m2": 90.0}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.radar.beam_sweep import first_illumination
+from components.radar.beam import first_illumination
 from components.traffic.source import TrafficSource
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from components.flights.steered_flight import SteeredFlight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.steering import Manoeuvre
-from components.traffic.steered_flight import SteeredFlight
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

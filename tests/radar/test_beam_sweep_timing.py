@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.radar.beam_sweep import illumination_offset_s
+from components.radar.beam import illumination_offset_s
 
 # The thesis's radar: 1 Hz over ±110°.
 SWEEP = {"start_rad": math.radians(-110), "width_rad": math.radians(220), "scan_period_s": 1.0}

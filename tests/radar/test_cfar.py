@@ -8,13 +8,13 @@ from scipy.integrate import quad
 from scipy.special import gammaincc
 from scipy.stats import binom, gamma
 
-from components.radar.cfar import (
+from components.radar.detection import detection_probability
+from components.radar.detection.cfar import (
     cfar_detection_probability,
     cfar_loss_db,
     cfar_multiplier,
     cfar_required_snr,
 )
-from components.radar.detection import detection_probability
 
 
 def drawn(rng, model, snr, pulses, cells, pfa, looks):

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.arguments.checks import MODELS
-from components.radar.clutter import (
+from components.radar.detection import detection_probability
+from components.radar.detection.clutter import (
     KINDS,
     clutter_detection_probability,
+    marcum_q1,
 )
-from components.radar.detection import detection_probability
-from components.radar.marcum import marcum_q1
 
 DRAWS = 200_000
 

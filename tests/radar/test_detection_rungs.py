@@ -5,8 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from components.radar.detection import detection_probability, miss_probability
-from components.radar.required_snr import required_snr
+from components.radar.detection import (
+    detection_probability,
+    miss_probability,
+    required_snr,
+)
 
 MODELS = [f"swerling{i}" for i in range(5)]
 

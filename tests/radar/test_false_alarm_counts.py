@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.special import bdtr, gammaincc
 
-from components.radar.false_alarms import (
+from components.radar.detection.output import (
     false_alarm_count,
     false_alarm_snr,
 )
-from components.radar.resolution_cells import resolution_cells
+from components.radar.resolution import resolution_cells
 
 # The thesis's radar: ±110° by ±20° at 1°, 76.2 m cells out to 6.5 km.
 OASYS = resolution_cells(

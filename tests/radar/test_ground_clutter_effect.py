@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import chndtr, roots_genlaguerre
 
-from components.radar.clutter import clutter_detection_probability
 from components.radar.detection import detection_probability
+from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.aircraft.rcs_table import dbsm_to_m2
-from components.radar.detection import detection_probability
+from components.aircraft.aspect_tables import dbsm_to_m2
+from components.radar.detection import detection_probability, required_snr
 from components.radar.link_budget import (
     LinkBudget,
     calibrated_bandwidth,
@@ -18,7 +18,6 @@ from components.radar.link_budget import (
     wavelength,
     with_bandwidth,
 )
-from components.radar.required_snr import required_snr
 
 # Thesis Table 2.2 (OASys).
 OASYS = LinkBudget(

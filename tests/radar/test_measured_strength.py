@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from components.radar.detection import detection_probability
-from components.radar.false_alarms import false_alarm_snr
-from components.radar.measured_snr import measured_snr
-from components.radar.threshold import detection_threshold
+from components.radar.detection.output import false_alarm_snr, measured_snr
+from components.radar.detection.threshold import detection_threshold
 
 DRAWS = (np.arange(100_000) + 0.5) / 100_000
 MODELS = [f"swerling{number}" for number in range(5)]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.radar.measurement_accuracy import (
+from components.radar.measurement import (
     angle_variance,
     range_rate_variance,
     range_variance,

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from components.radar.moving_target_filter import (
-    FILTERS,
-    MovingTargetFilter,
-    folded_range_rate,
-    platform_spread_m_s,
-)
+from components.radar.doppler import FILTERS, MovingTargetFilter, folded_range_rate
+from components.radar.ground_clutter import platform_spread_m_s
 
 PRF_HZ, WAVELENGTH_M = 5000.0, 0.03
 BLIND_M_S = 75.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.aircraft.rcs_table import RcsTable, dbsm_to_m2
+from components.aircraft.aspect_tables import RcsTable, dbsm_to_m2
 from components.radar.detection import detection_probability, detection_threshold
 from components.radar.rcs import fluctuating_rcs
 
@@ -141,15 +141,6 @@ def test_csv_with_other_columns_order_and_comments(tmp_path, table):
     read = RcsTable.from_csv(path)
     np.testing.assert_array_equal(read.azimuth_deg, AZIMUTHS)
     np.testing.assert_array_equal(read.rcs_dbsm, VALUES)
-
-
-def test_symmetric_table_mirrors():
-    half = RcsTable.from_rows([0, 90, 180], [0, 0, 0], [1.0, 5.0, 2.0], symmetric=True)
-    np.testing.assert_array_equal(half.azimuth_deg, [0.0, 90.0, 180.0, 270.0])
-    angles = np.radians([17.0, 100.0, 179.0])
-    np.testing.assert_allclose(half.dbsm(angles, 0.0), half.dbsm(-angles, 0.0), rtol=1e-13)
-    with pytest.raises(ValueError, match=r"az_deg is 190: it must lie in .* symmetric"):
-        RcsTable.from_rows([0, 190], [0, 0], [1, 2], symmetric=True)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from components.aircraft.aircraft import Aircraft, Roster
 from components.messages.targets import RelativeTargets
 from components.radar.detection import detection_probability
-from components.radar.sampled_rcs import scan_rcs
+from components.radar.rcs import scan_rcs
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
 from components.sensor.look import Cells

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import spherical_jn, spherical_yn
 
 from components.radar.ground_clutter import ground_ring_rcs_m2
-from components.radar.volume_clutter import (
+from components.radar.rain import (
     fall_speed_m_s,
     rain_reflectivity_per_m,
     rain_shell_m3,

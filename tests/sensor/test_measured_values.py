@@ -11,7 +11,7 @@ from scipy.stats import kstest, ncx2, norm
 from wired import alone, chain, decided, rows, run, sensor
 
 from components.radar.parameters import RadarParameters
-from components.radar.radar_block import Radar
+from components.radar.radar import Radar
 from components.sensor.look import Look
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene

@@ -8,8 +8,8 @@ import pytest
 from test_false_alarms_look_like_targets import CROWD, noisy
 from wired import SEES_ALL, chain, noise_crosses, rows, run, sensor
 
-from components.sensor import declaration_by_place
-from components.sensor.declaration_by_place import SeenPlaces, scans_with_company
+from components.sensor import declaration
+from components.sensor.declaration import SeenPlaces, scans_with_company
 
 
 def test_where_and_how_strong_noise_of_a_camera_is_are_drawn_each_by_itself():
@@ -109,13 +109,13 @@ def test_a_place_is_the_same_within_motion_and_three_deviations(second, variance
 
 def test_places_of_a_scene_are_as_wrong_as_their_detections(monkeypatch):
     """High up an error of azimuth moves less: by the cosine of the elevation."""
-    seen, judged = [], declaration_by_place.scans_with_company
+    seen, judged = [], declaration.scans_with_company
 
     def kept(found, *given, **keys):
         seen.append(found)
         return judged(found, *given, **keys)
 
-    monkeypatch.setattr(declaration_by_place, "scans_with_company", kept)
+    monkeypatch.setattr(declaration, "scans_with_company", kept)
     high = {**crooked.ROLLING, "up_m": 2900.0}
     radar = sensor("radar.range_boundary", errors="stated", azimuth_error_deg=1.5,
                    elevation_error_deg=0.4, range_error_m=12.0, quantised=False,

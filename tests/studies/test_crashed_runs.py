@@ -13,6 +13,7 @@ from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
 from dsa_des.studies.chunk import Done
 from dsa_des.studies.executors import TRIES, Attempts, Local, halves
+from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
 from dsa_des.studies.study import Chunk
 from dsa_des.studies.study_file import read_study
@@ -90,10 +91,10 @@ def test_kills_from_outside_make_no_error_rows(small: Path) -> None:
     Path("study.toml").write_text(text.replace("runs_per_chunk = 3", "runs_per_chunk = 1"))
     checked = read_study("study.toml")
     alone = StudyFolder(Path("alone"))
-    alone.open(checked, resume=False)
+    alone.open(description_text(checked), resume=False)
     run_study(checked, alone, executors.Serial())
     folder = StudyFolder(Path("o"))
-    folder.open(checked, resume=False)
+    folder.open(description_text(checked), resume=False)
     local = Local(2)
     killed = []
 

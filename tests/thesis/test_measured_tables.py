@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from components.aircraft.silhouette_table import read_aspect_table
+from components.aircraft.aspect_tables import read_aspect_table
 from components.optical.silhouette import visible_area
 from components.thesis.scenes import areas as areas_of
 from components.thesis.silhouette_comparison import AXES, compare_silhouettes

@@ -213,7 +213,7 @@ def test_marcum_s_q_far_out_is_the_integral_of_its_density():
     from scipy.integrate import quad
     from scipy.special import ive
 
-    from components.radar.marcum import marcum_q1
+    from components.radar.detection.clutter import marcum_q1
 
     for signal, threshold in ((300.0, 250.0), (250.0, 280.0), (900.0, 950.0)):
         a, b = math.sqrt(2.0 * signal), math.sqrt(2.0 * threshold)

@@ -13,8 +13,7 @@ from wired import HEARS_ALL, chain, decided, run
 
 import dsa_des
 from components.radar.detection import detection_probability
-from components.radar.fading import fading_power
-from components.radar.scatterers import Scatterers
+from components.radar.rcs import Scatterers, fading_power
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
 from dsa_des.record.recording import Recorder

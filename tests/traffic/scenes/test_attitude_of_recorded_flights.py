@@ -8,9 +8,9 @@ import pytest
 from wired import chain, rows, run, sensor
 
 from components.display.terminal import attitude_lines
-from components.traffic.attitude_from_path import attitude_from_path, fit_path
-from components.traffic.csv_file import read_csv
-from components.traffic.daa_file import read_daa
+from components.flights.attitude import attitude_from_path, fit_path
+from components.formats.csv_file import read_csv
+from components.formats.daa_file import read_daa
 from components.traffic.files import derived_attitude
 
 KNOT, FOOT = 1852 / 3600, 0.3048

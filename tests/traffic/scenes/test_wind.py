@@ -10,9 +10,9 @@ from covering import covers
 from test_avoidance_by_bands import scene as steered_scene
 from wired import chain, first_look, rows, run, sensor
 
-from components.traffic.legs import Climb, ScriptedTrajectory, Straight, Turn
-from components.traffic.straight_flights import Starts, flights_of
-from components.traffic.wind import Wind, ground_speed_mps, heading_and_airspeed
+from components.flights.attitude import Wind, ground_speed_mps, heading_and_airspeed
+from components.flights.legs import Climb, Straight, Turn
+from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
 from components.traffic.wind_effect import Crabbing
 from dsa_des.errors import SceneError
 

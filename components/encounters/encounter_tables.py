@@ -1,0 +1,311 @@
+"""Tables with one row per encounter, and ``dsa-des encounters risk``: the risk ratio of one."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.formats.encounter_set import LARGEST_WEIGHT
+from components.formats.text_rows import csv_table
+from components.metrics.risk import RiskRatio, risk_ratio, risk_ratios_by_class
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.errors import UsageError, did_you_mean, shown_value
+from dsa_des.files.input_files import (
+    InputFileError,
+    is_folder,
+    read_input_bytes,
+    read_input_text,
+    resolve_home,
+)
+from dsa_des.terminal.tables import print_table
+from dsa_des.terminal.terminal import console, say, say_json
+
+#: Names of a column that says which encounter a row is, for messages.
+_NAMES = ("encounter", "encounter_id", "id")
+_MOST = 20
+
+
+@dataclass(frozen=True)
+class EncounterTable:
+    """Columns of texts, and where each row stands.
+
+    Parameters
+    ----------
+    path : Path
+    columns : dict of str to list
+        Texts, or numbers where the file has types; None where a cell is empty.
+    lines : list of int
+        The line of each row in the file, from 1; for Parquet its row.
+    """
+
+    path: Path
+    columns: dict[str, list[object]]
+    lines: list[int]
+
+    def column(self, name: str, option: str) -> list[object]:
+        """Return a column, or raise UsageError with the nearest name."""
+        if name not in self.columns:
+            raise UsageError(
+                f"{self.path}: {option} {name}: there is no such column"
+                f"{did_you_mean(name, self.columns)}"
+            )
+        return self.columns[name]
+
+    def place(self, row: int) -> str:
+        """Return how a row is named in a message."""
+        name = next((n for n in _NAMES if n in self.columns), None)
+        told = f"encounter {self.columns[name][row]}" if name else f"encounter {row + 1}"
+        return f"{told} (line {self.lines[row]})"
+
+
+def read_table(text: str) -> EncounterTable:
+    """Read a table by the name that a user wrote."""
+    try:
+        path = resolve_home(text)
+        if is_folder(path):
+            return _study(path)
+        if path.suffix.lower() == ".parquet":
+            return _parquet(path, read_input_bytes(path))
+        content = read_input_text(path)
+    except InputFileError as error:
+        raise UsageError(f"{text}: {error}") from None
+    names, some = csv_table(content, lambda said, line: UsageError(f"{path}: line {line}: {said}"))
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UsageError(f"{path}: line 1: the column {twice!r} stands there twice")
+    rows = list(some)
+    if not rows:
+        raise UsageError(f"{path}: a row of column names and one row per encounter are needed")
+    columns: dict[str, list[object]] = {
+        name: [row[place] or None for _, row in rows] for place, name in enumerate(names)
+    }
+    return EncounterTable(path, columns, [line for line, _ in rows])
+
+
+def _study(path: Path) -> EncounterTable:
+    """Return the runs of a study's folder; those without result are left out."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    parts = sorted((path / "parts").glob("*.parquet"))
+    if not parts:
+        raise UsageError(f"{path}: is no folder of a study: there are no parts in it")
+    try:
+        table = pa.concat_tables([pq.read_table(p) for p in parts], promote_options="default")
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: a part is no whole Parquet file: {error}") from None
+    lines = list(range(1, table.num_rows + 1))
+    if "error" in table.column_names:
+        good = np.asarray(table["error"].is_null())
+        table = table.filter(good)
+        lines = (np.flatnonzero(good) + 1).tolist()
+    if not lines:
+        raise UsageError(f"{path}: no run of the study has a result")
+    return EncounterTable(path, {n: table[n].to_pylist() for n in table.column_names}, lines)
+
+
+def _parquet(path: Path, content: bytes) -> EncounterTable:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(pa.BufferReader(content))
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: is no whole Parquet file: {error}") from None
+    if table.num_rows == 0:
+        raise UsageError(f"{path}: holds no row")
+    columns = {name: table[name].to_pylist() for name in table.column_names}
+    return EncounterTable(path, columns, list(range(1, table.num_rows + 1)))
+
+
+def numbers(
+    table: EncounterTable, name: str, option: str, *, flag: bool
+) -> tuple[FloatArray, dict[int, str]]:
+    """Return a column as numbers, and row → what is wrong with it."""
+    cells = table.column(name, option)
+    values = np.array([_number(cell) for cell in cells])
+    with np.errstate(invalid="ignore"):
+        zero_one = (values == 0.0) | (values == 1.0)
+        good = zero_one if flag else (values >= 0.0) & (values <= LARGEST_WEIGHT)
+    most = f"must be a number of 0 or more, {LARGEST_WEIGHT:g} at most"
+    allowed = "must be 0 or 1" if flag else most
+    wrong = {
+        row: f"{name} is missing: {allowed}"
+        if cells[row] is None
+        else f"{name} = {shown_value(cells[row])}: {allowed}"
+        for row in np.flatnonzero(~good).tolist()
+    }
+    return values, wrong
+
+
+def _number(cell: object) -> float:
+    if isinstance(cell, str):
+        low = cell.lower()
+        if low in ("true", "false"):
+            return float(low == "true")
+        try:
+            return math.nan if "_" in cell else float(cell)
+        except ValueError:
+            return math.nan
+    return float(cell) if isinstance(cell, int | float) else math.nan
+
+
+def kept_rows(table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool) -> BoolArray:
+    """Return which rows are good, or raise UsageError with what is wrong with the others."""
+    found: dict[int, list[str]] = {}
+    for some in wrong:
+        for row, said in some.items():
+            found.setdefault(row, []).append(said)
+    kept: AnyArray = np.ones(len(table.lines), dtype=np.bool_)
+    kept[list(found)] = False
+    if found and (not skip or not kept.any()):
+        rows = sorted(found)
+        lines = [f"{table.path}: {table.place(row)}: {'; '.join(found[row])}" for row in rows]
+        more = [f"and {len(rows) - _MOST} more"] if len(rows) > _MOST else []
+        raise UsageError(*lines[:_MOST], *more)
+    return kept
+
+
+_CLASSES = 200
+
+
+def show_risk(
+    table: str,
+    nominal: str,
+    mitigated: str,
+    weight: str | None,
+    cluster: str | None,
+    by: str | None,
+    edges: str | None,
+    confidence: float,
+    method: str,
+    resamples: int,
+    seed: int,
+    skip_damaged: bool,
+    as_json: bool,
+) -> None:
+    """Print the risk ratio of a table, and one per class where that is asked for."""
+    if edges is not None and by is None:
+        raise UsageError("--edges belongs to --by COLUMN: which column has these edges?")
+    content = read_table(table)
+    n, wrong_n = numbers(content, nominal, "--nominal", flag=True)
+    m, wrong_m = numbers(content, mitigated, "--mitigated", flag=True)
+    w, wrong_w = np.ones(len(n)), dict[int, str]()
+    if weight is not None:
+        w, wrong_w = numbers(content, weight, "--weight", flag=False)
+    together = None
+    if cluster is not None:
+        together = np.array([str(cell) for cell in content.column(cluster, "--cluster")])
+    labels, wrong_by = _labels(content, by, edges)
+    kept = kept_rows(content, [wrong_n, wrong_m, wrong_w, wrong_by], skip_damaged)
+    n, m, w, labels = n[kept], m[kept], w[kept], labels[kept]
+    together = None if together is None else together[kept]
+    options: dict[str, Any] = {
+        "confidence": confidence, "method": method, "resamples": resamples, "seed": seed,
+    }  # fmt: skip
+    whole = risk_ratio(n, m, w, cluster=together, **options)
+    if whole.reason:
+        raise UsageError(f"{content.path}: there is no risk ratio: {whole.reason}")
+    classes = {}
+    if by is not None:
+        classes = risk_ratios_by_class(n, m, w, labels, together, **options)
+    skipped = int((~kept).sum())
+    if as_json:
+        found: dict[str, Any] = {"skipped": skipped, "confidence": confidence, **asdict(whole)}
+        if by is not None:
+            found["classes"] = {name: asdict(one) for name, one in classes.items()}
+        say_json(found)
+        return
+    for line in _told(whole, confidence, skipped):
+        say(line)
+    if by is not None:
+        _show_classes(by, classes, confidence)
+
+
+def _labels(
+    content: EncounterTable, by: str | None, edges: str | None
+) -> tuple[AnyArray, dict[int, str]]:
+    """Return the class of every row, and what is wrong with single ones."""
+    if by is None:
+        return np.zeros(len(content.lines), dtype=np.int64), {}
+    if edges is None:
+        each = [content.column(name.strip(), "--by") for name in by.split(",")]
+        labels = np.array(
+            [", ".join("" if cell is None else str(cell) for cell in row)
+             for row in zip(*each, strict=True)]
+        )  # fmt: skip
+        if len(np.unique(labels)) > _CLASSES:
+            raise UsageError(
+                f"{content.path}: --by {by}: has more than {_CLASSES} values; give the edges of "
+                "classes, --edges A,B,..."
+            )
+        return labels, {}
+    bounds = _edges(edges)
+    cells = content.column(by, "--by")
+    values, wrong = np.full(len(cells), np.nan), {}
+    for row, cell in enumerate(cells):
+        try:
+            values[row] = float(cell)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            wrong[row] = f"{by} is no number"
+    # Numbered, so that classes stand in the order of their edges.
+    inner = (f"{low:g} to {high:g}" for low, high in pairwise(bounds))
+    names = [f"below {bounds[0]:g}", *inner, f"{bounds[-1]:g} and above"]
+    place = np.searchsorted(bounds, np.nan_to_num(values), side="right")
+    width = len(str(len(names)))
+    return np.array([f"{k + 1:0{width}d}: {name}" for k, name in enumerate(names)])[place], wrong
+
+
+def _edges(text: str) -> FloatArray:
+    try:
+        bounds = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        bounds = np.array([math.nan])
+    if not np.isfinite(bounds).all() or (np.diff(bounds) <= 0).any():
+        raise UsageError(f"--edges {text}: must be rising numbers with commas between them")
+    return bounds
+
+
+def _told(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
+    low, high = found.interval
+    alone = found.clusters == found.encounters
+    clusters = "" if alone else f" in {found.clusters} clusters"
+    lines = [
+        f"{found.encounters} encounters{clusters}, {found.nominal_events} with the event "
+        f"nominally, {found.mitigated_events} mitigated ({found.induced_events} of them induced)",
+        f"probability nominal     {found.nominal_probability:.15g}",
+        f"probability mitigated   {found.mitigated_probability:.15g}",
+        f"risk ratio              {found.ratio:.15g}",
+        f"  unresolved            {found.unresolved:.15g}",
+        f"  induced               {found.induced:.15g}",
+        f"standard error          {found.standard_error:.8g} ({found.method}, paired)",
+        f"  nominal taken as known  {found.unpaired_error:.8g}",
+        f"{100 * confidence:g} % interval           {low:.6g} to {high:.6g}",
+        f"effective sample size   {found.effective_sample_size:.2f}",
+    ]
+    if found.few:
+        lines.append("few: fewer than 20 mitigated events, in effect, carry the interval")
+    if skipped:
+        lines.append(f"{skipped} damaged encounters were skipped")
+    return lines
+
+
+def _show_classes(by: str, classes: dict[str, RiskRatio], confidence: float) -> None:
+    rows = []
+    for name, one in classes.items():
+        told = [name or "(none)", str(one.encounters), str(one.nominal_events)]
+        told.append(str(one.mitigated_events))
+        if one.reason:
+            rows.append([*told, "-", "-", "-", "-", one.reason])
+            continue
+        low, high = one.interval
+        values = (one.ratio, one.unresolved, one.induced)
+        interval = f"{low:.4g} to {high:.4g}"
+        rows.append([*told, *(f"{v:.4g}" for v in values), interval, "few" if one.few else ""])
+    headings = [by, "encounters", "nominal", "mitigated", "ratio", "unresolved", "induced",
+                f"{100 * confidence:g} % interval", "note"]  # fmt: skip
+    print_table(console(), "", headings, rows, right=range(1, 7), below=8)

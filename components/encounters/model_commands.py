@@ -1,0 +1,255 @@
+"""``dsa-des encounters sample`` and ``generate``: tracks and sets of encounter models."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.encounters.made_encounters import made_set, read_recipe
+from components.encounters.model import EncounterModel
+from components.encounters.model_file import ModelFileError, read_model
+from components.encounters.pair_densities import PairingRules, StepDensity
+from components.encounters.pairing import PairSampler, set_of_pairs
+from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
+from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
+from components.formats.public_formats import SET
+from components.formats.set_file import is_place, set_writer, streamed
+from dsa_des.arrays.types import AnyArray
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import foreseen
+from dsa_des.files.input_files import InputFileError, resolve_home
+from dsa_des.files.output_file import check_ending, check_file
+from dsa_des.files.output_names import named, reason_of
+from dsa_des.terminal.terminal import say
+
+#: Purpose of the draws: without rejections raw tracks and flown ones are the same.
+TRACKS = "tracks"
+# Processor time (s) and bytes of a row, as measured with a small model.
+_RAW_ROW, _FLOWN_ROW = (1e-6, 60.0), (4e-6, 160.0)
+
+
+def sample_tracks(
+    model: str,
+    count: int,
+    first: int,
+    duration_s: float,
+    seed: int,
+    raw: bool,
+    dynamics: str,
+    out: str,
+) -> None:
+    """Write the tracks that the command line asks for."""
+    found = open_model(model)
+    path = named(out)
+    check_file(path)
+    seconds = int(duration_s)
+    if seconds != duration_s:
+        raise UsageError(
+            f"--duration-s {duration_s:g}: must be a whole number, as tracks have 1 Hz"
+        )
+    asked = f"--count {count} --duration-s {seconds}"
+    each = _RAW_ROW if raw else _FLOWN_ROW
+    if long := foreseen(asked, count * (seconds + 1), *each):
+        say(f"note: {long}", err=True)
+    batches = _raw(found, seed, range(first, first + count), seconds)
+    if not raw:
+        batches = _flown(found, seed, range(first, first + count), seconds, dynamics)
+    try:
+        rows = _write(path, batches)
+    except TrackError as error:
+        raise UsageError(f"{model}: {error}") from None
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    for note in found.notes:
+        say(f"note: {note}")
+    say(f"{path}: {count} tracks of {seconds} s, {rows} rows")
+
+
+def open_model(text: str) -> EncounterModel:
+    """Return the model in a file that a user named."""
+    try:
+        return read_model(resolve_home(text))
+    except ModelFileError as error:
+        raise UsageError(str(error)) from None
+    except InputFileError as error:
+        raise UsageError(f"{text}: {error}") from None
+
+
+_Columns = dict[str, AnyArray]
+
+
+def _raw(model: EncounterModel, seed: int, numbers: range, seconds: int) -> Iterator[_Columns]:
+    """Give what the network gave, before any rejection."""
+    sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
+    for tracks in sampler.batches(numbers, seconds):
+        yield _variables(model, tracks, seconds)
+
+
+def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _Columns:
+    """Return track, time and all variables, track after track."""
+    instants = seconds + 1
+    columns: _Columns = {
+        "track": np.repeat(tracks.numbers, instants),
+        "t_s": np.tile(np.arange(instants), len(tracks.numbers)),
+    }
+    for place, label in enumerate(model.labels):
+        if place in model.dynamic:
+            values = tracks.changing[:, model.dynamic.index(place)].T.reshape(-1)
+        else:
+            values = np.repeat(tracks.initial[place], instants)
+        if model.bins[place].edges is None:
+            values = values.astype(np.int64)
+        columns[label] = values
+    return columns
+
+
+def _flown(
+    model: EncounterModel, seed: int, numbers: range, seconds: int, dynamics: str
+) -> Iterator[_Columns]:
+    """Give accepted tracks with the positions they fly through, once per second."""
+    sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
+    rules = TrackRules(model)
+    for tracks, flown in accepted_tracks(sampler, rules, numbers, seconds, dynamics):
+        each = round(1.0 / flown.step_s)
+        columns = _variables(model, tracks, seconds)
+        for name, values in (
+            ("north_ft", flown.north_ft),
+            ("east_ft", flown.east_ft),
+            ("altitude_ft", flown.up_ft),
+            ("speed_ft_s", flown.speed_ft_s),
+            ("heading_deg", np.degrees(flown.heading_rad)),
+            ("climb_ft_s", flown.climb_ft_s),
+        ):
+            columns[name] = values[::each].T.reshape(-1)
+        yield columns
+
+
+def _write(path: Path, batches: Iterator[_Columns]) -> int:
+    """Write batches as one CSV table; return how many rows it has."""
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    rows = 0
+    plain = pa_csv.WriteOptions(include_header=False)
+    with streamed(path) as file:
+        for columns in batches:
+            if not rows:
+                header = io.StringIO()
+                csv.writer(header, lineterminator="\n").writerow(columns)
+                file.write(header.getvalue().encode())
+            table = pa.table(columns)
+            pa_csv.write_csv(table, file, plain)
+            rows += table.num_rows
+    return rows
+
+
+#: Edges of miss distances: farther than any aircraft sees another.
+_FARTHEST_FT = 1e6
+# Processor time (s) and bytes of an encounter, as measured with a small model.
+_PAIR = (1e-3, 900.0)
+
+
+def generate_set(
+    made: str | None,
+    model: str | None,
+    intruder_model: str | None,
+    count: int | None,
+    first: int,
+    seed: int,
+    at: tuple[float, float],
+    horizontal: tuple[str, str] | None,
+    vertical: tuple[str, str] | None,
+    out: str,
+) -> None:
+    """Write a set of paired encounters, or of those that a table describes."""
+    check_place(at)
+    if made is not None:
+        if model is not None or intruder_model is not None or count is not None:
+            raise UsageError("--made says all of its encounters: no --model and no --count with it")
+        if horizontal is not None or vertical is not None:
+            raise UsageError("--horizontal and --vertical belong to --model, not to --made")
+        _write_made(made, out)
+        return
+    if model is None or count is None:
+        raise UsageError("either --model FILE and --count N are needed, or --made FILE.toml")
+    own = open_model(model)
+    intruder = own if intruder_model is None else open_model(intruder_model)
+    path = named(out)
+    check_ending(path, [SET])
+    check_file(path)
+    rules = _rules(horizontal, vertical)
+    if long := foreseen(f"--count {count}", count, *_PAIR):
+        say(f"note: {long}", err=True)
+    about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
+    total, squares, attempts = 0.0, 0.0, 0
+    try:
+        pairing = PairSampler(own, intruder, seed, rules)
+        with set_writer(path, about) as writer:
+            for pairs in pairing.batches(range(first, first + count)):
+                writer.write(set_of_pairs(pairs, rules.closest_s, at, str(path)))
+                total += math.fsum(pairs.weight)
+                squares += math.fsum(pairs.weight**2)
+                attempts += int(np.sum(pairs.attempts + 1))
+    except TrackError as error:
+        raise UsageError(f"{model}: {error}") from None
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {count} encounters of {rules.duration_s} s")
+    say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
+
+
+def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:
+    """Return the densities of miss distances that a command line asks for."""
+    changes: dict[str, Any] = {}
+    for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
+        if given is None:
+            continue
+        try:
+            edges, parts = (np.array([float(word) for word in text.split(",")]) for text in given)
+        except ValueError:
+            raise UsageError(
+                f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
+                "step between two, all with commas between them"
+            ) from None
+        said = f"{option} {' '.join(given)}"
+        if not (np.abs(edges) <= _FARTHEST_FT).all():
+            raise UsageError(f"{said}: edges must lie within ±{_FARTHEST_FT:g} ft")
+        if option == "--vertical" and not (parts <= 1.0).all():
+            raise UsageError(f"{said}: chances must lie above 0 and be 1 at most")
+        # Shares of horizontal distances are of a step as a whole, those of heights its chance.
+        wide = np.diff(edges) if option == "--horizontal" and len(edges) == len(parts) + 1 else 1.0
+        try:
+            with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
+                density = StepDensity(edges, parts / wide)
+        except ValueError as error:
+            raise UsageError(f"{said}: {error}") from None
+        if edges[0] > 0.0 or edges[-1] < 0.0:
+            raise UsageError(f"{said}: the edges must lie about 0")
+        changes["horizontal_ft" if option == "--horizontal" else "vertical_ft"] = density
+    return PairingRules(**changes)
+
+
+def _write_made(made: str, out: str) -> None:
+    recipe = read_recipe(made)
+    path = named(out)
+    check_ending(path, [SET])
+    check_file(path)
+    found = made_set(recipe)
+    try:
+        with set_writer(path, {"made_by": "hand", "seed": recipe.seed}) as writer:
+            writer.write(found)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {len(found)} encounters of {recipe.duration_s:g} s")
+
+
+def check_place(at: tuple[float, float]) -> None:
+    """Raise UsageError unless a latitude and a longitude are usable as the origin of a set."""
+    if not is_place(at):
+        raise UsageError(
+            f"--at {at[0]} {at[1]}: latitude must lie within ±89, longitude within ±360 degrees"
+        )

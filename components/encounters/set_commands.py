@@ -1,0 +1,299 @@
+"""``dsa-des encounters convert``, ``show`` and ``split``: what is done with sets."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.encounters.encounter_tables import kept_rows, numbers, read_table
+from components.encounters.model_commands import check_place
+from components.encounters.splitting import expected_copies, nearness, split_set
+from components.formats.encounter_set import EncounterSet, geometry_class
+from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
+from components.formats.set_file import EncounterSetError, read_set, set_writer
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import refuse_samples
+from dsa_des.files.input_files import InputFileError, resolve_home
+from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
+from dsa_des.files.output_names import named, reason_of
+from dsa_des.terminal.tables import print_table
+from dsa_des.terminal.terminal import console, say
+
+
+def convert_sets(
+    files: tuple[str, ...],
+    weights: str | None,
+    at: tuple[float, float] | None,
+    skip_damaged: bool,
+    out: str,
+) -> None:
+    """Write what is in some files as one set, or as a file of waypoints."""
+    if at is not None:
+        check_place(at)
+    path = named(out)
+    if path.suffix.lower() not in (SET, *WAYPOINTS):
+        raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
+    check_file(path)
+    try:
+        found = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
+        if weights is not None:
+            found = EncounterSet(**{**vars(found), "weights": _weights(weights, found)})
+        if path.suffix.lower() == SET:
+            with set_writer(path, {"made_by": "conversion"}) as writer:
+                writer.write(found)
+        else:
+            write_file(path, waypoints_of(found))
+    except InputFileError as error:
+        raise UsageError(str(error)) from None
+    except EncounterSetError as error:
+        raise UsageError(*str(error).split("\n")) from None
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {len(found)} encounters")
+    if found.skipped:
+        say(f"{found.skipped} damaged encounters were skipped")
+
+
+def _weights(text: str, found: EncounterSet) -> FloatArray:
+    """Return the weights that a table with the columns ``encounter`` and ``weight`` gives."""
+    table = read_table(text)
+    number, wrong = numbers(table, "encounter", "--weights", flag=False)
+    weight, also = numbers(table, "weight", "--weights", flag=False)
+    kept_rows(table, [wrong, also], skip=False)
+    known = dict(zip(number.astype(np.int64).tolist(), weight.tolist(), strict=True))
+    missing = [n for n in found.numbers.tolist() if n not in known]
+    if missing:
+        raise UsageError(f"{text}: encounter {missing[0]}: weight is missing")
+    weights = np.array([known[n] for n in found.numbers.tolist()])
+    if not (weights > 0.0).any():
+        raise UsageError(f"{text}: all weights are 0")
+    return weights
+
+
+_DRAWN = 12
+
+
+@dataclass(frozen=True)
+class Closest:
+    """Closest approaches (of the nearest intruder); arrays over encounters.
+
+    Parameters
+    ----------
+    weight : (n,)
+    horizontal_m, vertical_m : (n,)
+        Apart, then; vertical is intruder above ownship.
+    time_s : (n,)
+    closing_mps : (n,)
+        Relative speed then.
+    course_deg : (n,)
+        The intruder's against the ownship's.
+    """
+
+    weight: FloatArray
+    horizontal_m: FloatArray
+    vertical_m: FloatArray
+    time_s: FloatArray
+    closing_mps: FloatArray
+    course_deg: FloatArray
+
+
+def closest_approaches(found: EncounterSet, places: Sequence[int]) -> Closest:
+    """Return the closest approaches of some encounters, exact along straight paths in the plane."""
+    rows = [_closest(found, place) for place in places]
+    return Closest(found.weights[list(places)], *np.array(rows).T)
+
+
+def _closest(found: EncounterSet, place: int) -> tuple[float, ...]:
+    first, end = (int(found.first_rows[place + k]) for k in (0, 1))
+    own = np.stack(found.path(first))
+    best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
+    for row in range(first + 1, end):
+        other = np.stack(found.path(row))
+        low, high = max(own[0, 0], other[0, 0]), min(own[0, -1], other[0, -1])
+        both = np.union1d(own[0], other[0])
+        both = both[(both >= low) & (both <= high)]
+        if len(both) < 2:
+            continue
+        a, b = (np.array([np.interp(both, p[0], p[k]) for k in (1, 2, 3)]) for p in (own, other))
+        apart, step = b - a, np.diff(b - a)
+        length = (step * step).sum(axis=0)
+        share = -(apart[:, :-1] * step).sum(axis=0) / np.where(length > 0.0, length, 1.0)
+        share = np.clip(share, 0.0, 1.0)
+        at = apart[:, :-1] + share * step
+        k = int(np.argmin((at * at).sum(axis=0)))
+        duration = both[k + 1] - both[k]
+        ways = [np.diff(p[:2, k : k + 2])[:, 0] for p in (a, b)]
+        courses = [math.degrees(math.atan2(way[1], way[0])) for way in ways]
+        found_here = (
+            float(np.hypot(at[0, k], at[1, k])), float(at[2, k]),
+            float(both[k] + share[k] * duration), float(math.sqrt(length[k]) / duration),
+            (courses[1] - courses[0]) % 360.0,
+        )  # fmt: skip
+        distance = float((at[:, k] ** 2).sum())
+        best = min(best, (distance, found_here), key=lambda one: one[0])
+    return best[1]
+
+
+def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
+    """Print what is in a set, and draw it where that is asked for."""
+    path = None if figure is None else named(figure, "--figure")
+    if path is not None:
+        check_ending(path, PICTURES, "--figure")
+        check_file(path, "--figure")
+    try:
+        found = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
+    except (EncounterSetError, InputFileError) as error:
+        raise UsageError(*str(error).split("\n")) from None
+    places = np.unique(np.linspace(0, len(found) - 1, min(most, len(found))).astype(int)).tolist()
+    closest = closest_approaches(found, places)
+    total, squares = math.fsum(found.weights), math.fsum(found.weights**2)
+    say(f"{found.source}: {len(found)} encounters of {found.kind}, {len(found.names)} flights")
+    say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
+        else "all weights are 0")  # fmt: skip
+    if found.skipped:
+        say(f"{found.skipped} damaged encounters were skipped")
+    if len(places) < len(found):
+        say(f"closest approaches of {len(places)} of them, evenly spread")
+    headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]
+    print_table(console(), "", headings, _rows(closest), right=range(1, 5))
+    print_table(console(), "", ["geometry", "encounters", "share of the weight"],
+                _classes(closest), right=range(1, 3))  # fmt: skip
+    if path is not None:
+        try:
+            _draw(found, places, closest, path)
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+        say(f"{path}")
+
+
+def _rows(c: Closest) -> list[list[str]]:
+    rows = []
+    for name, values in (
+        ("horizontal, m", c.horizontal_m), ("vertical, m", c.vertical_m), ("time, s", c.time_s),
+        ("relative speed, m/s", c.closing_mps),
+    ):  # fmt: skip
+        good = np.isfinite(values)
+        weight = c.weight[good]
+        mean = (weight * values[good]).sum() / weight.sum() if weight.sum() > 0 else math.nan
+        spread = np.quantile(values[good], [0.05, 0.5, 0.95]) if good.any() else [math.nan] * 3
+        rows.append([name, *(f"{v:.4g}" for v in (*spread, mean))])
+    return rows
+
+
+def _classes(c: Closest) -> list[list[str]]:
+    kinds: AnyArray = geometry_class(c.course_deg)
+    total = c.weight.sum() or 1.0
+    return [
+        [str(kind), str(int((kinds == kind).sum())), f"{c.weight[kinds == kind].sum() / total:.3f}"]
+        for kind in np.unique(kinds)
+    ]
+
+
+def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> None:
+    """Draw histograms of the geometry, as drawn and as weighted, and a plan of a sample."""
+    from dsa_des.record.drawing import drawing
+
+    with drawing(11.0, 6.5, path) as figure:
+        axes: Any = figure.subplots(2, 3)
+        parts = (
+            ("horizontal distance, m", c.horizontal_m), ("vertical distance, m", c.vertical_m),
+            ("closest at, s", c.time_s), ("relative speed, m/s", c.closing_mps),
+            ("course against the ownship's, °", c.course_deg),
+        )  # fmt: skip
+        weight = c.weight / c.weight.sum() if c.weight.sum() > 0 else None
+        for axis, (name, values) in zip(axes.flat, parts, strict=False):
+            good = np.isfinite(values)
+            middle = float(np.mean(values[good])) if good.any() else 0.0
+            near = bool(np.ptp(values[good]) < 1e-2) if good.any() else False
+            edges = np.histogram_bin_edges(
+                values[good], 24, (middle - 0.5, middle + 0.5) if near else None
+            )
+            share = np.full(int(good.sum()), 1.0 / max(int(good.sum()), 1))
+            axis.hist(values[good], edges, weights=share, color="#9ecae1", label="encounters")
+            if weight is not None:
+                axis.hist(values[good], edges, weights=weight[good], histtype="step",
+                          color="#d94801", label="weighted")  # fmt: skip
+            axis.set_xlabel(name)
+            axis.set_ylabel("share")
+        axes.flat[0].legend()
+        plan = axes.flat[5]
+        for place in places[:: max(1, len(places) // _DRAWN)][:_DRAWN]:
+            rows = range(int(found.first_rows[place]), int(found.first_rows[place + 1]))
+            for k, row in enumerate(rows):
+                _, north, east, _ = found.path(row)
+                plan.plot(
+                    east / 1000, north / 1000, lw=0.8, color="#08519c" if k == 0 else "#d94801"
+                )
+        plan.set_aspect("equal", adjustable="datalim")
+        plan.set_xlabel("east, km")
+        plan.set_ylabel("north, km")
+        plan.set_title("plan of a sample (ownship blue)")
+        figure.tight_layout()
+
+
+def split_encounters(
+    file: str,
+    levels: str,
+    copies: str,
+    scores: str | None,
+    score: str | None,
+    seed: int,
+    out: str,
+) -> None:
+    """Write a set of copies of another set's encounters."""
+    if (scores is None) != (score is None):
+        raise UsageError("--scores TABLE and --score COLUMN belong together: give both, or neither")
+    path = named(out)
+    check_ending(path, [SET])
+    check_file(path)
+    try:
+        found = read_set(resolve_home(file))
+    except (EncounterSetError, InputFileError) as error:
+        raise UsageError(*str(error).split("\n")) from None
+    if scores is None or score is None:
+        near = np.array([nearness(found, place) for place in range(len(found))])
+    else:
+        near = _scores(scores, score, found)
+    try:
+        expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
+    except ValueError as error:
+        raise UsageError(f"--levels {levels} --copies {copies}: {error}") from None
+    lengths = np.diff(found.starts[found.first_rows])
+    refuse_samples(f"--copies {copies}", float(np.sum(expected * lengths)))
+    made = split_set(found, expected, seed)
+    if not len(made):
+        raise UsageError(f"{file}: no encounter is left; more copies are needed")
+    try:
+        with set_writer(path, {"made_by": "splitting", "of": str(file), "seed": seed}) as writer:
+            writer.write(made)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    families = len(np.unique(made.extra["family"]))
+    say(f"{path}: {len(made)} encounters, copies of {families} of {len(found)}")
+    say(f"sum of weights {math.fsum(made.weights):.6g}, of the set {math.fsum(found.weights):.6g}")
+
+
+def _numbers(option: str, text: str) -> FloatArray:
+    try:
+        return np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        raise UsageError(f"{option} {text}: must be numbers with commas between them") from None
+
+
+def _scores(text: str, column: str, found: EncounterSet) -> FloatArray:
+    """Return each encounter's least value in a table or a study's folder."""
+    table = read_table(text)
+    number, wrong = numbers(table, "encounter", "--scores", flag=False)
+    value, also = numbers(table, column, "--score", flag=False)
+    kept_rows(table, [wrong, also], skip=False)
+    least: dict[int, float] = {}
+    for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
+        least[n] = min(v, least.get(n, math.inf))
+    missing = [n for n in found.numbers.tolist() if n not in least]
+    if missing:
+        raise UsageError(f"{text}: encounter {missing[0]}: {column} is missing")
+    return np.array([least[n] for n in found.numbers.tolist()])

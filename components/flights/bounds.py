@@ -1,0 +1,185 @@
+"""Bounds of flights over a run: speeds, times, lines of sight, and height above the terrain.
+
+Nothing moves farther than its largest speed times half the spacing of the samples from where a
+sample saw it. What holds at the samples, widened by that, holds all the time.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
+from components.geometry.angles import wrap_by_sines
+from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M, line_of_sight
+from components.geometry.state import TrajectoryState
+from components.messages.reach import REACH_MARGIN
+from components.terrain.raster import ElevationRaster
+from dsa_des.arrays.types import FloatArray
+
+
+def max_speeds_mps(flights: Sequence[Any]) -> FloatArray:
+    """Return the largest speed of each flight along its path, shape (flights,)."""
+    if isinstance(flights, StraightFlights):
+        return flights.max_speeds_mps
+    return np.array([flight.max_speed_mps for flight in flights], dtype=np.float64)
+
+
+def intervals_present_s(flights: Sequence[Any]) -> FloatArray:
+    """Return the first and the last time at which each flight may be there, shape (flights, 2).
+
+    A flight that does not say it may be there at any time from 0 on.
+    """
+    if isinstance(flights, StraightFlights):
+        return flights.intervals_present_s
+    always = (0.0, math.inf)
+    there = [f.interval_present() if hasattr(f, "interval_present") else always for f in flights]
+    return np.array(there, dtype=np.float64).reshape(-1, 2)
+
+
+Interval = tuple[float, float]
+#: States of a flight at times (n,).
+FlightAt = Callable[[FloatArray], TrajectoryState]
+
+# Two per second where there are few aircraft, and a tenth of a second's work where there are many.
+_SPACING_S = 0.5
+_MOST_CELLS = 200_000
+#: Instants, one a second, at which a flight is compared with the terrain.
+_MOST_SAMPLES = 100_000
+# As in `culling`: speeds of turns and long legs hold to 2e-4, positions to less than a metre.
+_SPEED_MARGIN = 1.001
+_POSITION_MARGIN_M = 1.0
+
+
+@dataclass(frozen=True)
+class TrafficEnvelope:
+    """What the targets that come in reach, and the ownship, can do over a run.
+
+    Parameters
+    ----------
+    range_m : float
+        Longest line of sight within reach; 0 if no target ever comes in reach.
+    own_lat_deg, own_alt_m, target_alt_m : (low, high)
+    elevation_rad : float
+        Largest size of an elevation above the ownship's horizon, of targets in reach.
+    pitch_rad, roll_rad : float
+        Largest sizes of the ownship's pitch and roll.
+    """
+
+    range_m: float
+    own_lat_deg: Interval
+    own_alt_m: Interval
+    target_alt_m: Interval
+    elevation_rad: float
+    pitch_rad: float
+    roll_rad: float
+
+
+def traffic_envelope(
+    own: Any, targets: Any, fleet: Any, duration_s: float, reach_m: float
+) -> TrafficEnvelope:
+    """Bound a run's lines of sight up to a reach."""
+    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
+    intervals = max(1, math.ceil(count))
+    half_s = 0.5 * duration_s / intervals
+    times = (np.arange(intervals) + 0.5) * (2.0 * half_s)
+    own_state, states = own.at(times), fleet.at(times)
+    own_moves = _moves_m(own.max_speed_mps, half_s)
+    moves = _moves_m(max_speeds_mps(targets), half_s)
+    _, elevation, range_m = line_of_sight(
+        own_state.lat_deg[:, np.newaxis],
+        own_state.lon_deg[:, np.newaxis],
+        own_state.alt_m[:, np.newaxis],
+        states.lat_deg,
+        states.lon_deg,
+        states.alt_m,
+        validate=False,
+    )
+    apart = moves + own_moves
+    near = range_m - apart <= REACH_MARGIN * reach_m
+    lowest = float(own_state.alt_m.min()) - own_moves
+    # The normal turns fastest along the equator's meridian.
+    turns = own_moves / (SEMI_MAJOR_AXIS_M * (1.0 - ECCENTRICITY_SQUARED) + lowest)
+    lat, alt = own_state.lat_deg, (lowest, float(own_state.alt_m.max()) + own_moves)
+    latitudes = (
+        max(-90.0, float(lat.min()) - math.degrees(turns)),
+        min(90.0, float(lat.max()) + math.degrees(turns)),
+    )
+    pitch, roll = attitude_extremes_rad(own)
+    if not near.any():
+        return TrafficEnvelope(0.0, latitudes, alt, alt, 0.0, pitch, roll)
+    swing = np.arcsin(np.minimum(1.0, apart / np.maximum(range_m, 1e-3)))
+    steepest = float(np.max((np.abs(elevation) + swing)[near])) + turns
+    low, high = states.alt_m - moves, states.alt_m + moves
+    return TrafficEnvelope(
+        min(reach_m, float(np.max((range_m + apart)[near]))),
+        latitudes,
+        alt,
+        (float(low[near].min()), float(high[near].max())),
+        min(0.5 * math.pi, steepest),
+        pitch,
+        roll,
+    )
+
+
+def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
+    """Return the largest sizes of pitch and roll over a flight; pi/2 and pi where not known."""
+    if isinstance(trajectory, SampledTrajectory):
+        # Between samples both change evenly, roll by the shorter way round.
+        turned = np.diff(trajectory.roll_rad)
+        after = trajectory.roll_rad[:-1] + wrap_by_sines(turned)
+        roll = np.concatenate((trajectory.roll_rad, after))
+        return float(np.max(np.abs(trajectory.pitch_rad))), float(np.max(np.abs(roll)))
+    if isinstance(trajectory, ScriptedTrajectory):
+        _, pitch, roll_fixed = trajectory.fixed_attitude_rad
+        pitches = [s.pitch_rad for s in trajectory.segments] if pitch is None else [pitch]
+        rolls = [s.roll_rad for s in trajectory.segments] if roll_fixed is None else [roll_fixed]
+        return max(map(abs, pitches)), max(map(abs, rolls))
+    return 0.5 * math.pi, math.pi
+
+
+def _moves_m(speed_mps: Any, half_s: float) -> Any:
+    return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
+
+
+def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
+    """Refuse terrain that the ownship does not fly above."""
+    count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
+    times = np.linspace(0.0, duration_s, count)
+    state = own_at(times)
+    hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
+    if len(hit):
+        first = hit[0]
+        raise ValueError(
+            f"[terrain] height_m is {terrain_m:g}: it must be below the ownship, which is at "
+            f"{state.alt_m[first]:g} m at {times[first]:g} s"
+        )
+
+
+def check_on_raster(
+    own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
+) -> None:
+    """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
+    count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
+    times = np.linspace(0.0, duration_s, count)
+    state = own_at(times)
+    there = np.flatnonzero(state.present)
+    ground, inside = raster.height(state.lat_deg[there], state.lon_deg[there])
+    if len(there) and not inside.any():
+        first = there[0]
+        raise ValueError(
+            f"[terrain] raster {raster.name} covers {raster.box()}: the ownship is at latitude "
+            f"{state.lat_deg[first]:.6g}, longitude {state.lon_deg[first]:.6g} and never over it; "
+            "they must overlap"
+        )
+    hit = np.flatnonzero(state.alt_m[there] <= ground + offset_m)
+    if len(hit):
+        first = there[hit[0]]
+        raise ValueError(
+            f"[terrain] raster {raster.name} is {ground[hit[0]] + offset_m:.6g} m high under the "
+            f"ownship, which is at {state.alt_m[first]:.6g} m at {times[first]:.6g} s: it must fly "
+            "above the ground"
+        )

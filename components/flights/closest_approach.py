@@ -1,0 +1,161 @@
+"""The instant of closest approach: time is halved, with the largest speeds as proof.
+
+Distances are compared at given times. A target that is d away at one of them is nowhere nearer
+than d - v·dt up to a time dt before or after it, with v the sum of the two largest speeds: a
+stretch of time in which that leaves nothing nearer than what is known already is not looked at.
+What is found is what looking at every time would find, to the bit.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.flights.bounds import intervals_present_s
+from components.flights.sample_times import SampleTimes
+from components.geometry.ellipsoid import line_of_sight
+from dsa_des.arrays.types import FloatArray, IntArray
+
+# As in `near_intervals`: speeds of turns and long legs hold to 2e-4, positions to under a metre.
+_SPEED_MARGIN = 1.001
+_RANGE_MARGIN_M = 1.0
+#: So many stretches of time are looked at together: it bounds the memory, however long the run.
+MOST_AT_ONCE = 32_768
+
+
+@dataclass(frozen=True, eq=False)
+class Approaches:
+    """The closest approach of each of many targets.
+
+    Parameters
+    ----------
+    time_s : (targets,)
+        NaN where target and ownship are never there together at any of the times.
+    range_m : (targets,)
+        Slant range; infinite there.
+    """
+
+    time_s: FloatArray
+    range_m: FloatArray
+
+    @classmethod
+    def none(cls, targets: int) -> "Approaches":
+        """Return what is known before anything was looked at."""
+        return cls(np.full(targets, np.nan), np.full(targets, np.inf))
+
+
+def closest_approaches(
+    own_at: Callable[[IntArray, FloatArray], Any],
+    targets_at: Callable[[IntArray, FloatArray], Any],
+    times: SampleTimes,
+    *,
+    closing_speed_mps: FloatArray,
+    present_s: tuple[FloatArray, FloatArray],
+    best: Approaches | None = None,
+) -> Approaches:
+    """Find the time of the smallest slant range of each target; the first one of several.
+
+    Flights are asked by `own_at` and `targets_at` of targets (n,), each at a time (n,) of its own;
+    only times from `present_s[0]` to `present_s[1]` are looked at. What is known already, `best`,
+    is improved in place.
+    """
+    closing = closing_speed_mps * _SPEED_MARGIN
+    best = Approaches.none(len(closing)) if best is None else best
+    target = np.arange(len(closing))
+    first, last = times.between(target, *present_s)
+    some = first <= last
+    waiting = [(target[some], first[some], last[some])]
+    while waiting:
+        target, first, last = waiting.pop()
+        if len(target) > MOST_AT_ONCE:  # the later part waits
+            waiting.append((target[MOST_AT_ONCE:], first[MOST_AT_ONCE:], last[MOST_AT_ONCE:]))
+            target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
+        middle = (first + last) // 2
+        time_s = times.at(target, middle)
+        range_m, there = _apart(own_at(target, time_s), targets_at(target, time_s))
+        _improve(best, target[there], time_s[there], range_m[there])
+        away_s = np.maximum(time_s - times.at(target, first), times.at(target, last) - time_s)
+        nearest_m = range_m - closing[target] * away_s - _RANGE_MARGIN_M
+        open_ = nearest_m <= best.range_m[target]
+        before, after = open_ & (first < middle), open_ & (middle < last)
+        halves = (
+            np.concatenate((target[before], target[after])),
+            np.concatenate((first[before], middle[after] + 1)),
+            np.concatenate((middle[before] - 1, last[after])),
+        )
+        if len(halves[0]) > MOST_AT_ONCE:
+            # Those that may come nearest first: what they find spares the others.
+            order = np.argsort(np.concatenate((nearest_m[before], nearest_m[after])), kind="stable")
+            halves = halves[0][order], halves[1][order], halves[2][order]
+        if len(halves[0]):
+            waiting.append(halves)
+    return best
+
+
+def _apart(own: Any, other: Any) -> tuple[FloatArray, Any]:
+    """Return slant ranges between two states, and whether both are there."""
+    _, _, range_m = line_of_sight(
+        own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
+        validate=False,
+    )  # fmt: skip
+    return range_m, own.present & other.present
+
+
+def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray) -> None:
+    """Note what is nearer than all that was known, or as near and earlier."""
+    maybe = range_m <= best.range_m[target]
+    target, time_s, range_m = target[maybe], time_s[maybe], range_m[maybe]
+    order = np.lexsort((time_s, range_m, target))
+    one = order[np.flatnonzero(np.diff(target[order], prepend=-1))]
+    known_m, known_s = best.range_m[target[one]], best.time_s[target[one]]
+    nearer = range_m[one] < known_m
+    nearer |= (range_m[one] == known_m) & (time_s[one] < known_s)
+    one = one[nearer]
+    best.range_m[target[one]] = range_m[one]
+    best.time_s[target[one]] = time_s[one]
+
+
+def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
+    """Say of each closest approach whether it is at an end of what was looked at."""
+    present_s = np.array(present_together_s(source.own, source.targets, end_s))
+    looked_s = np.array(_looked_at_s(source, *present_s))
+    return [
+        end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
+        for number, time in enumerate(time_s.tolist())
+    ]
+
+
+def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
+    """Say of one closest approach whether it is at an end of what was looked at."""
+    if time_s <= looked_s[0]:
+        return "the start of its flight" if present_s[0] > 0.0 else "the start"
+    if time_s >= looked_s[1]:
+        return "the end of the run" if present_s[1] >= end_s else "the end of its flight"
+    return ""
+
+
+def present_together_s(
+    own: Any, targets: Sequence[Any], end_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the first and the last time (targets,) of a run at which both may be there, s."""
+    first, last = intervals_present_s([own])[0].tolist()
+    intervals = intervals_present_s(targets)
+    return (
+        np.maximum(intervals[:, 0], max(first, 0.0)),
+        np.minimum(intervals[:, 1], min(last, end_s)),
+    )
+
+
+def _looked_at_s(
+    source: Any, begin_s: FloatArray, end_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the first and the last sample (targets,) in [begin_s, end_s]; NaN without any."""
+    first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
+    for times in source.sample_times():
+        targets = np.arange(len(begin_s))
+        low, high = times.between(targets, begin_s, end_s)
+        some = np.flatnonzero(high >= low)
+        first[some] = np.fmin(first[some], times.at(some, low[some]))
+        last[some] = np.fmax(last[some], times.at(some, high[some]))
+    return first, last

@@ -1,0 +1,172 @@
+"""Segments of a scripted flight, each with an exact closed form: geodesics, turns, and holds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from geographiclib.geodesic import Geodesic
+
+from components.flights.geodesic_motion import geodesic_state
+from components.geometry.angles import (
+    TWO_PI,
+    FloatArray,
+    local_axes,
+    normal_to_degrees,
+    past,
+    wrap_heading_rad,
+)
+from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, radii_of_curvature
+
+LARGEST_TURN_RADIUS_M = 200_000.0
+"""Up to here a turn keeps its speed to 2e-4; the error grows with the radius, 1e-6 at 1 km."""
+
+# Rows: the centre's axes (east, north, up), reciprocal radii east and north, and the motion.
+_EAST, _NORTH, _UP = 0, 3, 6
+
+_PER_EAST, _PER_NORTH, _RADIUS, _PHASE, _RATE, _ALT, _CLIMB = range(9, 16)
+
+TURN_ROWS = 16
+
+
+def turn_parameters(
+    lat_deg: float,
+    lon_deg: float,
+    alt_m: float,
+    azimuth_rad: float,
+    speed_mps: float,
+    climb_mps: float,
+    rate_rad_s: float,
+) -> FloatArray:
+    """Prepare a turn: everything that does not depend on time.
+
+    The circle lies around its own centre in the chart (east, north) -> (angle about the centre's
+    prime-vertical and meridian radii), so it is round in metres although the ellipsoid's two
+    radii differ by up to 0.7 %, and it returns to where it began.
+    """
+    radius = abs(speed_mps / rate_rad_s)
+    if radius > LARGEST_TURN_RADIUS_M:
+        raise ValueError(
+            f"turn radius is {radius:.0f} metres ({speed_mps:g} m/s at "
+            f"{math.degrees(rate_rad_s):g} deg/s): it must not exceed {LARGEST_TURN_RADIUS_M:g}; "
+            "use a straight leg or waypoints"
+        )
+    meridian, prime_vertical = radii_of_curvature(lat_deg)
+    side = math.copysign(0.5 * math.pi, rate_rad_s)
+    # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).
+    cos2, sin2 = math.sin(azimuth_rad) ** 2, math.cos(azimuth_rad) ** 2
+    abeam = 1.0 / (cos2 / float(meridian) + sin2 / float(prime_vertical))
+    centre = Geodesic.WGS84.Direct(
+        lat_deg,
+        lon_deg,
+        math.degrees(azimuth_rad + side),
+        radius * abeam / (abeam + alt_m),
+    )
+    c_lat, c_lon = np.array([centre["lat2"]]), np.array([centre["lon2"]])
+    axes = [np.array(axis)[:, 0] for axis in local_axes(c_lat, c_lon)]
+    start = np.array(local_axes(np.array([lat_deg]), np.array([lon_deg]))[2])[:, 0]
+    c_meridian, c_prime_vertical = radii_of_curvature(float(c_lat[0]))
+    per_east, per_north = 1.0 / (c_prime_vertical + alt_m), 1.0 / (c_meridian + alt_m)
+    east, north, up = (float(axis @ start) for axis in axes)
+    chord = math.hypot(east, north)
+    stretch = math.atan2(chord, up) / chord if chord else 1.0
+    x, y = east * stretch / float(per_east), north * stretch / float(per_north)
+    table = np.empty(TURN_ROWS)
+    table[_EAST : _EAST + 3], table[_NORTH : _NORTH + 3], table[_UP : _UP + 3] = axes
+    table[_PER_EAST], table[_PER_NORTH] = per_east, per_north
+    table[_RADIUS], table[_PHASE] = math.hypot(x, y), math.atan2(x, y)
+    table[_RATE], table[_ALT], table[_CLIMB] = rate_rad_s, alt_m, climb_mps
+    return table
+
+
+def turn_state(
+    table: FloatArray, elapsed: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Evaluate turns."""
+    angle = table[_PHASE] + table[_RATE] * elapsed
+    sine, cosine = np.sin(angle), np.cos(angle)
+    # Offsets from the centre as angles, and their derivatives by `angle`.
+    east, north = (
+        table[_RADIUS] * sine * table[_PER_EAST],
+        table[_RADIUS] * cosine * table[_PER_NORTH],
+    )
+    d_east, d_north = (
+        table[_RADIUS] * cosine * table[_PER_EAST],
+        -table[_RADIUS] * sine * table[_PER_NORTH],
+    )
+    rho = np.sqrt(east * east + north * north)
+    sin_rho, cos_rho = np.sin(rho), np.cos(rho)
+    sinc = sin_rho / rho
+    d_rho = (east * d_east + north * d_north) / rho
+    d_sinc = (cos_rho - sinc) / rho * d_rho
+    x, y, z = (
+        cos_rho * table[_UP + i] + sinc * (east * table[_EAST + i] + north * table[_NORTH + i])
+        for i in range(3)
+    )
+    dx, dy, dz = (
+        d_sinc * (east * table[_EAST + i] + north * table[_NORTH + i])
+        + sinc * (d_east * table[_EAST + i] + d_north * table[_NORTH + i])
+        - sin_rho * d_rho * table[_UP + i]
+        for i in range(3)
+    )
+    lat, lon = normal_to_degrees(x, y, z)
+    # The velocity's east and north parts, both times the distance to the axis; the meridian's
+    # radius is the prime vertical's times (1 - e²) / w², of which altitude changes next to nothing.
+    level = x * x + y * y
+    to_east = x * dy - y * dx
+    to_north = level * dz - z * (x * dx + y * dy)
+    to_north = to_north * ((1.0 - ECCENTRICITY_SQUARED) / (1.0 - ECCENTRICITY_SQUARED * z * z))
+    direction = np.where(table[_RATE] + 0.0 * rho > 0.0, 1.0, -1.0)
+    yaw = wrap_heading_rad(np.arctan2(to_east * direction, to_north * direction))
+    return lat, lon, table[_ALT] + table[_CLIMB] * elapsed, yaw
+
+
+Kind = Literal["geodesic", "turn", "hold"]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One leg, ready to be evaluated.
+
+    Parameters
+    ----------
+    kind : {"geodesic", "turn", "hold"}
+        Which formula; "hold" stays over one place, and may climb and turn on the spot.
+    start_s : float
+        When it begins, since the start of the flight.
+    parameters : ndarray
+        The formula's table. For "hold": lat_deg, lon_deg, alt_m, climb_mps, yaw_rad, rate_rad_s.
+    pitch_rad, roll_rad : float
+        The attitude that follows from the motion.
+    speed_mps : float
+        Along the path, climb included.
+    """
+
+    kind: Kind
+    start_s: float
+    parameters: FloatArray
+    pitch_rad: float
+    roll_rad: float
+    speed_mps: float
+
+
+def hold_state(
+    table: FloatArray, elapsed: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Evaluate aircraft that stay over one place; see `Segment` for the table's rows."""
+    zero = np.zeros_like(elapsed)
+    # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
+    yaw = past(table[4] + table[5] * elapsed, TWO_PI)
+    return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
+
+
+FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
+
+
+def segment_state(segment: Segment, elapsed: FloatArray) -> tuple[FloatArray, ...]:
+    """Evaluate one segment at times since its start."""
+    state = FORMULAS[segment.kind](segment.parameters[:, np.newaxis], elapsed)
+    pitch, roll = (np.full_like(elapsed, a) for a in (segment.pitch_rad, segment.roll_rad))
+    return (*state, pitch, roll)

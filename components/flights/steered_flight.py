@@ -1,0 +1,276 @@
+"""Flights that are steered while they are flown, and flights of any kind asked together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from components.flights.legs import AnyLeg, Straight, Turn
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry.state import TrajectoryState
+from components.messages.steering import Manoeuvre
+from dsa_des.arrays.types import FloatArray
+
+
+class Trajectory(Protocol):
+    """The flight of one aircraft."""
+
+    name: str
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along its path."""
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return its state at some times."""
+
+
+# Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
+# place is right to 0.0625 m on the way, and exact at the end.
+_SPEED_STEP_S = 0.5
+# Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
+_BASE_S = 0.5
+AROUND_S = np.array([-_BASE_S, 0.0, _BASE_S])
+_SHORTEST_PIECE_S = 1e-9
+
+#: How long, s, at which mean rate, and how that changes each second; one after the other.
+Pieces = tuple[tuple[float, float, float], ...]
+
+
+class SteeredFlight:
+    """A flight up to its first manoeuvre, then what it is told: turns, climbs, speeds together.
+
+    A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
+    climb. The flight's own script ends with the first one.
+
+    It never changes: `steered` returns another one, so that a run can go back to the flight it had.
+    """
+
+    def __init__(
+        self, flight: Trajectory, parts: tuple[tuple[float, SteeredPart], ...] = ()
+    ) -> None:
+        self.name, self.flight, self.parts = flight.name, flight, parts
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along the path as it is now."""
+        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
+
+    def fastest_by(self, time_s: FloatArray) -> FloatArray:
+        """Return the largest speed of any manoeuvre that has begun by each of some times, or 0."""
+        speeds = [0.0, *(flight.max_speed_mps for _, flight in self.parts)]
+        part = np.searchsorted([start for start, _ in self.parts], time_s, side="right")
+        return np.asarray(np.maximum.accumulate(speeds)[part])
+
+    def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
+        """Return the flight that does as it is told from a time on, beside what it still does.
+
+        A turn or a change of altitude begins and ends at once, without a change of speed along the
+        path's projection and without acceleration upward; speeds change steadily.
+        """
+        around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
+        before = self.parts[-1][1] if self.parts else None
+        (part,) = flown_from(self.name, around, np.array([time_s]), [told], [before])
+        return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return the state at some times, of any shape."""
+        times = np.asarray(time_s, dtype=np.float64)
+        if not self.parts:
+            return self.flight.at(times)
+        flat = times.reshape(-1)
+        part = np.searchsorted([start for start, _ in self.parts], flat, side="right")
+        flights: list[Any] = [self.flight, *(flight for _, flight in self.parts)]
+        flown = np.flatnonzero(np.bincount(part, minlength=1)).tolist()
+        if len(flown) == 1:
+            state: TrajectoryState = flights[flown[0]].at(times)
+            return state
+        chosen = [np.flatnonzero(part == number) for number in flown]
+        states = [flights[k].at(flat[rows]) for k, rows in zip(flown, chosen, strict=True)]
+        # In order of time, rows of one flight follow those of another; others are put in place.
+        order = np.argsort(np.concatenate(chosen), kind="stable")
+        columns = zip(*(state.arrays() for state in states), strict=True)
+        return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
+
+
+class SteeringPlan(NamedTuple):
+    """What is still to be flown of turns, climbs and speeds, side by side, and what comes after.
+
+    Parameters
+    ----------
+    turns : Pieces
+        Rates in deg/s; then straight on.
+    climbs : Pieces
+        In m/s.
+    climb_mps : float
+        Afterwards.
+    speeds : Pieces
+        Over ground, in m/s.
+    speed_mps : float
+        Afterwards.
+    """
+
+    turns: Pieces
+    climbs: Pieces
+    climb_mps: float
+    speeds: Pieces
+    speed_mps: float
+
+    def after(self, elapsed_s: float) -> SteeringPlan:
+        """Return what is left of it after some time."""
+        return self._replace(
+            turns=_left(self.turns, elapsed_s),
+            climbs=_left(self.climbs, elapsed_s),
+            speeds=_left(self.speeds, elapsed_s),
+        )
+
+    def told(self, told: Manoeuvre, alt_m: float) -> SteeringPlan:
+        """Return it with the parts that are told anew, from an altitude; the others stay."""
+        plan = self
+        if told.turn_rad != 0.0:
+            rate_deg_s = math.copysign(math.degrees(told.rate_rad_s), told.turn_rad)
+            angle_rad = math.radians(math.degrees(abs(told.turn_rad)))
+            plan = plan._replace(
+                turns=((angle_rad / abs(math.radians(rate_deg_s)), rate_deg_s, 0.0),)
+            )
+        if told.vertical_speed_mps != 0.0:
+            climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
+            plan = plan._replace(
+                climbs=_ramp(climb_mps, told.vertical_speed_mps, told.vertical_acceleration_mps2),
+                climb_mps=climb_mps + told.vertical_speed_mps,
+            )
+        elif told.climb_m != 0.0:
+            rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
+            rise_s = (alt_m + told.climb_m - alt_m) / rate_mps
+            plan = plan._replace(
+                climbs=((rise_s, rate_mps, 0.0),) if rise_s > 0.0 else (), climb_mps=0.0
+            )
+        if told.speed_mps != 0.0:
+            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
+            change = max(told.speed_mps, -speed_mps)
+            plan = plan._replace(
+                speeds=_ramp(speed_mps, change, told.acceleration_mps2),
+                speed_mps=speed_mps + change,
+            )
+        return plan
+
+    def legs(self) -> list[AnyLeg]:
+        """Return it as legs, each as long as nothing changes; the last one is for ever."""
+        legs: list[AnyLeg] = []
+        plan = self
+        while plan.turns or plan.climbs or plan.speeds:
+            parts = plan.turns, plan.climbs, plan.speeds
+            lasts_s = min(part[0][0] for part in parts if part)
+            climb_mps = _mean(plan.climbs, lasts_s, plan.climb_mps)
+            speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
+            if plan.turns:
+                rate_deg_s = plan.turns[0][1]
+                legs.append(Turn(lasts_s, speed_mps, climb_mps, rate_deg_s=rate_deg_s))
+            else:
+                legs.append(Straight(lasts_s, speed_mps, climb_mps))
+            plan = plan.after(lasts_s)
+        return [*legs, Straight(speed_mps=plan.speed_mps, climb_mps=plan.climb_mps)]
+
+
+def _left(pieces: Pieces, elapsed_s: float) -> Pieces:
+    for number, (lasts_s, mean, change) in enumerate(pieces):
+        # What rounding leaves of a piece is none.
+        if elapsed_s < lasts_s - _SHORTEST_PIECE_S:
+            gone_s = max(elapsed_s, 0.0)
+            return ((lasts_s - gone_s, mean + 0.5 * change * gone_s, change), *pieces[number + 1 :])
+        elapsed_s -= lasts_s
+    return ()
+
+
+def _mean(pieces: Pieces, first_s: float, without: float) -> float:
+    """Return the mean rate over the first seconds of the first piece, or what is flown without."""
+    if not pieces:
+        return without
+    lasts_s, mean, change = pieces[0]
+    return mean - 0.5 * change * (lasts_s - first_s)
+
+
+class SteeredPart(ScriptedTrajectory):
+    """What is flown after a manoeuvre, with the plan that it follows."""
+
+    plan: SteeringPlan
+
+
+def flown_from(
+    name: str,
+    around: TrajectoryState,
+    time_s: FloatArray,
+    told: Sequence[Manoeuvre],
+    before: Sequence[SteeredPart | None],
+) -> list[SteeredPart]:
+    """Return what aircraft fly from a manoeuvre on.
+
+    `around` says where each would be without it, (n, 3), `AROUND_S` of its time. Parts of an
+    earlier manoeuvre, `before`, that are not commanded anew go on.
+    """
+    middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
+    # Ends of the chord seen from its middle, so that the track is the one there.
+    ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
+    north, east, _ = line_of_sight_ned(*middle, *ends)
+    found = []
+    rows = zip(time_s.tolist(), told, before, strict=True)
+    for row, (at_s, manoeuvre, earlier) in enumerate(rows):
+        low, here, high = around.alt_m[row].tolist()
+        place = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
+        if earlier is None:
+            along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
+            heading_deg = math.degrees(math.atan2(along[1], along[0]))
+            speed_mps = math.hypot(*along) / (2.0 * _BASE_S)
+            plan = SteeringPlan(
+                (), (), _own_climb(0.5 * (high - low) / _BASE_S, manoeuvre), (), speed_mps
+            )
+        else:
+            heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
+            plan = earlier.plan.after(at_s - earlier.start_time_s)
+        found.append(_flown_from(name, place, heading_deg, at_s, plan.told(manoeuvre, here)))
+    return found
+
+
+def _own_climb(climb_mps: float, told: Manoeuvre) -> float:
+    """Return the climb that is left of a flight's own: a turn or a climb ends it."""
+    ends = told.turn_rad != 0.0 or told.climb_m != 0.0
+    return 0.0 if ends and told.vertical_speed_mps == 0.0 else climb_mps
+
+
+# A study's metrics fly again what its runs flew.
+@lru_cache(maxsize=4096)
+def _flown_from(
+    name: str,
+    place: tuple[float, float, float],
+    heading_deg: float,
+    time_s: float,
+    plan: SteeringPlan,
+) -> SteeredPart:
+    part = SteeredPart(
+        name,
+        lat_deg=place[0],
+        lon_deg=place[1],
+        alt_m=place[2],
+        heading_deg=heading_deg,
+        speed_mps=plan.speed_mps,
+        legs=plan.legs(),
+        start_time_s=time_s,
+    )
+    part.plan = plan
+    return part
+
+
+def _ramp(from_mps: float, change_mps: float, acceleration_mps2: float) -> Pieces:
+    """Return a steady change of speed in equal steps, each at its mean."""
+    time_s = abs(change_mps) / acceleration_mps2
+    count = max(math.ceil(time_s / _SPEED_STEP_S), 1)
+    lasts_s = max(time_s / count, 1e-9)
+    rate_mps2 = math.copysign(acceleration_mps2, change_mps)
+    return tuple(
+        (lasts_s, from_mps + change_mps * (k + 0.5) / count, rate_mps2) for k in range(count)
+    )

@@ -1,0 +1,309 @@
+"""Read DAIDALUS `.daa` and `.xyz` encounter files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from components.formats.sample_table import (
+    UNITS,
+    SampleColumn,
+    SampleTable,
+    enu_velocity,
+    unit_factor,
+)
+from components.formats.text_rows import (
+    ALL_TOKENS,
+    Problems,
+    TrafficFile,
+    TrafficFileError,
+    cell_count,
+    cells,
+    clean_token,
+    did_you_mean,
+    read_lines,
+    shown_columns,
+    tokens,
+)
+from components.geometry.angles import FloatArray, local_axes
+from components.geometry.ellipsoid import enu_to_geodetic
+
+__all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
+
+HEADERS = {
+    "name": ("name", "id", "aircraft", "acid", "callsign", "ident"),
+    "time": ("time", "t", "clock"),
+    "lat": ("lat", "latitude"),
+    "lon": ("lon", "long", "longitude", "lng"),
+    "alt": ("alt", "altitude"),
+    "sx": ("sx", "x"),
+    "sy": ("sy", "y"),
+    "sz": ("sz", "z"),
+    "trk": ("trk", "track"),
+    "gs": ("gs", "groundspeed", "ground_speed"),
+    "vs": ("vs", "verticalspeed", "vertical_speed"),
+    "vx": ("vx",),
+    "vy": ("vy",),
+    "vz": ("vz",),
+}
+# Where the nose points, which the track does not say in wind; and what alerting reads besides:
+# which alerter an intruder belongs to, and standard deviations; those of "en" are signed square
+# roots of the covariances of east and north.
+EXTRA_HEADERS = {
+    "yaw": ("heading", "hdg", "true_heading", "trueheading", "yaw"),
+    "airspeed": ("airspeed", "air_speed", "tas", "true_airspeed"),
+    "alerter": ("alerter",),
+    **{
+        name: (name,)
+        for kind in ("s", "v")
+        for name in (*(f"{kind}_{axes}_std" for axes in ("ew", "ns", "en")), f"{kind}z_std")
+    },
+}
+# What DAIDALUS itself assumes where a file has no row of units.
+DEFAULT_UNITS = {
+    "time": "s",
+    "lat": "deg",
+    "lon": "deg",
+    "alt": "ft",
+    "sx": "nmi",
+    "sy": "nmi",
+    "sz": "ft",
+    "trk": "deg",
+    "gs": "knot",
+    "vs": "fpm",
+    "vx": "knot",
+    "vy": "knot",
+    "vz": "fpm",
+    "yaw": "deg",
+    "airspeed": "knot",
+    "alerter": "",
+    **{f"{name}_std": "m" for name in ("s_ew", "s_ns", "s_en", "sz")},
+    **{f"{name}_std": "m/s" for name in ("v_ew", "v_ns", "v_en", "vz")},
+}
+# Extras that are no error where they cannot be read: files in the wild hold gaps there.
+_OPTIONAL = frozenset({"yaw", "airspeed"})
+_VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
+
+
+def read_daa(
+    path: str | PathLike[str],
+    *,
+    reference_lat_deg: float = 0.0,
+    reference_lon_deg: float = 0.0,
+    reference_alt_m: float = 0.0,
+) -> TrafficFile:
+    """Read a `.daa` or `.xyz` file: one row of names, one of units, then samples.
+
+    Parameters
+    ----------
+    path : path-like
+        The file. Which of the two kinds it is shows in its columns, not in its name.
+    reference_lat_deg, reference_lon_deg, reference_alt_m : float
+        Where on Earth the origin of an `.xyz` file is put. Its sx and sy are east and north in
+        the tangent plane there, its sz is the altitude above the reference: aircraft at one sz
+        are level with each other, however far apart.
+
+    Returns
+    -------
+    TrafficFile
+        The first aircraft named is the ownship. Times count from the earliest sample.
+
+    Raises
+    ------
+    TrafficFileError
+        With all problems of the file (up to 20): line, column, value, what is allowed.
+
+    Notes
+    -----
+    Columns may come in any order; only name, time and position are required. Velocity is taken
+    from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there. A column `heading`
+    is where the nose points, from true north; an aircraft whose column has gaps, or a column that
+    is in no unit of angle, is read without it. All other columns are ignored. Commas, semicolons,
+    tabs and blanks separate, also mixed. A file without a row of units is read with those of
+    DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the notes. Altitudes are taken as
+    heights above the ellipsoid.
+    """
+    table, columns = _table(path, ("yaw",))
+    notes = table.notes
+    reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
+    if "sx" in columns:
+        notes.append(
+            f"positions are offsets from a reference point, put at latitude {reference[0]:g}, "
+            f"longitude {reference[1]:g}, altitude {reference[2]:g} m"
+        )
+    return table.finish(None, lambda samples: _geodetic(samples, reference))
+
+
+def read_daa_samples(
+    path: str | PathLike[str], extra: Sequence[str] = ()
+) -> dict[str, dict[str, FloatArray]]:
+    """Return the samples of a `.daa` or `.xyz` file by aircraft, in its order.
+
+    They are time (s), lat, lon (deg) and alt or sx, sy, sz (m), ve, vn, vu (m/s) where there are
+    velocities, and `extra` of its columns.
+    """
+    table, _ = _table(path, extra)
+    return {
+        name: {**samples, **enu_velocity(samples)} for name, samples in table.samples(None).items()
+    }
+
+
+def _table(
+    path: str | PathLike[str], extra: Sequence[str]
+) -> tuple[SampleTable, dict[str, SampleColumn]]:
+    """Read a file's rows into a table of samples, not checked yet against each other."""
+    problems = Problems(str(path))
+    lines = read_lines(Path(path), problems)
+    header_line, header_text = lines[0]
+    headers = tokens(header_text)
+    places = _find_columns(problems, headers, header_line, extra)
+    notes: list[str] = []
+    units, body = _find_units(problems, headers, places, lines[1:], notes)
+    columns = {}
+    for quantity in [*_wanted(places), *(q for q in extra if q in places)]:
+        index = places[quantity]
+        line, token = units[quantity]
+        if quantity in _OPTIONAL and clean_token(token) not in UNITS[quantity]:
+            notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
+            continue
+        factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
+        columns[quantity] = SampleColumn(index, headers[index], factor)
+    ignored = [
+        h
+        for i, h in enumerate(headers)
+        if i != places["name"] and i not in {c.index for c in columns.values()}
+    ]
+    if ignored:
+        notes.append(f"columns ignored: {', '.join(ignored)}")
+    table = SampleTable(problems, places["name"], columns, optional=_OPTIONAL)
+    table.notes = notes
+    for number, text in body:
+        row = cells(text, len(headers), places["name"])
+        if row is None:
+            problems.add(
+                f"the row has {cell_count(text)} values: the header names {len(headers)} columns",
+                line=number,
+            )
+        else:
+            table.add_row(number, row)
+    return table, columns
+
+
+def _find_columns(
+    problems: Problems, headers: list[str], line: int, extra: Sequence[str]
+) -> dict[str, int]:
+    """Find which column holds what; a missing required one ends the reading."""
+    plain = [header.lower() for header in headers]
+    places: dict[str, int] = {}
+    accepted = {**HEADERS, **{quantity: EXTRA_HEADERS[quantity] for quantity in extra}}
+    for quantity, names in accepted.items():
+        for name in names:
+            if name in plain and quantity not in places:
+                places[quantity] = plain.index(name)
+    offsets = any(q in places for q in ("sx", "sy", "sz")) and "lat" not in places
+    required = ("name", "time", *(("sx", "sy", "sz") if offsets else ("lat", "lon", "alt")))
+    unused = [h for i, h in enumerate(plain) if i not in places.values()]
+    for quantity in required:
+        if quantity not in places:
+            hint = did_you_mean(quantity, unused).replace("did you mean", "is it")
+            problems.add(
+                f"there is no column {quantity!r} among {shown_columns(headers, bool(places))}"
+                f"{hint}",
+                line=line,
+            )
+    problems.raise_if_any()
+    for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):
+        places.pop(quantity, None)
+    return places
+
+
+def _wanted(places: dict[str, int]) -> list[str]:
+    """List the quantities to read: time, position and one complete velocity."""
+    wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in places]
+    for velocity in _VELOCITIES:
+        if all(q in places for q in velocity):
+            return wanted + list(velocity)
+    return wanted
+
+
+def _find_units(
+    problems: Problems,
+    headers: list[str],
+    places: dict[str, int],
+    lines: list[tuple[int, str]],
+    notes: list[str],
+) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
+    """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
+    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in DEFAULT_UNITS.items()}
+    if not lines:
+        problems.fail("there are no samples after the row of column names")
+    line, text = lines[0]
+    row = tokens(text)
+    bracketed = "[" in text
+    known = sum(clean_token(token) in ALL_TOKENS for token in row)
+    if not bracketed and known < max(2, len(row) // 2):
+        used = [f"{headers[places[q]]} [{u}]" for q, u in DEFAULT_UNITS.items() if q in places]
+        notes.append(f"there is no row of units; assumed {', '.join(used)}")
+        return defaults, lines
+    if len(row) != len(headers):
+        problems.fail(
+            f"the row of units has {len(row)} entries: the header names {len(headers)} columns",
+            line=line,
+        )
+    units: dict[str, tuple[int | None, str]] = {
+        q: (line, row[places[q]]) for q in places if q in UNITS
+    }
+    return units, lines[1:]
+
+
+def _geodetic(
+    samples: dict[str, FloatArray], reference: tuple[float, float, float]
+) -> dict[str, FloatArray]:
+    """Turn one aircraft's columns into geodetic positions and local velocities."""
+    velocity = enu_velocity(samples)
+    if "sx" not in samples:
+        return {**samples, **velocity}
+    attitude = {}
+    lat, lon, _ = enu_to_geodetic(
+        samples["sx"],
+        samples["sy"],
+        samples["sz"],
+        reference_lat_deg=reference[0],
+        reference_lon_deg=reference[1],
+        reference_alt_m=reference[2],
+    )
+    if velocity:
+        # The file's axes are the reference point's; the aircraft's own have turned a little.
+        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
+        parts = [velocity[key] for key in ("ve", "vn", "vu")]
+        x, y, z = (
+            parts[0] * origin[0][i] + parts[1] * origin[1][i] + parts[2] * origin[2][i]
+            for i in range(3)
+        )
+        velocity = {
+            key: x * axis[0] + y * axis[1] + z * axis[2]
+            for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
+        }
+    if "yaw" in samples:
+        # A heading counts from the reference point's north as well.
+        nose = np.radians(samples["yaw"])
+        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
+        ahead = [np.sin(nose) * origin[0][i] + np.cos(nose) * origin[1][i] for i in range(3)]
+        east, north = (
+            sum(part * axis[i] for i, part in enumerate(ahead)) for axis in local_axes(lat, lon)[:2]
+        )
+        attitude = {"yaw": np.degrees(np.arctan2(east, north))}
+    # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
+    alt = samples["sz"] + reference[2]
+    return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity, **attitude}
+
+
+def daa_columns() -> list[tuple[str, ...]]:
+    """Return quantity, accepted names, and unit by default."""
+    return [
+        (quantity, ", ".join(names), DEFAULT_UNITS.get(quantity, ""))
+        for quantity, names in (*HEADERS.items(), ("yaw", EXTRA_HEADERS["yaw"]))
+    ]

@@ -1,0 +1,165 @@
+"""Sets of encounters as arrays: who flies where in each of thousands, and what each weighs.
+
+An aircraft is a row; rows of an encounter stand together, the ownship's first. A row holds either
+an initial state and *events* (climb, turn and acceleration, held from an instant on), or a sampled
+*track*. Lists of all rows lie end to end in flat arrays, cut by `starts`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from components.flights.point_mass import fly_euler, fly_point_mass
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+
+EVENTS, TRACKS = "events", "tracks"
+STATE = ("north_m", "east_m", "altitude_m", "speed_mps", "heading_rad", "duration_s")
+LISTS = {
+    EVENTS: ("time_s", "climb_mps", "turn_rad_s", "acceleration_mps2"),
+    TRACKS: ("time_s", "north_m", "east_m", "altitude_m"),
+}
+DYNAMICS = ("euler", "point_mass")
+#: Sums of weights, and of their cubes, stay numbers.
+LARGEST_WEIGHT = 1e90
+
+
+class NoSuchEncounter(ValueError):
+    """A set holds no encounter of that number."""
+
+
+@dataclass(frozen=True)
+class EncounterSet:
+    """Encounters; arrays over encounters (n), over aircraft (rows) and over list entries.
+
+    Parameters
+    ----------
+    source : str
+        The file, for messages.
+    kind : {"events", "tracks"}
+    numbers : (n,)
+        Rising.
+    weights : (n,)
+    first_rows : (n + 1,)
+        The rows of encounter k are ``first_rows[k]`` up to ``first_rows[k + 1]``.
+    names : tuple of str
+        Of the aircraft, (rows,).
+    state : dict of str to (rows,)
+        Of events: `STATE`.
+    starts : (rows + 1,)
+        Where the lists of each row begin.
+    lists : dict of str to (entries,)
+        `LISTS`.
+    reference_deg : (latitude, longitude)
+        Where the origin is put; altitudes are above the ellipsoid.
+    extra : dict of str to (n,)
+        Geometry and classes of encounters, as far as the file gives them.
+    skipped : int
+        Damaged encounters that were left out.
+    """
+
+    source: str
+    kind: str
+    numbers: IntArray
+    weights: FloatArray
+    first_rows: IntArray
+    names: tuple[str, ...]
+    state: dict[str, FloatArray]
+    starts: IntArray
+    lists: dict[str, FloatArray]
+    reference_deg: tuple[float, float] = (0.0, 0.0)
+    extra: dict[str, AnyArray] = field(default_factory=dict)
+    skipped: int = 0
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def place(self, number: int) -> int:
+        """Return where an encounter stands."""
+        at = int(np.searchsorted(self.numbers, number))
+        if at < len(self) and self.numbers[at] == number:
+            return at
+        close = self.numbers[np.abs(self.numbers - number).argmin()]
+        raise NoSuchEncounter(
+            f"{self.source}: there is no encounter {number}; it holds {len(self)}, numbered from "
+            f"{self.numbers[0]} to {self.numbers[-1]}; the nearest is {close}"
+        )
+
+    def path(
+        self, row: int, dynamics: str = "euler"
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return time (s), north, east and altitude (m) along the path of one aircraft."""
+        if self.kind == TRACKS:
+            lists = self._lists(row)
+            return lists["time_s"], lists["north_m"], lists["east_m"], lists["altitude_m"]
+        time_s, *place = flown_events([(self, row)], dynamics)
+        return time_s, *(part[:, 0] for part in place)  # type: ignore[return-value]
+
+    def seconds(self, row: int) -> int:
+        """Return how many whole seconds an aircraft of a set of events flies."""
+        return int(np.ceil(self.state["duration_s"][row]))
+
+    def _lists(self, row: int) -> dict[str, FloatArray]:
+        entries = slice(int(self.starts[row]), int(self.starts[row + 1]))
+        return {name: values[entries] for name, values in self.lists.items()}
+
+
+def flown_events(
+    aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Fly initial states and events of several aircraft, as each would be flown alone.
+
+    All have as many `EncounterSet.seconds`; returns times (instants,) in s, and north, east and
+    altitude (instants, aircraft) in m.
+    """
+    whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
+    state = {name: np.array([s.state[name][row] for s, row in aircraft]) for name in STATE}
+    commands = np.empty((3, len(whole), len(aircraft)))
+    for column, (found, row) in enumerate(aircraft):
+        start, end = found.starts[row], found.starts[row + 1]
+        at = start + np.searchsorted(found.lists["time_s"][start:end], whole, side="right") - 1
+        for k, name in enumerate(LISTS[EVENTS][1:]):
+            commands[k, :, column] = found.lists[name][at]
+    climb, turn, acceleration = commands
+    fly = {"euler": fly_euler, "point_mass": fly_point_mass}[dynamics]
+    flown = fly(
+        state["altitude_m"] / FOOT_M,
+        state["speed_mps"] / FOOT_M,
+        acceleration_ft_s2=acceleration / FOOT_M,
+        climb_ft_s=climb / FOOT_M,
+        turn_rad_s=turn,
+        start_heading_rad=state["heading_rad"],
+    )
+    time_s: FloatArray = np.arange(float(len(flown.up_ft))) * flown.step_s
+    return (
+        time_s,
+        state["north_m"] + flown.north_ft * FOOT_M,
+        state["east_m"] + flown.east_ft * FOOT_M,
+        flown.up_ft * FOOT_M,
+    )
+
+
+NAMES = ("ownship", "intruder")
+
+
+#: What `geometry_class` gives.
+GEOMETRIES = ("head-on", "overtaking", "crossing from the left", "crossing from the right")
+
+
+def geometry_class(course_deg: FloatArray) -> AnyArray:
+    """Return how each intruder's course lies to the ownship's.
+
+    Within 20° of opposite it is ``head-on``, within 70° of the same ``overtaking`` (either may be
+    the one that overtakes), else ``crossing from the left`` (its course leads to the right) or
+    ``crossing from the right``; the sectors are those of the rules of the air (14 CFR 91.113), the
+    widths ours for head-on.
+    """
+    off = np.abs((course_deg + 180.0) % 360.0 - 180.0)
+    side = np.where(course_deg % 360.0 < 180.0, "crossing from the left", "crossing from the right")
+    found: AnyArray = np.where(off >= 160.0, "head-on", np.where(off <= 70.0, "overtaking", side))
+    return found
+
+
+#: The column of a set that says of which encounter each is a copy.
+FAMILY = "family"

@@ -1,0 +1,300 @@
+"""Text files of rows: separators, units, and all that is wrong with one file in one error."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from components.flights.sampled_flight import SampledTrajectory
+from dsa_des.errors import Lines, nearest
+from dsa_des.files.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
+from dsa_des.text.safe_text import shortened
+
+_FOOT_M = 0.3048
+_NAUTICAL_MILE_M = 1852.0
+
+LENGTH_M = {
+    "m": 1.0,
+    "metre": 1.0,
+    "metres": 1.0,
+    "meter": 1.0,
+    "meters": 1.0,
+    "km": 1000.0,
+    "ft": _FOOT_M,
+    "foot": _FOOT_M,
+    "feet": _FOOT_M,
+    "nmi": _NAUTICAL_MILE_M,
+    "nm": _NAUTICAL_MILE_M,
+}
+SPEED_MPS = {
+    "m/s": 1.0,
+    "mps": 1.0,
+    "km/h": 1.0 / 3.6,
+    "kph": 1.0 / 3.6,
+    "kmh": 1.0 / 3.6,
+    "knot": _NAUTICAL_MILE_M / 3600.0,
+    "knots": _NAUTICAL_MILE_M / 3600.0,
+    "kn": _NAUTICAL_MILE_M / 3600.0,
+    "kt": _NAUTICAL_MILE_M / 3600.0,
+    "kts": _NAUTICAL_MILE_M / 3600.0,
+    "nmi/h": _NAUTICAL_MILE_M / 3600.0,
+    "nmi/s": _NAUTICAL_MILE_M,
+    "fpm": _FOOT_M / 60.0,
+    "ft/min": _FOOT_M / 60.0,
+    "ft/s": _FOOT_M,
+    "fps": _FOOT_M,
+}
+ANGLE_DEG = {
+    "deg": 1.0,
+    "degree": 1.0,
+    "degrees": 1.0,
+    "rad": 180.0 / math.pi,
+    "radian": 180.0 / math.pi,
+    "radians": 180.0 / math.pi,
+}
+TIME_S = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "ms": 1e-3,
+    "min": 60.0,
+    "h": 3600.0,
+    "hr": 3600.0,
+}
+NO_UNIT = {"none": 1.0, "unitless": 1.0, "": 1.0, "-": 1.0, "1": 1.0}
+
+ALL_TOKENS = {*LENGTH_M, *SPEED_MPS, *ANGLE_DEG, *TIME_S, *NO_UNIT}
+
+
+def clean_token(token: str) -> str:
+    """Take a unit token to its plain form: no brackets, no blanks, lower case."""
+    return re.sub(r"[\s\[\](){}]", "", token).lower()
+
+
+MOST_PROBLEMS = 20
+"""Problems listed in one error; further ones are only counted."""
+MOST_COLUMNS = 30
+"""Names of columns listed in a message."""
+MOST_OF_A_CELL = 24
+"""Letters of a cell that a message repeats."""
+
+
+class TrafficFileError(ValueError):
+    """A traffic file cannot be used; `problems` says everything that is wrong with it."""
+
+    def __init__(self, path: str, problems: Iterable[str]) -> None:
+        self.path = str(path)
+        self.problems = list(problems)
+        # Plain positional arguments: pickling and SimPy rebuild an exception from them.
+        super().__init__(self.path, self.problems)
+
+    def __str__(self) -> str:
+        if len(self.problems) == 1:
+            return Lines.of([f"{self.path}: {self.problems[0]}"])
+        lines = [f"{self.path}: {len(self.problems)} problems"]
+        return Lines.of(lines + [f"  {problem}" for problem in self.problems])
+
+
+@dataclass(frozen=True)
+class TrafficFile:
+    """The aircraft of a traffic file.
+
+    Parameters
+    ----------
+    ownship : SampledTrajectory
+        The first aircraft named in the file, or the one asked for.
+    intruders : list of SampledTrajectory
+        All others, in the order in which the file first names them.
+    start_time_s : float
+        The file's own time of its earliest sample. Times in the trajectories count from there.
+    notes : list of str
+        What was assumed, reordered or ignored.
+    """
+
+    ownship: SampledTrajectory
+    intruders: list[SampledTrajectory]
+    start_time_s: float
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def aircraft(self) -> list[SampledTrajectory]:
+        """Ownship first, then the intruders."""
+        return [self.ownship, *self.intruders]
+
+
+class Problems:
+    """Collects what is wrong with one file, to be reported at once."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        #: Line (infinite for none) and text.
+        self._found: list[tuple[float, str]] = []
+        self._more = 0
+
+    def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+        """Note a problem, with its line and column where it has them."""
+        place = [f"line {line}"] if line is not None else []
+        place += [f"column {column}"] if column is not None else []
+        if len(self._found) < MOST_PROBLEMS:
+            text = f"{', '.join(place)}: {problem}" if place else problem
+            self._found.append((math.inf if line is None else line, text))
+        else:
+            self._more += 1
+
+    def raise_if_any(self) -> None:
+        """Raise one `TrafficFileError` with all problems so far, in order of their lines."""
+        if not self._found:
+            return
+        found = [text for _, text in sorted(self._found, key=lambda one: one[0])]
+        if self._more:
+            found[-1] += f" (and {self._more} more problems)"
+        raise TrafficFileError(self.path, found)
+
+    def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+        """Note a problem that makes reading on pointless, and raise."""
+        self.add(problem, line=line, column=column)
+        self.raise_if_any()
+
+
+def shown_columns(headers: Iterable[str], known: bool) -> str:
+    """Return the names of columns for a message; `known` says whether any is one of ours.
+
+    A file without any of our columns is something else, whose content is not quoted.
+    """
+    names = [shortened(header, MOST_OF_A_CELL) for header in headers]
+    if not known:
+        return f"the {len(names)} columns of the first row"
+    return ", ".join(names[:MOST_COLUMNS]) + (", …" if len(names) > MOST_COLUMNS else "")
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return a suggestion for a misspelt name, or an empty string when nothing is close."""
+    close = nearest(name, sorted(allowed))
+    return f"; did you mean {close!r}?" if close else ""
+
+
+_SEPARATORS = re.compile(r"[,;]")
+_TOKEN = re.compile(r"\[[^\]]*\]|[^\s,;\[\]]+")
+_TRAFFIC = "a text file with one row per aircraft and time"
+_ROWS = "a row of column names and rows of samples"
+
+
+def read_lines(
+    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
+) -> list[tuple[int, str]]:
+    """Return a file's lines that hold something but comments, with their numbers from 1.
+
+    It may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end in
+    LF, CR LF or CR. `needed` and `holds` are for the messages of a binary and of an empty file.
+    """
+    try:
+        data = read_input_bytes(path)
+    except NoSuchFile:
+        close = [p.name for p in path.parent.glob("*")] if is_folder(path.parent) else []
+        problems.fail(f"there is no such file{did_you_mean(path.name, close)}")
+    except InputFileError as error:
+        if is_folder(path):
+            problems.fail("this is a directory: give the file itself")
+        problems.fail(f"the file {error}")
+    text = _decoded(data)
+    if text is None:
+        problems.fail(f"this is a binary file: {needed} is needed")
+    lines = [
+        # Not tabs: one at either end delimits an empty cell.
+        (number, line.strip(" "))
+        for number, line in enumerate(re.split(r"\r\n|\r|\n", text or ""), start=1)
+    ]
+    kept = [(n, line) for n, line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if not kept:
+        problems.fail(f"the file is empty: {holds} are needed")
+    return kept
+
+
+def _decoded(data: bytes) -> str | None:
+    """Decode text, or return None for something that is none."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encodings = ["utf-16"]
+    else:
+        encodings = ["utf-8-sig", "latin-1"]
+    for encoding in encodings:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        control = sum(1 for c in text[:4096] if ord(c) < 32 and c not in "\t\r\n\f\v\x1a")
+        # C1 control characters only turn up when bytes that are no text are read as Latin-1.
+        control += sum(1 for c in text[:4096] if 0x7F <= ord(c) < 0xA0)
+        return None if "\0" in text or control > len(text[:4096]) // 50 else text
+    return None
+
+
+def tokens(line: str) -> list[str]:
+    """Split a row of names or units at commas, semicolons and blanks; [m / s] stays together."""
+    return _TOKEN.findall(line)
+
+
+def cells(line: str, count: int, name_column: int) -> list[str] | None:
+    """Split a row of values into as many cells as there are columns; None where that cannot be.
+
+    Commas (or semicolons, or tabs where there are neither) separate first; a cell that holds
+    blanks is split further until the count fits, the aircraft's name last of all, so that names
+    with blanks survive in comma-separated rows.
+    """
+    pattern = _SEPARATORS if _SEPARATORS.search(line) else re.compile(r"\t")
+    parts = [part.strip() for part in pattern.split(line)]
+    if len(parts) == count + 1 and parts[-1] == "":
+        parts.pop()
+    blanks = [i for i, part in enumerate(parts) if len(part.split()) > 1]
+    if len(parts) == count and all(i == name_column for i in blanks):
+        return parts
+    for keep_name in (True, False):
+        split: list[str] = []
+        for i, part in enumerate(parts):
+            whole = keep_name and i == name_column and len(parts) > 1
+            # An empty cell between two commas stays a cell; between two tabs it is padding.
+            split += [part] if whole or (not part and pattern is _SEPARATORS) else part.split()
+        if len(split) == count + 1 and split[-1] == "":
+            split.pop()
+        if len(split) == count:
+            return split
+    return None
+
+
+def cell_count(line: str) -> int:
+    """Count the values of a row that does not fit, for the message."""
+    return len([part for part in re.split(r"[,;\s]+", line) if part])
+
+
+def csv_table(
+    text: str, fail: Callable[[str, int], Exception]
+) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    """Return the column names of a CSV table, and its rows with their lines; blank ones left out.
+
+    `fail` makes the error of what cannot be read, and of a row that has another number of cells.
+    """
+    reader = csv.reader(io.StringIO(text))
+
+    def each() -> Iterator[tuple[int, list[str]]]:
+        try:
+            for row in reader:
+                if any(cell.strip() for cell in row):
+                    yield reader.line_num, [cell.strip() for cell in row]
+        except csv.Error as error:
+            raise fail(str(error), reader.line_num) from None
+
+    rows = each()
+    names = next(rows, (0, []))[1]
+
+    def checked() -> Iterator[tuple[int, list[str]]]:
+        for line, row in rows:
+            if len(row) != len(names):
+                raise fail(f"has {len(row)} values, but there are {len(names)} columns", line)
+            yield line, row
+
+    return names, checked()

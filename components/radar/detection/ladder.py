@@ -1,0 +1,209 @@
+"""The ladders of radars: how an echo becomes a detection, and how large the target's RCS is."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.aircraft.known_targets import known_targets
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
+from dsa_des.block.wake import Wake
+
+_PD = Quantity("detection_probability", "Pd", tolerance="detection_probability")
+
+
+def _pd_of(radar: Any, cells: Cells) -> FloatArray:
+    """Return the probability with which a radar detects each cell; 0 or 1 if it does not draw."""
+    look = radar.look(cells)
+    if "detection_probability" in look.extras:
+        echo: FloatArray = np.where(
+            radar.snr(cells) > 0.0, look.extras["detection_probability"], 0.0
+        )
+        return echo
+    return np.where(look.detected, 1.0, 0.0)
+
+
+def measure_pd(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability of detection at every (scan, target)."""
+    radar: Any = block
+    # What is too far away to be looked at is detected with probability 0.
+    found: dict[str, AnyArray] = dict(
+        over_cells(radar, wake, lambda cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0)
+    )
+    return found
+
+
+def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the errors of Pd at the SNR in use against sums at 40 digits (needs mpmath)."""
+    from components.high_precision.detection import detection_error
+
+    radar: Any = block
+    if not hasattr(radar, "models_in_use"):
+        raise Unavailable("a boundary or threshold decides: it states no probability")
+    if any(map(radar.built, ("clutter", "Doppler", "threshold from reference cells"))):
+        raise Unavailable("clutter, filter or CFAR: no evaluation at more digits")
+    at: dict[str, FloatArray] = {}
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        model = np.empty(len(cells))
+        for number, chosen in radar.models_in_use(cells):
+            model[chosen] = number
+        return {"snr": radar.snr(cells), "model": model, "pd": _pd_of(radar, cells)}
+
+    at = over_cells(radar, wake, values)
+    errors = [
+        detection_error(
+            at["pd"][row, target],
+            at["snr"][row, target],
+            radar.p.pulses_summed,
+            radar.p.false_alarm_probability,
+            int(at["model"][row, target]),
+        )
+        for row, target in cells.tolist()
+        if at["snr"][row, target] > 0.0
+    ]
+    return {_PD.name: np.array(errors)}
+
+
+def measure_rcs(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the mean RCS and the probability of detection at every (scan, target)."""
+    radar: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {"rcs": radar.mean_rcs_m2(cells), _PD.name: _pd_of(radar, cells)}
+
+    found: dict[str, AnyArray] = dict(over_cells(radar, wake, values))
+    return found
+
+
+def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the boundary: where the calibration knows Pd, else the radar's own limit."""
+    if block["type"] == "radar.range_boundary":
+        return {}
+    if block.get("calibrate"):
+        return {"range_km": block["calibrate"]["range_km"]}
+    if block.get("range_km"):
+        return {"range_km": block["range_km"]}
+    raise Unavailable("needs calibrate.range_km or range_km to put the boundary at")
+
+
+def _averages(block: Component) -> str:
+    cells = getattr(block.p, "cfar_reference_cells", None)
+    return "" if cells is None else f"cfar_reference_cells is {cells}: Pd has one method with CFAR"
+
+
+def _tables(block: Component) -> str:
+    rosters = known_targets(block.context)
+    if rosters and not any(craft.rcs_table for roster in rosters for craft in roster.aircraft):
+        return "no target has an rcs_table"
+    return ""
+
+
+DETECTION = Ladder(
+    "detection",
+    (
+        Rung("range_boundary", "all inside the calibrated range (section 2.2.2)",
+             "radar.range_boundary", _boundary),
+        Rung("threshold", "mean SNR against a threshold", "radar.threshold"),
+        Rung("gram_charlier", "thesis eq. 26-31 at a sampled RCS", "radar.swerling",
+             {"detection": "gram_charlier"}, {"fluctuation": "sampled"}),
+        Rung("table", "Pd looked up, error below 1e-6", "radar.swerling",
+             {"detection": "table"}),
+        Rung("exact", "Pd to 12 digits", "radar.swerling", {"detection": "exact"}),
+    ),
+    "exact",
+    (_PD,),
+    measure_pd,
+    pd_truth,
+    clears=("model",),
+    applies=_averages,
+)  # fmt: skip
+
+RCS = Ladder(
+    "rcs",
+    (
+        Rung("constant", "one mean RCS per aircraft", parameters={"aspect_rcs": False}),
+        Rung("aspect", "the aircraft's table over aspect", parameters={"aspect_rcs": True}),
+    ),
+    "aspect",
+    (Quantity("rcs", "m²"), _PD),
+    measure_rcs,
+    applies=_tables,
+)
+
+
+#: Largest absolute error of ``method="table"`` over all SNR (its contract; 2.9e-8 was measured).
+TABLE_ERROR = 1e-6
+
+#: Worst absolute errors of ``method="gram_charlier"`` by number of pulses, found by search.
+GRAM_CHARLIER_ERROR = {1: 0.025, 2: 0.010, 5: 0.003, 10: 0.001, 100: 5e-5}
+
+
+class ExactDetection(Effect):
+    """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
+
+    lockstep = True
+    name = "exact Pd"
+    acts_on = "method of Pd"
+    neutral = False
+    outside_the_proof = "it is a choice between two methods, of which one is always in use"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""
+        if block.p.detection != "exact":
+            return Verdict(False, f"detection is {block.p.detection!r}")
+        if block.p.cfar_reference_cells is not None:
+            return Verdict(True, "with CFAR there is no other")
+        if closed_form(block):
+            return Verdict(True, "with 1 pulse and Swerling I or II it is a closed form")
+        bound = {"detection_probability": TABLE_ERROR}
+        return Verdict(True, "detection is 'exact'", bound)
+
+    def build(self, block: Any) -> str:
+        """Return the method's name."""
+        return "exact"
+
+
+def closed_form(block: Any) -> bool:
+    """Say whether the exact Pd of all of a radar's targets is one power, cheaper than any rung."""
+    return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
+
+
+def picked_method(block: Any, method: str) -> list[str]:
+    """Say why a radar with ``model = "auto"`` computes Pd exactly or by a table."""
+    allowed = block.context.sections["accuracy"].detection_probability
+    if method == "table":
+        said = f"table, its error is at most {TABLE_ERROR:g} and [accuracy] allows {allowed:g}"
+    elif closed_form(block):
+        said = "exact, with 1 pulse and Swerling I or II a closed form and the cheapest"
+    elif block.context.simulate_everything:
+        said = "exact, the reference: everything is simulated"
+    elif allowed is None:
+        said = "exact, the reference: [accuracy] allows no error of Pd"
+    else:
+        said = (
+            f"exact, the reference: a table may err by {TABLE_ERROR:g}, and of the {allowed:g} "
+            f"that [accuracy] allows {block.context.tolerance['detection_probability']:.2g} is left"
+        )
+    # Fewer pulses err more: the entry at or below the radar's own is an upper estimate.
+    error = GRAM_CHARLIER_ERROR[max(n for n in GRAM_CHARLIER_ERROR if n <= block.p.pulses_summed)]
+    return [
+        f"Pd: {said}",
+        f"Pd: not gram_charlier: it errs by up to {error:g}, and the table by less",
+    ]
+
+
+def _models(block: Any) -> set[int]:
+    if block.p.samples_rcs:
+        return {0}
+    if block.p.swerling is not None:
+        return {block.p.swerling % 5}
+    rosters = known_targets(block.context)
+    if not rosters:
+        return {0}
+    return {craft.swerling % 5 for roster in rosters for craft in roster.aircraft}

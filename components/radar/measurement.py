@@ -1,0 +1,303 @@
+"""What a radar measures of a detection: strength, and the errors that follow from it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.arguments.checks import not_negative, positive
+from components.radar.detection.output import measured_snr
+from components.radar.link_budget import wavelength
+from components.radar.resolution import ResolutionParameters
+from components.sensor.look import Cells, Look
+from components.sensor.parameters import CorrelationTime, ErrorParameters, GlintParameters
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.errors import Disagreements
+
+
+class RadarErrorParameters(ResolutionParameters):
+    """Errors of range and range rate, and whether the latter is measured."""
+
+    quantities: ClassVar[Mapping[str, str]] = {
+        **ErrorParameters.quantities, "range": "m", "range_rate": "m_s"
+    }  # fmt: skip
+
+    range_error_m: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range, m."
+    )
+    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
+    )
+    measures_range_rate: bool = Field(
+        default=False,
+        description="Whether the rate of the slant range is measured, by its Doppler shift.",
+    )
+    range_rate_resolution_m_s: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range rate, m/s; 0 measures exactly."
+    )
+    range_rate_error_m_s: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range rate, m/s."
+    )
+    range_rate_bias_m_s: float = Field(
+        default=0.0, description="Bias of measured range rate, m/s; see biases."
+    )
+    range_rate_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_rate_error_m_s, s."
+    )
+
+    @model_validator(mode="after")
+    def _rate_is_measured(self) -> Self:
+        Disagreements.refuse(
+            f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
+            f"or leave {key} out"
+            for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s")
+            if not self.measures_range_rate and getattr(self, key)
+        )
+        return self
+
+
+class SignalErrorParameters(GlintParameters, RadarErrorParameters):
+    """Errors that follow from the signal-to-noise ratio of each detection."""
+
+    errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
+        default="grid",
+        description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "
+        "the standard deviations and biases that the scene gives; 'signal', those that follow from "
+        "the SNR and the widths of beam and resolution cell, beside the stated ones.",
+    )
+    angle_measurement: Literal["monopulse", "scan"] = Field(
+        default="monopulse",
+        description="How errors = 'signal' has angles measured: by beams at the same time, or by "
+        "splitting one beam that scans over the target.",
+    )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors by signal, where there are none."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
+        return said
+
+
+#: Slope of the difference pattern over the sum pattern, in beamwidths (Barton).
+MONOPULSE_SLOPE = 1.6
+#: Of a beam that scans over the target, and what its pattern takes from the pulses' energy.
+SCAN_SLOPE = 1.66
+SCAN_BEAMSHAPE_LOSS = 1.33
+#: A measurement is somewhere in its cell.
+_UNIFORM = 1.0 / 12.0
+
+
+def angle_variance(
+    beamwidth_rad: float, energy_ratio: FloatArray, *, method: str = "monopulse"
+) -> FloatArray:
+    """Return the variance of an angle measured with one beam or a pair of them, rad².
+
+    By the energy ratio, S/N of a pulse times the number of pulses; at most beamwidth²/12.
+
+    ``monopulse``: sigma = beamwidth / (k_m sqrt(2 n S/N)), k_m = 1.6, of a target near the axis.
+    ``scan``: sigma = beamwidth / (k sqrt(2 n S/N / L_p)), k = 1.66, L_p = 1.33 the beamshape loss.
+    Barton & Leonov, Radar Technology Encyclopedia, Artech House 1997, "accuracy of monopulse,
+    fundamental" and "accuracy of sequential lobing, fundamental"; Curry, Radar System Performance
+    Modeling, 2nd ed., Artech House 2005, section 8.2, has the former.
+    """
+    width = float(positive("beamwidth_rad", beamwidth_rad))
+    ratio = _ratio(energy_ratio)
+    if method == "monopulse":
+        return _limited(width, ratio, MONOPULSE_SLOPE)
+    if method == "scan":
+        return _limited(width, ratio / SCAN_BEAMSHAPE_LOSS, SCAN_SLOPE)
+    raise ValueError(f"method is {method!r}: it must be 'monopulse' or 'scan'")
+
+
+def range_variance(range_resolution_m: float, energy_ratio: FloatArray) -> FloatArray:
+    """Return the variance of a range measured with a resolution c / 2B, m², at most resolution²/12.
+
+    sigma = resolution / sqrt(2 n S/N): Curry, section 8.1; Mahafza, Radar Systems Analysis and
+    Design Using MATLAB, has it with the rms bandwidth. That of a flat spectrum of width B, by
+    Skolnik, Theoretical accuracy of radar measurements, IRE Trans. ANE-7, 1960, would be smaller by
+    sqrt(3) / pi, which a receiver with weighting does not reach.
+    """
+    return _limited(float(positive("range_resolution_m", range_resolution_m)), _ratio(energy_ratio))
+
+
+def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArray) -> FloatArray:
+    """Return the variance of a range rate measured by its Doppler shift, at most resolution²/12.
+
+    sigma = resolution / sqrt(2 n S/N), resolution = wavelength / (2 coherent time): Curry, section
+    8.3.
+    """
+    step = float(positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
+    return _limited(step, _ratio(energy_ratio))
+
+
+def _ratio(energy_ratio: FloatArray) -> FloatArray:
+    ratio: FloatArray = np.asarray(not_negative("energy_ratio", energy_ratio))
+    return ratio
+
+
+def _limited(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
+    least = 1.0 / (2.0 * slope**2 * _UNIFORM)
+    variance: FloatArray = width**2 / (2.0 * slope**2 * np.maximum(ratio, least))
+    return variance
+
+
+def heard(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
+    """Return what a look's errors follow from: a pulse's signal over noise and clutter.
+
+    It is the SNR that the decision rested on and that is recorded: the mean one of a fluctuating
+    target, or that of its sampled cross-section. A radar knows it from the height of the echo, to
+    about 1 dB where it detects. As errors are drawn by the same number, variances are honest.
+    """
+    return {"snr": snr if cnr is None else snr / (1.0 + cnr)}
+
+
+def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
+    """Return the variances of measured quantities at the SNR of a pulse: rad², m², m²/s²."""
+    ratio = p.pulses_summed * snr
+    variances = {
+        angle: angle_variance(math.radians(width_deg), ratio, method=p.angle_measurement)
+        for angle, width_deg in (
+            ("azimuth", p.azimuth_beamwidth_deg),
+            ("elevation", p.elevation_beamwidth_deg),
+        )
+    }
+    variances["range"] = range_variance(p.range_resolution_m, ratio)
+    if (step := _range_rate_resolution_m_s(p)) is not None and p.measures_range_rate:
+        variances["range_rate"] = range_rate_variance(step, ratio)
+    return variances
+
+
+def check_signal_errors(p: Any) -> None:
+    """Refuse errors by signal of a radar whose beam or resolution is not known."""
+    if p.errors != "signal":
+        return
+    wrong = [
+        f"errors is 'signal' and {key} is not given: errors of angles are a share of the beam"
+        for key in ("azimuth_beamwidth_deg", "elevation_beamwidth_deg")
+        if getattr(p, key) is None
+    ]
+    if not p.range_resolution_m:
+        wrong.append(
+            "errors is 'signal' and range_resolution_m is 0: errors of range are a share of it, it "
+            "must be above 0"
+        )
+    if p.measures_range_rate and _range_rate_resolution_m_s(p) is None:
+        wrong.append(
+            "errors is 'signal', measures_range_rate is true and neither "
+            "range_rate_resolution_m_s nor the time of a look (dwell_s, or pulses_per_dwell and "
+            "prf_hz) is given: errors of range rate are a share of what Doppler resolves"
+        )
+    Disagreements.refuse(wrong)
+
+
+def _range_rate_resolution_m_s(p: Any) -> float | None:
+    """Return the range rate that Doppler resolves, of its own or by the time of a look."""
+    if p.range_rate_resolution_m_s:
+        return float(p.range_rate_resolution_m_s)
+    look = p.look_energy
+    dwell_s = p.stated_dwell_s if look is None else look.dwell_s
+    if not dwell_s:
+        return None
+    wavelength_m = p.wavelength_m or wavelength(p.frequency_hz)
+    return float(wavelength_m / (2.0 * dwell_s))
+
+
+#: Noise may barely cross a low threshold; -60 dB stands for nothing.
+FAINTEST = 1e-6
+
+
+class MeasuredStrength(Effect):
+    """What a radar knows of a target's echo is what it knows of noise: how strong it came out.
+
+    SNR and confidence of a detection are those of the output that crossed the threshold, by the
+    target's own fluctuation and the noise of that look; errors by signal follow from that output
+    too. The probability of detection, which only the truth gives, is left out; ``looks`` has what
+    decided. Where the draw of a look decides, the same draw says how strong it came out.
+    """
+
+    lockstep = True
+    name = "measured strength"
+    acts_on = "strength"
+    neutral = False
+    outside_the_proof = "a radar always measures strength"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask whether the radar is switched on."""
+        if not block.p.enabled:
+            return Verdict(False, "enabled is false")
+        return Verdict(True, "a radar measures strength as it measures places")
+
+    def build(self, block: Any) -> "Strength":
+        """Return what measures the strength of detections."""
+        return Strength(block)
+
+
+class Strength:
+    """Gives the output that crossed the threshold."""
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        self._draws = block.stream("measured strength")
+
+    def __call__(self, cells: Cells, found: IntArray, look: Look) -> Look:
+        """Return the look with the measured strength of the cells that are detected (`found`)."""
+        if "snr" not in look.signal:  # a radar of one's own that says no strength
+            return look
+        block = self._block
+        extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
+        if look.tail is None:
+            keys = cells.roster.keys_of(cells.target[found])
+            tail = 1.0 - self._draws.uniform(keys, cells.scan[found])
+        else:
+            tail = look.tail[found]
+        # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
+        # noise hears it as signal.
+        mean = look.signal["snr"][found]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][found]) / mean, 1.0)
+        heard = floor if block.p.clutter_threshold == "noise" else np.ones(len(found))
+        snr = np.empty(len(found))
+        for crossing, part in block.crossings_of(cells, found):
+            for model, chosen in block.models_in_use(cells):
+                some = part[_within(found[part], chosen, len(cells))]
+                output = 1.0 + measured_snr(
+                    tail[some],
+                    mean[some],
+                    threshold=crossing.threshold / heard[some],
+                    pulses=crossing.pulses,
+                    model=f"swerling{model}",
+                )
+                snr[some] = np.maximum(output * heard[some] - 1.0, 0.0)
+        snr_db, confidence = extras["snr_db"].copy(), look.confidence.copy()
+        snr_db[found] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
+        confidence[found] = snr_db[found] - block.false_alarm_zero_db()
+        signal: FloatArray = look.signal["snr"].copy()
+        signal[found] = snr
+        return replace(
+            look, extras={**extras, "snr_db": snr_db}, confidence=confidence, signal={"snr": signal}
+        )
+
+
+def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
+    """Return which of some cells are among the chosen ones."""
+    inside = np.zeros(count, dtype=bool)
+    inside[chosen] = True
+    return np.flatnonzero(inside[cells])
+
+
+def noise_at_targets(parameters: Any) -> list[str]:
+    """Say that looks which noise decides are reported at the target's own place, where they are."""
+    steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
+    exact = [step for step in steps if getattr(parameters, step) == 0]
+    if parameters.errors != "grid" or not exact:
+        return []
+    return [
+        f"noise that is taken for a target: {exact[0]} is 0, so it is reported exactly where the "
+        "target is (thesis); a grid has the cell's place, errors = 'signal' any place in the cell"
+    ]

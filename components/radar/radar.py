@@ -1,0 +1,417 @@
+"""The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2).
+
+A range rate is of two aircraft: who estimates the other one's velocity from it must know our own,
+so radars that measure rates report it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.messages.columns import OWN_VELOCITY
+from components.messages.detections import Detections, OwnOfEntries
+from components.messages.reach import farthest_look
+from components.messages.targets import RelativeTargets
+from components.radar.beam import BeamSweep, Sweep
+from components.radar.detection.cfar import Averaging, CellAveraging
+from components.radar.detection.ladder import DETECTION
+from components.radar.detection.probability import required_snr
+from components.radar.doppler import LASTS_S, DopplerFilter, RangeRate, folded_range_rate
+from components.radar.ground_clutter import BoundaryClutter, Echo, clutter_as_signal, terrain_of
+from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.parameters import RadarParameters
+from components.radar.rain import RainClutter, SidelobeClutter
+from components.radar.resolution import Merging, OneReportByCell
+from components.radar.timing import unambiguous_range_m
+from components.radar.weather import (
+    WEATHER_EFFECTS,
+    BlindRange,
+    CellFactor,
+    deaf_to_weather,
+    said_of_rain,
+)
+from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.look import Cells, Look
+from components.sensor.marks import RADAR
+from components.sensor.sensor import Sensor
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.message import Message
+
+# Half of the time between two positions; a power of two, so that times differ by it exactly.
+_STEP_S = 1.0 / 64.0
+_PLACE = ("lat_deg", "lon_deg", "alt_m")
+
+
+class OwnVelocity(Effect):
+    """The ownship's velocity over ground beside every detection; navigation has no error of it."""
+
+    lockstep = True
+    name = "own velocity"
+    acts_on = "report"
+    neutral = False
+    outside_the_proof = "it fills columns that are null without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``measures_range_rate``."""
+        return Verdict.of_flag(block.p, "measures_range_rate")
+
+    def build(self, block: Any) -> Any:
+        """Return what adds the velocity to a report."""
+        ticks_per_s = block.context.ticks_per_s
+
+        def with_velocity(
+            detections: Detections, targets: RelativeTargets, rows: IntArray
+        ) -> Detections:
+            counts = np.diff(detections.offsets)
+            after, some = detections.ticks_after, counts > 0
+            # At instants of their own, or once a scan.
+            row = rows[some] if after is None else np.repeat(rows, counts)
+            state = (targets.tick if targets.state_tick is None else targets.state_tick)[row]
+            if block.span_ticks:
+                state = state % block.span_ticks
+            time_s = (state if after is None else state + after) / ticks_per_s
+            velocity = own_velocity(targets, row, time_s)
+            if after is not None:
+                own = dict(zip(OWN_VELOCITY, velocity, strict=True))
+                return replace(detections, own_velocity_of_entries=own)
+            of_scans = np.full((len(OWN_VELOCITY), len(rows)), np.nan)
+            of_scans[:, some] = velocity
+            return replace(detections, own_velocity=dict(zip(OWN_VELOCITY, of_scans, strict=True)))
+
+        return with_velocity
+
+
+def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
+    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
+
+    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
+    by the position itself where the flight begins or ends between; NaN where no flights are known.
+    """
+    if targets.revisit is None or not len(targets.roster) or not len(row):
+        return np.full((3, len(row)), np.nan)
+    flights = targets.revisit.take_rows(row)
+    # Where the ownship is does not depend on the target that is asked for with it.
+    anyone = np.zeros(1, dtype=np.int64)
+    own = [
+        {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
+        for at in (time_s, time_s - _STEP_S, time_s + _STEP_S)
+    ]
+    here = [own[0][name] for name in _PLACE]
+    moved, span_s = [], np.zeros(len(row))
+    for there in own[1:]:
+        places = [there[name] for name in _PLACE]
+        way = np.stack(line_of_sight_ned(*here, *places, validate=False))
+        moved.append(np.where(there["present"], way, 0.0))
+        span_s = span_s + np.where(there["present"], _STEP_S, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((moved[1] - moved[0]) / span_s)
+
+
+_RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
+#: Over ground, of the fastest aircraft that a radar listens for: a jet's at cruise.
+FASTEST_M_S = 250.0
+
+
+class Radar(Sensor):
+    """A sensor that measures range; subclasses decide what is detected."""
+
+    mark = RADAR
+    measures_range = True
+    #: Of the carrier, m; None where it is not known.
+    wavelength_m: float | None = None
+    hooks = {
+        "SNR": "(cells) -> factor of each cell's SNR",
+        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
+        "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
+        "one report by cell": "(cells, power) -> power of the echo that stands for its "
+        "resolution cell, 0 of the others",
+    }
+
+    effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
+    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        # Their key is one of every radar. The velocity is of what the reports before it say:
+        # false alarms, and when a sweeping beam met whom.
+        both = (_RANGE_RATE, _OWN_VELOCITY)
+        others = tuple(effect for effect in cls.effects if effect not in both)
+        cls.effects = (_RANGE_RATE, *others, _OWN_VELOCITY)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.snr_factors: list[CellFactor] = []
+        self._merging: Merging | None = None
+        self.doppler: Any = None
+        self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
+
+    def setup(self) -> None:
+        """Take what the scene's effects do to the SNR."""
+        self.snr_factors = self.built("SNR")
+        (self.doppler,) = self.built("Doppler") or [None]
+        (self._merging,) = self.built("one report by cell") or [None]
+
+    def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
+        """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
+        return power if self._merging is None else self._merging(cells, power)
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where the beam sweeps, the ownship at each entry's instant."""
+        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
+
+    @property
+    def _sweep(self) -> Sweep | None:
+        return self.context.effects.get(BeamSweep.name)
+
+    def request(self, port: str) -> Any:
+        """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
+        reach = super().request(port)
+        if not self.p.enabled:
+            return reach
+        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
+        if self._sweep is None:
+            return replace(reach, lasts_s=lasts_s)
+        return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+
+    def offer(self, port: str) -> Any:
+        """Say beside what every sensor says whether range rates fold."""
+        folds = bool(getattr(self.p, "range_rate_folds", False))
+        return replace(super().offer(port), folds_range_rate=folds)
+
+    def exact_because(self) -> str:
+        """A rate divides the change of an error over hundredths of a second by these."""
+        return f"{self.name} measures range rates" if self._rates else ""
+
+    @cached_property
+    def _rates(self) -> list[Any]:
+        return self.built("range rate")
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """Grid step of each quantity that is measured: rad, m and m/s."""
+        measured = getattr(self.p, "measures_range_rate", False)
+        rate = {"range_rate": self.range_rate_step_m_s} if measured else {}
+        return {**super().steps, **rate}
+
+    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
+        """Return the true range rates of some cells, m/s; None where they are not measured."""
+        return self._rates[0](cells, found) if self._rates else None
+
+    def _in_body(
+        self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return what is measured, range rates as one PRF takes them where they fold."""
+        azimuth, elevation, range_m, beside = super()._in_body(values, variances)
+        if self.p.range_rate_folds and "range_rate_m_s" in beside:
+            assert self.wavelength_m is not None
+            limit_m_s = 0.25 * self.wavelength_m * self.p.prf_hz
+            folded = folded_range_rate(beside["range_rate_m_s"], limit_m_s)
+            beside = {**beside, "range_rate_m_s": folded}
+        return azimuth, elevation, range_m, beside
+
+    def noise_range_rate(
+        self,
+        uniform: FloatArray,
+        where: Mapping[str, FloatArray],
+        targets: RelativeTargets,
+        row: IntArray,
+    ) -> FloatArray:
+        """Return range rates that noise alone gives, m/s: any that the radar listens for.
+
+        From uniform numbers in [0, 1). A radar of one PRF listens for all that are unambiguous;
+        another for those of aircraft up to `FASTEST_M_S` over ground, by its own motion along the
+        line of sight.
+        """
+        off = 2.0 * uniform - 1.0
+        if self.p.range_rate_folds:
+            assert self.wavelength_m is not None
+            return off * 0.25 * self.wavelength_m * self.p.prf_hz
+        each, place = np.unique(row, return_inverse=True)
+        tick = (targets.tick if targets.state_tick is None else targets.state_tick)[each]
+        if self.span_ticks:
+            tick = tick % self.span_ticks
+        velocity = own_velocity(targets, each, tick / self.context.ticks_per_s)
+        body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
+        attitude = targets.own_attitude
+        if attitude is None or not np.isfinite(velocity).all():
+            return off * FASTEST_M_S
+        turned = (attitude[f"{name}_rad"][row] for name in ("yaw", "pitch", "roll"))
+        towards = np.stack(body_to_ned(*body, *turned))
+        nearer_m_s: FloatArray = (towards * velocity[:, place]).sum(axis=0)
+        return off * FASTEST_M_S - nearer_m_s
+
+    def seen(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets at the instants at which the beam lights them."""
+        if self._sweep is None:
+            return targets, rows
+        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+
+
+class RangeBoundaryParameters(RadarParameters):
+    """Parameters of a range boundary radar."""
+
+    range_km: float = Field(gt=0, description="Range inside which every target is detected, km.")
+    minimum_range_m: float | None = Field(
+        default=None, gt=0, description="Closer than this nothing is detected, m; none by default."
+    )
+    boundary_rcs_dbsm: float = Field(
+        default=0.0,
+        ge=-100,
+        le=100,
+        description="Target that the range is stated for, dBsm; used with clutter and rain only.",
+    )
+    boundary_pd: float = Field(
+        default=0.9,
+        gt=0,
+        lt=1,
+        description="Pd at that range (Swerling I); used with clutter, rain and CFAR only.",
+    )
+    false_alarm_probability: float = Field(
+        default=1e-6,
+        gt=0,
+        lt=1,
+        description="Probability of false alarm that goes with it; used as boundary_pd is.",
+    )
+
+    frequency_hz: float | None = Field(
+        default=None,
+        gt=0,
+        description="Carrier, Hz; for weather, a moving_target_filter and range_rate_folds.",
+    )
+    prf_hz: float | None = Field(
+        default=None,
+        gt=0,
+        description="Pulse repetition frequency, Hz; as frequency_hz.",
+    )
+
+    @model_validator(mode="after")
+    def _carrier(self) -> Self:
+        for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
+            if getattr(self, key) != off and self.frequency_hz is None:
+                raise ValueError(
+                    f"{key} is {getattr(self, key)!r} and frequency_hz is not given: blind speeds "
+                    "and the unambiguous velocity follow from it"
+                )
+        if self.prf_hz is not None and self.range_km * 1000.0 > unambiguous_range_m(self.prf_hz):
+            raise ValueError(
+                f"prf_hz is {self.prf_hz:g}: echoes are unambiguous up to "
+                f"{unambiguous_range_m(self.prf_hz) / 1000:.4g} km and range_km is "
+                f"{self.range_km:g}; lower one of them"
+            )
+        return self
+
+    @property
+    def pulses_summed(self) -> int:
+        """One look."""
+        return 1
+
+
+class RangeBoundary(Radar):
+    """Detects every target inside its range, as the DUT/NLDA simulator's radar did.
+
+    Confidence is 40·log10(range limit / range), the SNR margin in dB that a radar would have
+    whose threshold lies at the limit.
+
+    Ground clutter brings the boundary nearer: for the target that it is stated for, the noise at
+    the boundary has that target's echo over the SNR that `boundary_pd` needs; the ground's echo
+    comes on top of it, and a threshold from reference cells needs the CFAR loss more. A
+    moving-target filter changes both echoes. With ``frequency_hz`` it obeys the weather: air and
+    rain take from both, and rain echoes as the ground does.
+    """
+
+    Parameters = RangeBoundaryParameters
+    inputs = CUED_INPUTS
+    lockstep = True
+    side_by_side = True
+    hooks = {
+        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
+        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
+    }
+    effects = (
+        *WEATHER_EFFECTS,
+        BlindRange(),
+        BoundaryClutter(),
+        RainClutter(),
+        SidelobeClutter(),
+        DopplerFilter(),
+        CellAveraging(),
+        OneReportByCell(),
+        BeamSweep(),
+    )
+    ladders = (DETECTION,)
+    _cfar: Averaging | None = None
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        frequency_hz = parameters.frequency_hz
+        self._echoes: list[Echo] = []
+        self.wavelength_m = None if frequency_hz is None else SPEED_OF_LIGHT_M_S / frequency_hz
+
+    def setup(self) -> None:
+        """Take what the scene's effects do to the boundary."""
+        super().setup()
+        refuse_cues(self)
+        self._echoes = self.built("clutter")
+        (self._cfar,) = self.built("threshold from reference cells") or [None]
+
+    def warnings(self) -> list[str]:
+        """Say that clutter counts as signal, where it does, and what it hears of the weather."""
+        return [
+            *super().warnings(),
+            *clutter_as_signal(self.p, terrain_of(self)),
+            *deaf_to_weather(self),
+            *said_of_rain(self),
+        ]
+
+    def look(self, cells: Cells) -> Look:
+        """Detect every cell: the gate has kept those out of range away."""
+        # A metre is closer than any radar sees; it keeps the margin finite at range 0.
+        ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
+        margin_db = 40.0 * np.log10(ratio)
+        detected = np.ones(len(cells), dtype=bool)
+        through = np.ones(len(cells))
+        for factor in self.snr_factors:
+            through = through * factor(cells)
+        heard = through > 0.0
+        lossy = bool((through[heard] != 1.0).any())
+        if lossy or self._echoes or not (self._cfar is self.doppler is None):
+            margin_db = self._margin_db(cells, margin_db, np.where(heard, through, 1.0))
+            detected = margin_db >= 0.0
+        detected &= heard
+        # Of equal targets the nearer one has the stronger echo.
+        detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
+        return Look(detected, margin_db)
+
+    def _margin_db(
+        self, cells: Cells, over_noise_db: FloatArray, through: FloatArray
+    ) -> FloatArray:
+        """Return the margin over what is in the cell, in dB, from that over noise."""
+        p = self.p
+        needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
+        signal, alone = through, 10.0 ** (-0.1 * over_noise_db)
+        noise = alone
+        residues: Any = [1.0] * len(self._echoes)
+        if self.doppler is not None:
+            passed, residues = self.doppler(cells, self._echoes)
+            signal = through * passed
+        for echo, residue in zip(self._echoes, residues, strict=True):
+            clutter = through * residue * echo(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
+            if p.clutter_threshold == "noise":
+                signal = signal + clutter
+            else:
+                noise = noise + needed * clutter
+        # Where nothing is added, no bit is: that margin is the one over noise.
+        same = (signal == 1.0) & (noise == alone)
+        margin_db: FloatArray = np.where(same, over_noise_db, 10.0 * np.log10(signal / noise))
+        if self._cfar is not None:
+            margin_db = margin_db - self._cfar.loss_db(p.boundary_pd, "swerling1")
+        return margin_db

@@ -1,0 +1,294 @@
+"""Resolution cells: their size and number, and targets that are one echo in one of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.arguments.checks import positive
+from components.geometry.angles import TWO_PI
+from components.geometry.field_of_view import sector_width_rad
+from components.messages.reach import Reach
+from components.radar.detection.output import MOST_CELLS
+from components.sensor.look import Cells
+from components.sensor.parameters import SensorParameters
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.errors import Disagreements
+
+
+@dataclass(frozen=True)
+class ResolutionCells:
+    """The grid of resolution cells that fills a field of view: `resolution_cells` builds it.
+
+    By axis the number of cells, and the first edge and width of the field of view.
+    """
+
+    azimuth: int
+    elevation: int
+    range: int
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+    range_m: tuple[float, float]
+
+    @property
+    def count(self) -> int:
+        """Number of resolution cells."""
+        return self.azimuth * self.elevation * self.range
+
+
+def resolution_cells(
+    *,
+    azimuth_width_rad: float,
+    lowest_elevation_rad: float,
+    highest_elevation_rad: float,
+    nearest_m: float,
+    farthest_m: float,
+    azimuth_cell_rad: float,
+    elevation_cell_rad: float,
+    range_cell_m: float,
+    azimuth_start_rad: float = 0.0,
+) -> ResolutionCells:
+    """Return the grid of resolution cells of a field of view, or refuse over 1e15 of them.
+
+    A remainder counts as a cell; the cells of an axis are then made equally a little smaller, so
+    that they fill the field of view, which runs clockwise from its start.
+    """
+    values = {
+        "azimuth_cell_rad": azimuth_cell_rad,
+        "elevation_cell_rad": elevation_cell_rad,
+        "range_cell_m": range_cell_m,
+        "azimuth_width_rad": azimuth_width_rad,
+    }
+    for name, value in values.items():
+        positive(name, value)
+    if not azimuth_width_rad <= 2.0 * math.pi * (1.0 + 1e-12):
+        raise ValueError(f"azimuth_width_rad is {azimuth_width_rad:g}: it must be at most 2π")
+    if not lowest_elevation_rad <= highest_elevation_rad:
+        raise ValueError(
+            f"highest_elevation_rad is {highest_elevation_rad:g}: it must be at least "
+            f"lowest_elevation_rad, {lowest_elevation_rad:g}"
+        )
+    if not (0.0 <= nearest_m < farthest_m and math.isfinite(farthest_m)):
+        raise ValueError(
+            f"farthest_m is {farthest_m:g}: it must be finite and above nearest_m, {nearest_m:g}, "
+            "which must be 0 or more"
+        )
+    widths = (
+        (azimuth_width_rad, azimuth_cell_rad),
+        (highest_elevation_rad - lowest_elevation_rad, elevation_cell_rad),
+        (farthest_m - nearest_m, range_cell_m),
+    )
+    # A width that is a whole number of cells up to rounding has that many.
+    counts = [max(1, math.ceil(width / cell - 1e-9)) for width, cell in widths]
+    cells = ResolutionCells(
+        azimuth=counts[0],
+        elevation=counts[1],
+        range=counts[2],
+        azimuth_rad=(azimuth_start_rad, widths[0][0]),
+        elevation_rad=(lowest_elevation_rad, widths[1][0]),
+        range_m=(nearest_m, widths[2][0]),
+    )
+    if cells.count > MOST_CELLS:
+        raise ValueError(
+            f"the field of view has {cells.count:g} resolution cells: it must have at most 1e15; "
+            "make the cells larger"
+        )
+    return cells
+
+
+#: Keys of a cell's size, which come before the grid step: what is told apart is seldom as fine as
+#: what is reported.
+CELL_SIZES = (
+    ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
+    ("elevation_beamwidth_deg", "elevation_resolution_deg"),
+    ("range_cell_m", "range_resolution_m"),
+)
+
+
+class ResolutionParameters(SensorParameters):
+    """Beam, grid of range, and whether its cells are what the radar tells apart."""
+
+    azimuth_beamwidth_deg: float | None = Field(
+        default=None,
+        gt=0,
+        le=360,
+        description="Half-power beamwidth in azimuth, deg; where none is given the grid's step "
+        "stands for the beam.",
+    )
+    elevation_beamwidth_deg: float | None = Field(
+        default=None, gt=0, le=180, description="Half-power beamwidth in elevation, deg."
+    )
+    range_cell_m: float | None = Field(
+        default=None,
+        gt=0,
+        description="Depth of a resolution cell, c / 2B, m; by default the grid's step of range.",
+    )
+    sidelobe_level_db: float | None = Field(
+        default=None,
+        ge=-100,
+        lt=0,
+        description="Mean level of the sidelobes over the main beam, one way, dB: ground and rain "
+        "all around are heard through them. By default there are none.",
+    )
+    range_resolution_m: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
+    )
+    resolution_cells: bool | None = Field(
+        default=None,
+        description="Whether targets in one resolution cell (beam, or grid step) are one report, "
+        "of the strongest echo at the sum of their powers; by default where errors is not 'grid' "
+        "and cells have a size.",
+    )
+
+    @property
+    def tells_cells_apart(self) -> bool:
+        """Whether targets of one resolution cell are one report."""
+        if self.resolution_cells is None:
+            return self.errors != "grid" and not self.without_size
+        return self.resolution_cells
+
+    @property
+    def without_size(self) -> list[str]:
+        """Grid steps of 0 that no beamwidth stands for: such a cell has no size."""
+        return [
+            step
+            for beam, step in CELL_SIZES
+            if not (getattr(self, beam, None) or getattr(self, step))
+        ]
+
+    @model_validator(mode="after")
+    def _two_beamwidths(self) -> Self:
+        if (self.azimuth_beamwidth_deg is None) != (self.elevation_beamwidth_deg is None):
+            raise ValueError(
+                "azimuth_beamwidth_deg and elevation_beamwidth_deg belong together: give both or "
+                "neither"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _cells_have_a_size(self) -> Self:
+        Disagreements.refuse(
+            f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
+            for step in (self.without_size if self.resolution_cells else ())
+        )
+        return self
+
+
+def azimuth_width_rad(reach: Reach) -> float:
+    """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
+    return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
+
+
+def cell_size(parameters: Any) -> tuple[float, float, float]:
+    """Return the size of a resolution cell (rad, rad, m): its beam, or its grid's step, or 0."""
+    widths = [
+        getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in CELL_SIZES
+    ]
+    return math.radians(widths[0]), math.radians(widths[1]), float(widths[2])
+
+
+def cells_of_radar(block: Any) -> ResolutionCells:
+    """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
+    p = block.p
+    azimuth_rad, elevation_rad, range_m = cell_size(p)
+    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), CELL_SIZES, strict=True):
+        if width == 0:
+            raise ValueError(
+                f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"
+            )
+    if p.range_km is None:
+        raise ValueError(
+            "range_km is not given: false alarms are counted by resolution cells up to it"
+        )
+    if block.budget.nearest_m >= block.reach.range_max_m:
+        raise ValueError(
+            f"range_km is {p.range_km:g}: it must be above the minimum range, "
+            f"{block.budget.nearest_m / 1000:g} km"
+        )
+    return resolution_cells(
+        azimuth_start_rad=block.reach.azimuth_rad[0],
+        azimuth_width_rad=azimuth_width_rad(block.reach),
+        lowest_elevation_rad=block.reach.elevation_rad[0],
+        highest_elevation_rad=block.reach.elevation_rad[1],
+        nearest_m=block.budget.nearest_m,
+        farthest_m=block.reach.range_max_m,
+        azimuth_cell_rad=azimuth_rad,
+        elevation_cell_rad=elevation_rad,
+        range_cell_m=range_m,
+    )
+
+
+class OneReportByCell(Effect):
+    """Targets whose echoes fall into one resolution cell give one report.
+
+    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
+
+    It is that of the strongest echo, looked at with the sum of their powers (phases are random
+    against each other), and with that target's fluctuation and draws. So noise alone reports a
+    cell with the probability of false alarm, however many faint targets it holds.
+    """
+
+    lockstep = True
+    name = "resolution cells"
+    acts_on = "one report by cell"
+    neutral = False
+    outside_the_proof = "without it every target has a report of its own"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``resolution_cells``."""
+        p = block.p
+        if p.resolution_cells is None and p.errors != "grid":
+            if p.without_size:
+                return Verdict(False, f"{p.without_size[0]} is 0: a cell has no size")
+            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
+        return Verdict(
+            p.tells_cells_apart, f"resolution_cells is {str(p.tells_cells_apart).lower()}"
+        )
+
+    def build(self, block: Any) -> Merging:
+        """Return what adds up the echoes of each cell."""
+        return Merging(block)
+
+
+class Merging:
+    """Adds up echoes by resolution cell; called with cells and their echoes' powers."""
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        self._widths = cell_size(block.p)
+
+    def __call__(self, cells: Cells, power: FloatArray) -> FloatArray:
+        """Return each cell's summed power for its strongest echo, and 0 for the others."""
+        if len(cells) < 2 or not (np.diff(cells.row) == 0).any():
+            return power
+        block = self._block
+        seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
+        place = [
+            np.rint(values / width)
+            for values, width in zip((*seen, cells.range_m), self._widths, strict=True)
+        ]
+        # Astern the last cell is the first one.
+        astern = np.rint(np.pi / self._widths[0])
+        place[0] = np.where(place[0] == -astern, astern, place[0])
+        # By cell, the strongest first; of equals the first of the roster.
+        order = np.lexsort((cells.target, -power, *place, cells.row))
+        new = np.ones(len(order), dtype=bool)
+        new[1:] = False
+        for values in (cells.row, *place):
+            ordered = values[order]
+            new[1:] |= ordered[1:] != ordered[:-1]
+        total = np.zeros(len(order))
+        # One after the other from the strongest on, so that a cell's sum does not depend on others.
+        first = np.flatnonzero(new)
+        count = np.diff(np.append(first, len(order)))
+        summed = power[order[first]]
+        for later in range(1, int(count.max(initial=1))):
+            more = count > later
+            summed[more] += power[order[first[more] + later]]
+        total[order[first]] = summed
+        return total

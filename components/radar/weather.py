@@ -1,0 +1,244 @@
+"""What the way takes from a radar's echo: gas, rain and fog, and the blind range."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.atmosphere.attenuation import gas_specific_attenuation
+from components.atmosphere.slant_path import (
+    AttenuationTable,
+    attenuation_table,
+    one_way_attenuation_db,
+    two_way_transmission,
+)
+from components.environment.tables import Weather
+from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
+
+#: From cells to the factor of each one's SNR.
+CellFactor = Callable[[Cells], FloatArray]
+
+
+class BlindRange(Effect):
+    """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
+
+    lockstep = True
+    name = "blind range"
+    acts_on = "SNR"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``minimum_range_m``."""
+        nearest = block.p.minimum_range_m
+        if nearest is None:
+            return Verdict(False, "minimum_range_m is not given")
+        return Verdict(True, f"minimum_range_m is {nearest:g}")
+
+    def build(self, block: Any) -> CellFactor:
+        """Return the factor on every cell's SNR: 0 closer than the minimum range, else 1."""
+        nearest_m = 0.0 if block.p.minimum_range_m is None else block.p.minimum_range_m
+
+        def factor(cells: Cells) -> FloatArray:
+            return np.where(cells.range_m < nearest_m, 0.0, 1.0)
+
+        return factor
+
+
+_NO_CARRIER = "frequency_hz is not given"
+
+
+class Attenuation(Effect):
+    """Loss along the slant path, evaluated once per run into a table over altitude."""
+
+    acts_on = "SNR"
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the arguments of the table for this effect and no other."""
+        raise TypeError(f"{type(self).__name__} has no settings")
+
+    def build(self, block: Any) -> CellFactor:
+        """Return the factor on every cell's SNR."""
+        weather = block.context.sections["weather"]
+        if block.wavelength_m is None:
+            return lambda cells: np.ones(len(cells))
+        table = attenuation_table(
+            SPEED_OF_LIGHT_M_S / block.wavelength_m,
+            **{"gas": False, **self.settings(weather, block)},
+        )
+
+        def factor(cells: Cells) -> FloatArray:
+            loss_db = one_way_attenuation_db(
+                cells.range_m, cells.of_row("own_alt_m"), cells.alt_m, table
+            )
+            return two_way_transmission(loss_db)
+
+        return factor
+
+    def bound(self, block: Any) -> dict[str, float]:
+        """Return the largest influence on Pd inside the radar's range, where it has one.
+
+        The loss is at most its sea-level value times the range, and Pd falls by at most
+        max |dPd / d ln SNR| per unit of ln SNR.
+        """
+        reach_m = block.reach.range_max_m
+        steepness = block.steepest_pd() if hasattr(block, "steepest_pd") else None
+        if not math.isfinite(reach_m) or steepness is None:
+            return {}
+        weather = block.context.sections["weather"]
+        table = attenuation_table(
+            SPEED_OF_LIGHT_M_S / block.budget.wavelength,
+            **{"gas": False, **self.settings(weather, block)},
+        )
+        most_db = 2.0 * worst_one_way_db(table, reach_m)
+        influence = steepness * most_db * math.log(10.0) / 10.0
+        return {"detection_probability": min(1.0, influence)}
+
+
+def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
+    """Return the largest one-way loss of any path up to `reach_m` long, dB."""
+    altitudes = np.arange(-1000.0, 40_001.0, 25.0)
+    level = one_way_attenuation_db(np.full(altitudes.shape, reach_m), altitudes, altitudes, table)
+    slanted = one_way_attenuation_db(
+        np.full(altitudes.shape, reach_m), altitudes, altitudes + reach_m, table
+    )
+    # Rain's coefficient depends on the path's elevation by a few per cent; 10 % covers it.
+    return 1.1 * float(max(level.max(), slanted.max()))
+
+
+def deaf_to_weather(block: Any) -> list[str]:
+    """Say that weather does nothing to a radar whose carrier is not known."""
+    weather = block.context.sections.get("weather")
+    if weather is None or block.wavelength_m is not None or not block.p.enabled:
+        return []
+    there = [key for key in ("gas", "rain_rate_mm_h", "fog_water_g_m3") if getattr(weather, key)]
+    if not there:
+        return []
+    return [
+        f"[weather] {' and '.join(there)}: no effect on this radar, whose frequency_hz is not "
+        "given: its boundary lies where range_km says, in any weather"
+    ]
+
+
+class Gas(Attenuation):
+    """Oxygen and water vapour (ITU-R P.676-12, reference atmosphere P.835-6)."""
+
+    name = "gas attenuation"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] gas``."""
+        if block.context.sections["weather"].gas:
+            if block.wavelength_m is None:
+                return Verdict(False, _NO_CARRIER)
+            return Verdict(True, "[weather] gas is true", self.bound(block))
+        return Verdict(False, "[weather] gas is false")
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return gas only; with no gas called for, a table without it."""
+        return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
+
+
+def said_of_rain(block: Any) -> list[str]:
+    """Say where rain has no echo, or where its echo is taken for more than it is."""
+    weather = block.context.sections.get("weather")
+    if weather is None or not weather.rain_rate_mm_h or not block.p.enabled:
+        return []
+    if block.wavelength_m is None:
+        return []  # said of all weather
+    if why := no_rain_echo(block):
+        return [f"rain has no echo for this radar: {why}"]
+    frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
+    if frequency_hz <= HIGHEST_RAYLEIGH_HZ:
+        return []
+    return [
+        f"rain echo: at {frequency_hz / 1e9:.3g} GHz drops are no longer small against the "
+        f"wavelength, and Rayleigh's formula, good up to {HIGHEST_RAYLEIGH_HZ / 1e9:g} GHz, gives "
+        "more echo than there is"
+    ]
+
+
+# Below it clear air takes less than 0.04 dB/km both ways from an echo; no radar's range notices.
+_GAS_MATTERS_HZ = 10e9
+_RANGE_WITHOUT_ONE_M = 10e3
+
+
+def gas_left_out(block: Any) -> list[str]:
+    """Say what clear air would take from a radar above 10 GHz in a scene without gas.
+
+    It is not on by default: a radar calibrated by a range that was measured through air has the air
+    in its calibration already, and scenes keep their values.
+    """
+    weather = block.context.sections.get("weather")
+    frequency_hz = SPEED_OF_LIGHT_M_S / block.budget.wavelength
+    if weather is None or weather.gas or frequency_hz <= _GAS_MATTERS_HZ:
+        return []
+    calibrated = getattr(block.p, "calibrate", None)
+    range_m = block.stated_reach.range_max_m
+    if calibrated is not None:
+        range_m = 1000.0 * calibrated.range_km
+    elif not math.isfinite(range_m):
+        range_m = _RANGE_WITHOUT_ONE_M
+    db_km = float(
+        gas_specific_attenuation(frequency_hz, vapour_density_g_m3=weather.vapour_density_g_m3)
+    )
+    return [
+        f"gas attenuation: at {frequency_hz / 1e9:.3g} GHz clear air at sea level would take "
+        f"{2e-3 * range_m * db_km:.2g} dB from an echo at {range_m / 1000:.4g} km, there and back; "
+        "[weather] gas = true simulates it"
+        + (" (the range calibrated by is then one without air)" if calibrated is not None else "")
+    ]
+
+
+class Rain(Attenuation):
+    """Rain below its upper edge (ITU-R P.838-3)."""
+
+    name = "rain"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] rain_rate_mm_h``."""
+        rate = block.context.sections["weather"].rain_rate_mm_h
+        if rate and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
+        because = f"[weather] rain_rate_mm_h is {rate:g}"
+        return Verdict(rate > 0, because, self.bound(block) if rate > 0 else {})
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return rain only."""
+        return {
+            "rain_rate_mm_h": weather.rain_rate_mm_h,
+            "rain_height_m": weather.rain_top_m,
+            # P.838-3 has one coefficient for a circular wave and a linear one at 45 degrees.
+            "polarisation": "circular" if block.p.polarisation == "slant" else block.p.polarisation,
+        }
+
+
+class Fog(Attenuation):
+    """Fog and cloud between two altitudes (ITU-R P.840-8)."""
+
+    name = "fog"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] fog_water_g_m3``."""
+        water = block.context.sections["weather"].fog_water_g_m3
+        if water and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
+        because = f"[weather] fog_water_g_m3 is {water:g}"
+        return Verdict(water > 0, because, self.bound(block) if water > 0 else {})
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return fog only."""
+        return {
+            "fog_liquid_water_g_m3": weather.fog_water_g_m3,
+            "fog_base_m": weather.fog_base_m,
+            "fog_top_m": weather.fog_top_m,
+            "fog_temperature_k": weather.fog_temperature_c + 273.15,
+        }
+
+
+WEATHER_EFFECTS = (Gas(), Rain(), Fog())

@@ -1,0 +1,95 @@
+"""Straight flights that are prepared together have the bits of each alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from components.flights.bounds import intervals_present_s, max_speeds_mps
+from components.flights.fleet import ScriptedFleet
+from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_parameters
+from components.flights.scripted_flights import (
+    ScriptedTrajectory,
+    Starts,
+    StraightFlights,
+    flights_of,
+)
+
+latitudes = st.floats(-90, 90) | st.sampled_from([90.0, -90.0, 0.0, -0.0, 52.0])
+headings = st.floats(-720, 720) | st.sampled_from([0.0, 90.0, 180.0, 270.0, 360.0])
+rows = st.tuples(
+    latitudes, st.floats(-400, 400), st.floats(-400, 20_000), headings, st.floats(0.1, 400),
+    st.floats(-30, 30),
+)  # fmt: skip
+optional = st.none() | st.floats(-80, 400)
+flights = st.tuples(rows, st.tuples(optional, optional, optional),
+                    st.floats(0, 50), st.none() | st.floats(50, 100))  # fmt: skip
+
+
+@settings(max_examples=200)
+@given(st.lists(rows, min_size=1, max_size=5))
+def test_tables_are_equal_to_the_bit(given_rows):
+    columns = np.array(given_rows).T
+    columns[3] = np.radians(columns[3])
+    together = geodesic_parameter_table(*columns)
+    alone = np.stack([geodesic_parameters(*row) for row in columns.T.tolist()], axis=1)
+    assert together.tobytes() == alone.tobytes()
+
+
+def starts_of(drawn):
+    columns = np.array([row for row, *_ in drawn]).T
+    fixed = np.array([[np.nan if a is None else a for a in angles] for _, angles, *_ in drawn]).T
+    ends = [np.inf if end is None else end for *_, end in drawn]
+    names = [f"t{i}" for i in range(len(drawn))]
+    start_s = np.array([start for _, _, start, _ in drawn])
+    return Starts(names, *columns, start_time_s=start_s, end_time_s=np.array(ends), fixed_deg=fixed)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(flights, min_size=1, max_size=6), st.data())
+def test_flights_together_fly_as_each_alone(drawn, data):
+    alone = [
+        ScriptedTrajectory(
+            f"t{i}", lat_deg=row[0], lon_deg=row[1], alt_m=row[2], heading_deg=row[3],
+            speed_mps=row[4], climb_mps=row[5], yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll,
+            start_time_s=start, end_time_s=end,
+        )
+        for i, (row, (yaw, pitch, roll), start, end) in enumerate(drawn)
+    ]  # fmt: skip
+    together = flights_of(starts_of(drawn))
+    assert isinstance(together, StraightFlights)
+    assert [flight.name for flight in together] == [flight.name for flight in alone]
+    assert max_speeds_mps(together).tolist() == max_speeds_mps(alone).tolist()
+    assert intervals_present_s(together).tolist() == intervals_present_s(alone).tolist()
+    times = np.array([-1.0, 0.0, 49.5, 77.7, 5000.0])
+    fleets = [ScriptedFleet(together), ScriptedFleet(alone)]
+    pairs = [(one.at(times), other.at(times)) for one, other in zip(together, alone, strict=True)]
+    pairs.append(tuple(fleet.at(times) for fleet in fleets))
+    which = np.array(data.draw(st.lists(st.integers(0, len(alone) - 1), max_size=8)), dtype=int)
+    pairs.append(tuple(fleet.each(which, np.linspace(0, 90, len(which))) for fleet in fleets))
+    chosen = np.unique(which)
+    pairs.append(tuple(fleet.subset(chosen).at(times) for fleet in fleets))
+    for one, other in pairs:
+        for a, b in zip(one.arrays(), other.arrays(), strict=True):
+            assert np.ascontiguousarray(a).tobytes() == np.ascontiguousarray(b).tobytes()
+
+
+def plain(**changes):
+    columns = {"lat_deg": 52.0, "lon_deg": 4.0, "alt_m": 100.0, "heading_deg": 10.0,
+               "speed_mps": 50.0} | changes  # fmt: skip
+    return Starts(["a", "b"], **{k: np.array([v, v]) for k, v in columns.items()})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [({"alt_m": 2e6}, "a: alt_m"), ({"lat_deg": 91.0}, "a: lat_deg"),
+     ({"start_time_s": 5.0, "end_time_s": 3.0}, "a: end_time_s"),
+     ({"heading_deg": np.inf}, "a: heading_deg"), ({"speed_mps": -1.0}, "a: speed_mps")],
+)  # fmt: skip
+def test_what_one_flight_refuses_is_refused_of_many(changes, said):
+    with pytest.raises(ValueError, match=said):
+        flights_of(plain(**changes))
+
+
+def test_flights_that_stand_still_are_made_one_by_one():
+    assert [type(flight) for flight in flights_of(plain(speed_mps=0.0))] == [ScriptedTrajectory] * 2

@@ -1,0 +1,37 @@
+"""Every unit that a traffic file may name is what it is defined as."""
+
+import math
+from fractions import Fraction
+
+import pytest
+
+from components.formats.text_rows import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
+
+FOOT, MILE, HOUR = Fraction("0.3048"), Fraction(1852), Fraction(3600)
+LENGTHS = {
+    "m": 1, "metre": 1, "metres": 1, "meter": 1, "meters": 1, "km": 1000, "ft": FOOT, "foot": FOOT,
+    "feet": FOOT, "nmi": MILE, "nm": MILE,
+}  # fmt: skip
+SPEEDS = {
+    "m/s": 1, "mps": 1, "km/h": 1000 / HOUR, "kph": 1000 / HOUR, "kmh": 1000 / HOUR,
+    "knot": MILE / HOUR, "knots": MILE / HOUR, "kn": MILE / HOUR, "kt": MILE / HOUR,
+    "kts": MILE / HOUR, "nmi/h": MILE / HOUR, "nmi/s": MILE, "fpm": FOOT / 60, "ft/min": FOOT / 60,
+    "ft/s": FOOT, "fps": FOOT,
+}  # fmt: skip
+ANGLES = {
+    **dict.fromkeys(("deg", "degree", "degrees"), 1.0),
+    **dict.fromkeys(("rad", "radian", "radians"), math.degrees(1.0)),
+}
+TIMES = {
+    **dict.fromkeys(("s", "sec", "second", "seconds"), 1), "ms": Fraction(1, 1000), "min": 60,
+    "h": HOUR, "hr": HOUR,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("known", "expected"),
+    [(LENGTH_M, LENGTHS), (SPEED_MPS, SPEEDS), (ANGLE_DEG, ANGLES), (TIME_S, TIMES)],
+    ids=["lengths", "speeds", "angles", "times"],
+)
+def test_units_are_what_they_are_defined_as(known, expected):
+    assert known == pytest.approx({name: float(value) for name, value in expected.items()})
