@@ -26,7 +26,7 @@ from components.arguments.checks import (
 from components.geometry import sector_width_rad
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections, in_measured_order
-from components.radar.false_alarms import false_alarm_count
+from components.radar.detection.output import false_alarm_count
 from dsa_des.block.effect import Effect, Verdict
 
 _NORMAL = NormalDist()
