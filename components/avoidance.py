@@ -85,7 +85,7 @@ class TurnOut(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        told: dict[int, Manoeuvre] = {}
+        manoeuvres: dict[int, Manoeuvre] = {}
         alerted = np.flatnonzero(alerts.highest() >= self.p.level)
         left = zip(alerted.tolist(), wake.replica[alerted].tolist(), strict=True)
         waiting = list(left)
@@ -104,10 +104,10 @@ class TurnOut(Component):
             for (run, place), changes in zip(now.items(), found, strict=True):
                 change = None if changes is None else smaller(changes)
                 if change is not None:
-                    told[place] = self._manoeuvre(change)
+                    manoeuvres[place] = self._manoeuvre(change)
                     self._free_from[run] = int(wake.ticks[place]) + self._pause_ticks
             waiting = later
-        return Manoeuvres.at_rows(wake.ticks, told)
+        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
         """Return what makes a change."""

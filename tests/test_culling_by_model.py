@@ -10,9 +10,9 @@ import pytest
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import KnownTraffic
 from components.geometry import ellipsoid
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.line_of_sight import LineOfSight
-from components.line_of_sight.true_reach import true_reach_m
+from components.geometry.earth_models import LineOfSight
+from components.geometry.ellipsoid import enu_to_geodetic
+from components.line_of_sight.rungs import true_reach_m
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink

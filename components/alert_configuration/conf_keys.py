@@ -144,21 +144,7 @@ class BadValue(ValueError):
 
 
 def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, str]:
-    """Return a value and the unit it is written in.
-
-    Parameters
-    ----------
-    kind : str
-        A key of `UNITS`, or "number", "count", "yes or no", "region", "name".
-    text : str
-        As after the equals sign.
-    negative : bool
-        Whether the number may be below 0.
-
-    Raises
-    ------
-    BadValue
-    """
+    """Return a value and the unit it is written in."""
     match = _VALUE.fullmatch(text.strip())
     if match is None:
         raise BadValue(f"{shortened(text, 40)!r} is not a value with its unit in brackets")

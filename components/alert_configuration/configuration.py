@@ -18,27 +18,18 @@ REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
 
 @dataclass(frozen=True)
 class Level:
-    """One level of an alerter.
-
-    Parameters
-    ----------
-    volume : Volume or TcasAdvisory
-    region : str
-        What its bands are painted as, one of `REGIONS`.
-    alerting_time_s, early_alerting_time_s : float
-        How long before the volume is entered the level is due; the early one holds while it is on.
-    uncertain : bool
-        Whether the bounds on the states count (volumes of class WCV_TAUMOD_SUM).
-    spreads : tuple of (kind, size)
-        By kind of guidance (hdir, hs, vs, alt): the level is due too if values so near the
-        ownship's own lead to its volume, rad, m/s, m. Kinds without a spread are left out.
-    """
+    """One level of an alerter."""
 
     volume: Volume | TcasAdvisory
-    region: str
+    region: str  # What its bands are painted as, one of `REGIONS`
+    # How long before the volume is entered the level is due; the early one holds while it is on
     alerting_time_s: float
     early_alerting_time_s: float
+    # Whether the bounds on the states count (volumes of class WCV_TAUMOD_SUM)
     uncertain: bool = False
+    # tuple of (kind, size): By kind of guidance (hdir, hs, vs, alt): the level is due too if
+    # values so near the ownship's own lead to its volume, rad, m/s, m. Kinds without a spread
+    # are left out
     spreads: tuple[tuple[str, float], ...] = ()
 
 
@@ -52,23 +43,12 @@ class Alerter:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A whole configuration.
+    """A whole configuration."""
 
-    Parameters
-    ----------
-    alerters : tuple of Alerter
-        The first is that of intruders whose alerter is not said.
-    values : mapping
-        Every other key of the file format, in SI units and radians.
-    units : mapping
-        The unit in which the file gives each key that has one.
-    left_out : tuple of str
-        Alerters that the file holds and its key `alerters` does not name.
-    """
-
-    alerters: tuple[Alerter, ...]
-    values: Mapping[str, Any]
-    units: Mapping[str, str]
+    alerters: tuple[Alerter, ...]  # The first is that of intruders whose alerter is not said
+    values: Mapping[str, Any]  # Every other key of the file format, in SI units and radians
+    units: Mapping[str, str]  # The unit in which the file gives each key that has one
+    # Alerters that the file holds and its key `alerters` does not name
     left_out: tuple[str, ...] = ()
 
     def __getitem__(self, key: str) -> Any:
@@ -97,30 +77,16 @@ class Configuration:
 
 
 class Deviations(NamedTuple):
-    """Standard deviations of states, those of ownship and target added, arrays of one shape.
+    """Standard deviations of states, those of ownship and target added, arrays of one shape."""
 
-    Parameters
-    ----------
-    position_m, height_m, velocity_mps, climb_mps : ndarray
-        Of horizontal ones along their longest axis.
-    """
-
-    position_m: FloatArray
+    position_m: FloatArray  # Of horizontal ones along their longest axis
     height_m: FloatArray
     velocity_mps: FloatArray
     climb_mps: FloatArray
 
 
 def margins(configuration: Configuration, deviations: Deviations, range_m: FloatArray) -> Bounds:
-    """Return how far relative states may be wrong.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    deviations : Deviations
-    range_m : ndarray
-        Horizontal: far away, less of the velocity's deviation counts.
-    """
+    """Return how far relative states may be wrong."""
     position = configuration["h_pos_z_score"] * deviations.position_m
     least, most = configuration["h_vel_z_score_min"], configuration["h_vel_z_score_max"]
     distance_m = configuration["h_vel_z_distance"]
@@ -135,14 +101,6 @@ def margins(configuration: Configuration, deviations: Deviations, range_m: Float
 
 
 def largest(east: FloatArray, north: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the standard deviation along the longest axis of 2 by 2 covariances.
-
-    Parameters
-    ----------
-    east, north : ndarray
-        Standard deviations.
-    covariance : ndarray
-        Of the two.
-    """
+    """Return the standard deviation along the longest axis of 2 by 2 covariances."""
     mean, half = 0.5 * (east**2 + north**2), 0.5 * (east**2 - north**2)
     return np.asarray(np.sqrt(mean + np.hypot(half, covariance)))

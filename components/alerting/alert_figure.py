@@ -27,17 +27,7 @@ def draw_alerts(
     encounter: Encounter,
     alerts: Alerts,
 ) -> None:
-    """Draw the alerts of one encounter into a PNG file.
-
-    Parameters
-    ----------
-    path : Path
-    title : str
-    configuration : Configuration
-    encounter : Encounter
-    alerts : Alerts
-        Of the encounter.
-    """
+    """Draw the alerts of one encounter into a PNG file."""
     with drawing(9.0, 7.5, path) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
         over_time = figure.add_subplot(grid[0, 0])

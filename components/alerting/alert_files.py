@@ -44,15 +44,7 @@ def alert_files(
     wind: tuple[float, float] | None,
     decimals: int,
 ) -> None:
-    """Write the tables and figures that the command line asks for.
-
-    Raises
-    ------
-    UsageError
-        For every file that cannot be used, before anything is written.
-    OutputError
-        If a result cannot be written.
-    """
+    """Write the tables and figures that the command line asks for."""
     paths, several = _found(encounters)
     names = {"--out": out, "--figure": figure, "--bands": bands}
     places = {option: named(name, option) for option, name in names.items() if name is not None}

@@ -48,17 +48,7 @@ def without_memory(configuration: Configuration) -> Configuration:
 def alert_table(
     configuration: Configuration, encounter: Encounter, alerts: Alerts, decimals: int = DECIMALS
 ) -> str:
-    """Return the table of an encounter as comma-separated text with two rows of headings.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    encounter : Encounter
-    alerts : Alerts
-        Of the encounter.
-    decimals : int
-        Of every number; trailing zeros are left out.
-    """
+    """Return the table of an encounter as comma-separated text with two rows of headings."""
     units = _units(configuration)
     shown = _shown(configuration)
     names = ["Time", "Ownship", "Traffic", "Alerter", "Alert Level"]
@@ -153,36 +143,17 @@ TABLE_UNITS = {
 
 
 class BandsOverTime(NamedTuple):
-    """Bands of one kind at the instants of an encounter.
+    """Bands of one kind at the instants of an encounter."""
 
-    Parameters
-    ----------
-    time_s : (instants,)
-        As in the file.
-    own_value : (instants,)
-        Of the ownship, in SI units and radians.
-    bands : list of list of Band
-        Those of each instant, as remembered.
-    """
-
-    time_s: FloatArray
-    own_value: FloatArray
-    bands: list[list[Band]]
+    time_s: FloatArray  # (instants,): as in the file
+    own_value: FloatArray  # (instants,): of the ownship, in SI units and radians
+    bands: list[list[Band]]  # Those of each instant, as remembered
 
 
 def bands_over_time(
     kind_name: str, configuration: Configuration, encounter: Encounter, alerts: Alerts
 ) -> BandsOverTime:
-    """Return the bands of a kind at all instants of an encounter, memory included.
-
-    Parameters
-    ----------
-    kind_name : {"hdir", "hs", "vs", "alt"}
-    configuration : Configuration
-    encounter : Encounter
-    alerts : Alerts
-        Of the encounter: a target whose level is on counts by its early alerting time.
-    """
+    """Return the bands of a kind at all instants of an encounter, memory included."""
     pairs = encounter.pairs
     assert pairs.own is not None
     count = len(encounter.time_s)

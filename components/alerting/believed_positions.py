@@ -7,8 +7,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Deviations
 from components.alerting.own_poses import OwnPoses, run_begins
-from components.geometry.attitude import body_to_ned
-from components.geometry.daidalus_sphere import east_north_m
+from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
@@ -161,14 +160,7 @@ def _by_instant(
 def _fitted(
     time_s: FloatArray, position_m: FloatArray, now_s: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Return the states at some instants of least-squares lines through positions.
-
-    Parameters
-    ----------
-    time_s : (positions, n)
-    position_m : (positions, n, targets, 3)
-    now_s : (n,)
-    """
+    """Return the states at some instants of least-squares lines through positions."""
     seen = np.isfinite(position_m[..., 0])
     count = np.maximum(seen.sum(axis=0), 1)
     # Relative to now, so that clock readings do not cost digits.

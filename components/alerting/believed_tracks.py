@@ -9,8 +9,7 @@ from components.alert_configuration.configuration import Deviations, largest
 from components.alerting.believed_positions import BelievedFlights
 from components.alerting.own_poses import OwnPoses
 from components.estimation.frame import ned_axes
-from components.geometry.daidalus_sphere import east_north_m, east_north_mps
-from components.geometry.enu import enu_to_geodetic
+from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
@@ -24,25 +23,13 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 
 
 class _Estimates(NamedTuple):
-    """Tracks as they were estimated, (tracks,) in the last axis.
+    """Tracks as they were estimated, (tracks,) in the last axis."""
 
-    Parameters
-    ----------
-    number : (tracks,)
-    time_s : (tracks,)
-        That their states speak of.
-    state : (6, tracks)
-        North, east, down and their rates in the frame.
-    covariance : (21, tracks)
-    origin : (3, tracks)
-        Of the frame: latitude, longitude (deg), height (m).
-    """
-
-    number: IntArray
-    time_s: FloatArray
-    state: FloatArray
-    covariance: FloatArray
-    origin: FloatArray
+    number: IntArray  # (tracks,)
+    time_s: FloatArray  # (tracks,): that their states speak of
+    state: FloatArray  # (6, tracks): north, east, down and their rates in the frame
+    covariance: FloatArray  # (21, tracks)
+    origin: FloatArray  # (3, tracks): of the frame: latitude, longitude (deg), height (m)
 
     @classmethod
     def of(cls, tracks: StateTracks) -> "_Estimates":
@@ -112,27 +99,7 @@ class EstimatedFlights:
     def states(
         self, now: IntArray, now_s: FloatArray, begins: IntArray, own_place: FloatArray
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
-        """Return the flights that are known at some instants, by instant and track.
-
-        Parameters
-        ----------
-        now : (instants,) of int
-            Ticks; what comes later is not known yet.
-        now_s : (instants,)
-            The same, since the start of the run; states are carried on straight until then.
-        begins : (instants,) of int
-            When the run of each begins.
-        own_place : (3, instants)
-            Of the ownship: latitude and longitude (rad), height (m).
-
-        Returns
-        -------
-        instant, number : (flights,) of int
-            Place of the instant, and the track's number; ascending.
-        state : (6, flights)
-            Place from the ownship, east, north, up in its plane, and velocity over ground there.
-        deviations : Deviations of (flights,)
-        """
+        """Return the flights that are known at some instants, by instant and track."""
         last = np.searchsorted(self._came, now, side="right") - 1
         some = np.flatnonzero(last >= np.searchsorted(self._came, begins))
         place, entry = _each(self._begin[last[some]], self._count[last[some]])

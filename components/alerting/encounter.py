@@ -10,7 +10,7 @@ from components.alert_configuration.configuration import Configuration, Deviatio
 from components.alerting.levels import AlertPairs
 from components.formats.daa_file import EXTRA_HEADERS, read_daa_samples
 from components.formats.text_rows import Problems
-from components.geometry.daidalus_sphere import east_north_m, east_north_mps
+from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
 from components.well_clear.detection import Bounds
 from components.well_clear.volume import Relative
@@ -20,47 +20,28 @@ Samples = dict[str, FloatArray]
 
 
 class Encounter(NamedTuple):
-    """An ownship and its targets at the ownship's times.
-
-    Parameters
-    ----------
-    ownship : str
-    targets : tuple of str
-    time_s : (times,)
-        As in the file.
-    present : (times, targets) of bool
-        Where a target has a sample at the ownship's time.
-    relative : six of (times, targets)
-        East, north, up in m and their rates in m/s, ownship less intruder, in the ownship's plane.
-    alerter : (times, targets) of int
-        Place of each target's alerter in the configuration, from 0.
-    bounds : Bounds or None
-        How far the relative states may be wrong, where the file says so.
-    own_state : (4, times)
-        Altitude, and velocity east, north, up of the ownship, m and m/s.
-    own_plane : (2, times)
-        East and north of the ownship in the plane of its first sample, m, for figures.
-    target_plane : (2, times, targets)
-        The same of the targets.
-    wind : (2, times)
-        Of the air, towards the east and north, m/s; velocities are relative to the air, which
-        changes none of the differences.
-    left_out : int
-        Samples of targets at other instants than the ownship's.
-    """
+    """An ownship and its targets at the ownship's times."""
 
     ownship: str
     targets: tuple[str, ...]
-    time_s: FloatArray
+    time_s: FloatArray  # (times,): as in the file
+    # (times, targets) of bool: where a target has a sample at the ownship's time
     present: BoolArray
+    # six of (times, targets): east, north, up in m and their rates in m/s, ownship less
+    # intruder, in the ownship's plane
     relative: Relative
+    # (times, targets) of int: place of each target's alerter in the configuration, from 0
     alerter: IntArray
-    bounds: Bounds | None
+    bounds: Bounds | None  # How far the relative states may be wrong, where the file says so
+    # (4, times): altitude, and velocity east, north, up of the ownship, m and m/s
     own_state: FloatArray
+    # (2, times): east and north of the ownship in the plane of its first sample, m, for figures
     own_plane: FloatArray
-    target_plane: FloatArray
+    target_plane: FloatArray  # (2, times, targets): the same of the targets
+    # (2, times): of the air, towards the east and north, m/s; velocities are relative to the
+    # air, which changes none of the differences
     wind: FloatArray
-    left_out: int
+    left_out: int  # Samples of targets at other instants than the ownship's
 
     @property
     def pairs(self) -> AlertPairs:

@@ -24,22 +24,7 @@ def due_by_spread(
     intruder: State,
     bounds: Bounds | None,
 ) -> tuple[BoolArray, BoolArray]:
-    """Return whether each level is due by its spreads, by its alerting time and its early one.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    levels : tuple of Level
-    own, intruder : State of (n,)
-        Pairs, each in its ownship's plane.
-    bounds : Bounds of (n,), optional
-
-    Returns
-    -------
-    (n, levels) of bool, twice
-        A level is due if, of some kind with a spread, part of the values nearer than it to the
-        own value is not clear of the level's volume, alone and within that time.
-    """
+    """Return whether each level is due by its spreads, by its alerting time and its early one."""
     count = len(own.up_m)
     due, early = (np.zeros((count, len(levels)), dtype=bool) for _ in range(2))
     for start in range(0, count, _MOST_SPREAD_AT_ONCE):
@@ -71,20 +56,13 @@ _MOST_AT_ONCE = 8192
 
 
 class Alerts(NamedTuple):
-    """Alert levels of targets over time.
+    """Alert levels of targets over time."""
 
-    Parameters
-    ----------
-    level : (times, targets)
-        0 without an alert, -1 where a target is absent.
-    violation_s : (times, targets, levels)
-        Time to violation of each level's volume, 0 inside, infinite if never.
-    early_level : (times, targets)
-        The level whose early alerting time counts for guidance; 0 for none.
-    """
-
-    level: IntArray
+    level: IntArray  # (times, targets): 0 without an alert, -1 where a target is absent
+    # (times, targets, levels): time to violation of each level's volume, 0 inside, infinite if
+    # never
     violation_s: FloatArray
+    # (times, targets): the level whose early alerting time counts for guidance; 0 for none
     early_level: IntArray
 
 
@@ -105,19 +83,7 @@ def violation_times_s(
     bounds: Bounds | None,
     own_up_mps: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
-    """Return the time to violation of each level, (n, levels).
-
-    Parameters
-    ----------
-    levels : tuple of Level
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder.
-    lookahead_s : float
-    bounds : Bounds or None
-        How far the states may be wrong, for levels that heed it.
-    own_up_mps : (altitude in m, climb in m/s) of (n,), optional
-        Of the ownship, for levels of TCAS II.
-    """
+    """Return the time to violation of each level, (n, levels)."""
     count = len(relative[0])
     found = np.empty((count, len(levels)))
     for start in range(0, count, _MOST_AT_ONCE):
@@ -147,22 +113,14 @@ def due_levels(levels: tuple[Level, ...], violation_s: FloatArray) -> tuple[Bool
 
 
 class AlertPairs(NamedTuple):
-    """Pairs of ownship and target at one instant each, for their levels without memory.
+    """Pairs of ownship and target at one instant each, for their levels without memory."""
 
-    Parameters
-    ----------
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less target.
-    own : State of (n,) or None
-        The ownship in its own plane: its altitude and velocity. Without it no level of TCAS II and
-        no spread can be told.
-    bounds : Bounds of (n,) or None
-        How far the relative states may be wrong.
-    """
-
+    # six of (n,): east, north, up in m and their rates in m/s, ownship less target
     relative: Relative
+    # (n,) or None: the ownship in its own plane: its altitude and velocity. Without it
+    # no level of TCAS II and no spread can be told
     own: State | None = None
-    bounds: Bounds | None = None
+    bounds: Bounds | None = None  # (n,) or None: how far the relative states may be wrong
 
     def some(self, which: Any) -> "AlertPairs":
         """Return some of the pairs."""
@@ -174,20 +132,7 @@ class AlertPairs(NamedTuple):
 def levels_without_memory(
     configuration: Configuration, alerter: Alerter, pairs: AlertPairs
 ) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Return the time to each level's volume, and whether it is due, at once and early.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    alerter : Alerter
-        Of all pairs.
-    pairs : AlertPairs
-
-    Returns
-    -------
-    (n, levels), thrice
-        As from `violation_times_s` and `due_levels`; spreads make a level due too.
-    """
+    """Return the time to each level's volume, and whether it is due, at once and early."""
     own, levels = pairs.own, alerter.levels
     found = violation_times_s(
         levels,

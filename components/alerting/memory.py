@@ -14,32 +14,16 @@ _COLUMNS = ("_last_s", "_output", "_risen_s", "_queue", "_own_time_s")
 
 @dataclass(frozen=True)
 class MemoryRule:
-    """How long and how an alert level is remembered.
+    """How long and how an alert level is remembered."""
 
-    Parameters
-    ----------
-    hysteresis_s : float
-        A gap in time longer than this forgets everything; 0 remembers nothing.
-    persistence_s : float
-        A level that rose less than this ago does not fall.
-    m, n : int
-        The m-th largest of the last n levels counts; m = 0 takes each one as it is.
-    """
-
-    hysteresis_s: float
-    persistence_s: float
-    m: int
+    hysteresis_s: float  # A gap in time longer than this forgets everything; 0 remembers nothing
+    persistence_s: float  # A level that rose less than this ago does not fall
+    m: int  # The m-th largest of the last n levels counts; m = 0 takes each one as it is
     n: int
 
 
 class AlertMemory:
-    """The remembered state of targets 0 ... count - 1, of one ownship or of several.
-
-    Parameters
-    ----------
-    rule : MemoryRule
-    count : int
-    """
+    """The remembered state of targets 0 ... count - 1, of one ownship or of several."""
 
     def __init__(self, rule: MemoryRule, count: int) -> None:
         self._rule = rule
@@ -69,24 +53,7 @@ class AlertMemory:
     def step(
         self, now_s: float | FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
     ) -> IntArray:
-        """Take in one instant and return the level of each target.
-
-        Parameters
-        ----------
-        now_s : float or (targets,)
-            The time of the ownship, or of each target's ownship.
-        present : (targets,) of bool
-            Who has a state now.
-        due : (targets, levels) of bool
-            Whether each level is due by its alerting time.
-        early : (targets, levels) of bool
-            Whether it is by its early alerting time.
-
-        Returns
-        -------
-        (targets,) of int
-            0 without an alert; meaningless for those who are absent.
-        """
+        """Take in one instant and return the level of each target."""
         rule = self._rule
         step_s = now_s - self._own_time_s
         gap = (step_s < 0.0) | (step_s > rule.hysteresis_s)
@@ -117,19 +84,7 @@ class AlertMemory:
         return level
 
     def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
-        """Return whose early alerting time counts for guidance: levels that rose before now.
-
-        Parameters
-        ----------
-        now_s : float
-            As in the last `step`.
-        present : (targets,) of bool
-
-        Returns
-        -------
-        (targets,) of int
-            The level; 0 for none.
-        """
+        """Return whose early alerting time counts for guidance: levels that rose before now."""
         counts = present & (self._rule.hysteresis_s > 0.0) & (self._risen_s < now_s)
         return np.where(counts, np.maximum(self._output, 0), 0)
 

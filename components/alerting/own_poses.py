@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.daidalus_sphere import east_north_m
+from components.geometry import east_north_m
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
@@ -15,12 +15,7 @@ _COLUMNS = ("_came", "_tick", "_place", "_attitude")
 
 
 class OwnPoses:
-    """What has come of the ownship's poses, of one run or of many; those of each run together.
-
-    Parameters
-    ----------
-    ticks_per_s : int
-    """
+    """What has come of the ownship's poses, of one run or of many; those of each run together."""
 
     def __init__(self, ticks_per_s: int) -> None:
         self._per_s = ticks_per_s
@@ -63,15 +58,7 @@ class OwnPoses:
     def pose_of(
         self, measured: IntArray, came: IntArray, begins: IntArray, asked: BoolArray
     ) -> IntArray:
-        """Return the pose of when something was measured, of those that had come; -1 for none.
-
-        Parameters
-        ----------
-        measured, came, begins : (n,) of int
-            When it was measured, when it came, and when its run begins.
-        asked : (n,) of bool
-            For which of them it counts.
-        """
+        """Return the pose of when something was measured, of those that had come; -1 for none."""
         made = np.searchsorted(self._tick, measured, side="right") - 1
         place, first = np.minimum(made, self.last_known(came)), self._first(begins)
         if self._old and bool((asked & (place <= first)).any()):
@@ -92,20 +79,7 @@ class OwnPoses:
         return self._place[np.maximum(self.last_known(ticks), 0)].T
 
     def states(self, ticks: IntArray, begins: IntArray, over_s: float) -> dict[str, FloatArray]:
-        """Return the altitude, and the mean velocity over the last seconds, at some instants.
-
-        Parameters
-        ----------
-        ticks, begins : (n,)
-            Instants, and when their runs begin.
-        over_s : float
-            At least the last two poses count.
-
-        Returns
-        -------
-        dict of (n,)
-            ``alt_m``, ``east_mps``, ``north_mps``, ``climb_mps``; NaN where one pose is all.
-        """
+        """Return the altitude, and the mean velocity over the last seconds, at some instants."""
         earliest = self._first(begins)
         last = np.maximum(self.last_known(ticks), earliest)
         since = ticks - round(over_s * self._per_s)
@@ -123,29 +97,13 @@ class OwnPoses:
         }
 
     def forget_before(self, tick: int, begin: int = 0) -> None:
-        """Drop poses that neither a velocity from an instant on nor a late sight asks for.
-
-        Parameters
-        ----------
-        tick : int
-        begin : int
-            When its run begins: those of runs before it have passed.
-        """
+        """Drop poses that neither a velocity from an instant on nor a late sight asks for."""
         old = int(np.searchsorted(self._tick, tick, side="left")) - 1
         keep = max(min(old, len(self._tick) - _KEPT_POSES), 0)
         self._keep(slice(max(keep, int(np.searchsorted(self._came, begin))), None))
 
     def set_aside(self, own_tick: int, wake: Wake, *, late_sights: bool) -> None:
-        """Set poses of runs side by side aside that only what comes late asks for.
-
-        Parameters
-        ----------
-        own_tick : int
-            Velocities are asked for from then on, since the start of the runs.
-        wake : Wake
-        late_sights : bool
-            Whether anything may come late; else these poses are dropped.
-        """
+        """Set poses of runs side by side aside that only what comes late asks for."""
         run, own = wake.replica_of(self._came), wake.own_ticks(self._tick)
         changes = np.append(run[1:] != run[:-1], True)
         recent = own >= own_tick

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from dsa_des.arrays.types import FloatArray
 
 # Beyond this the gap between neighbouring doubles is over a tenth of a radian: no direction is left
 # in the number.

@@ -7,16 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import (
-    FloatArray,
-    broadcast_flat,
-    finite,
-    not_negative,
-    positive,
-    unflatten,
-)
+from components.arguments.checks import broadcast_flat, finite, not_negative, positive, unflatten
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import KOSCHMIEDER
+from dsa_des.arrays.types import FloatArray
 
 BANDS = {"mwir": (3.0, 5.0), "lwir": (8.0, 12.0)}
 """Wavelengths of the bands, µm."""

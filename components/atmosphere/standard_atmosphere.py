@@ -1,14 +1,37 @@
-"""Pressure, temperature and humidity at an altitude in the standard atmosphere."""
+"""The standard atmosphere of ITU-R P.835, and the Recommendations' tables of coefficients."""
 
 from __future__ import annotations
 
+import csv
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, not_negative, unflatten, within
-from components.atmosphere.recommendation_tables import columns
+from dsa_des.arrays.types import FloatArray
+
+_FOLDER = Path(__file__).parent / "data"
+
+
+@cache
+def rows(name: str) -> tuple[dict[str, str], ...]:
+    """Return the rows of ``data/<name>.csv`` as dictionaries; lines starting with # are notes."""
+    with open(_FOLDER / f"{name}.csv", encoding="utf-8", newline="") as file:
+        return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+@cache
+def columns(name: str) -> dict[str, FloatArray]:
+    """Return the columns of ``data/<name>.csv`` as read-only float64 arrays."""
+    table = rows(name)
+    result = {key: np.array([float(row[key]) for row in table]) for key in table[0]}
+    for column in result.values():
+        column.flags.writeable = False
+    return result
+
 
 LOWEST_ALTITUDE_M = -5_000.0
 HIGHEST_ALTITUDE_M = 80_000.0

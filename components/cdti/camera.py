@@ -8,12 +8,12 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster, VisibleAreas
 from components.cdti.contacts import OwnNow
-from components.geometry.attitude import body_to_ned, ned_to_body, unit_vector_unchecked
+from components.geometry import body_to_ned, ned_to_body, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.detections import Detections
 from components.messages.targets import TrafficStates
 from components.optical.camera import Camera
-from components.optical.convex_hull import PLATE_ASPECT_RATIO
+from components.optical.silhouette import PLATE_ASPECT_RATIO
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.text.safe_text import printable
@@ -145,7 +145,7 @@ def silhouette(
     """Return the outlines of a target as a camera on the ownship has them.
 
     The bodies are those whose areas decide about the detection: a sphere drawn out into a capsule
-    along the x axis, and a plate in the x-y plane (`components.optical.convex_hull`).
+    along the x axis, and a plate in the x-y plane (`components.optical.silhouette`).
     Attitudes are yaw, pitch and roll, NED to body; the direction of the target is azimuth and
     elevation in the ownship's body axes; a pixel sees `pixel_rad` across and up.
     """

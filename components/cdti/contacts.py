@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.display.picture import TangentPlane, offset_positions
-from components.geometry.attitude import body_to_ned, unit_vector_unchecked
+from components.geometry import body_to_ned, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks

@@ -18,7 +18,7 @@ from components.cdti.page import (
 )
 from components.cdti.scope import Scope
 from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
-from components.operator.human import Desk, Laid
+from components.operator.human import Desk, PendingDecision
 from dsa_des.running.pacing import Pacer
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
@@ -279,7 +279,7 @@ class SessionControl:
             self._log.append(answer)
             self._server.tell(answer)
 
-        if self._desk.lay(Laid(decision, taken)):
+        if self._desk.put(PendingDecision(decision, taken)):
             return True
         del self._answers[message.id]
         return False

@@ -9,7 +9,7 @@ import numpy as np
 
 from components.display.recorded_rows import Detected
 from components.display.symbols import by_target, evenly
-from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
+from components.geometry import line_of_sight, line_of_sight_ned
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 

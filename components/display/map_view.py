@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.display.flights import Flights, Positions, where_detected
-from components.geometry.field_of_view import sector_width_rad
+from components.geometry import sector_width_rad
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI

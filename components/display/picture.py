@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.attitude import body_to_ned
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.enu import enu_to_geodetic
+from components.geometry import body_to_ned, enu_to_geodetic, line_of_sight_ned
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 

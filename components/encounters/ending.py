@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry import line_of_sight
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from components.terrain.raster_files import RasterFile
+from components.terrain.raster import RasterFile
 from dsa_des.block.component import Parameters
 from dsa_des.time.gauss_markov import LONGEST_S
 

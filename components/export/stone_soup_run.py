@@ -16,8 +16,7 @@ from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.estimation.frame import pose_in_frame
-from components.geometry.ellipsoid import north_east_up
-from components.geometry.normals import local_axes
+from components.geometry import local_axes, north_east_up
 from components.stone_soup.objects import (
     POSITION,
     VELOCITY,

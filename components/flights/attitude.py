@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.angles import FloatArray, Vector, local_axes, wrap_heading_rad
 from components.geometry.ellipsoid import radii_of_curvature
-from components.geometry.normals import FloatArray, Vector, local_axes
-from components.geometry.wrapping import wrap_heading_rad
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 """ISO 80000-3 standard acceleration of free fall."""

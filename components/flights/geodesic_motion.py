@@ -9,15 +9,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.angles import direction_angle, slope_angle
+from components.geometry.angles import (
+    DEG_PER_RAD,
+    FloatArray,
+    direction_angle,
+    slope_angle,
+    wrap_heading_rad,
+    wrap_longitude_deg,
+)
 from components.geometry.ellipsoid import (
     ECCENTRICITY_SQUARED,
     FLATTENING,
     SEMI_MAJOR_AXIS_M,
     radii_of_curvature,
 )
-from components.geometry.normals import DEG_PER_RAD, FloatArray
-from components.geometry.wrapping import wrap_heading_rad, wrap_longitude_deg
 
 # Rows of the parameter table of one straight leg.
 GEODESIC_ROWS = 20

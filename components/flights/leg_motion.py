@@ -10,9 +10,15 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 
 from components.flights.geodesic_motion import geodesic_state
+from components.geometry.angles import (
+    TWO_PI,
+    FloatArray,
+    local_axes,
+    normal_to_degrees,
+    past,
+    wrap_heading_rad,
+)
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, radii_of_curvature
-from components.geometry.normals import FloatArray, local_axes, normal_to_degrees
-from components.geometry.wrapping import TWO_PI, past, wrap_heading_rad
 
 LARGEST_TURN_RADIUS_M = 200_000.0
 """Up to here a turn keeps its speed to 2e-4; the error grows with the radius, 1e-6 at 1 km."""

@@ -12,9 +12,8 @@ from geographiclib.geodesic import Geodesic
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
 from components.flights.leg_motion import Kind, Segment, segment_state, turn_parameters
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import FloatArray
-from components.geometry.wrapping import heading_from_deg
+from components.geometry.angles import FloatArray, heading_from_deg
+from components.geometry.ellipsoid import enu_to_geodetic
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:

@@ -9,10 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from components.flights.attitude import attitude_from_path, fit_path
+from components.geometry.angles import (
+    FloatArray,
+    Vector,
+    local_axes,
+    normal_to_degrees,
+    wrap_difference_rad,
+    wrap_heading_rad,
+    wrap_longitude_deg,
+)
 from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight, radii_of_curvature
-from components.geometry.normals import FloatArray, Vector, local_axes, normal_to_degrees
 from components.geometry.state import TrajectoryState
-from components.geometry.wrapping import wrap_difference_rad, wrap_heading_rad, wrap_longitude_deg
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""

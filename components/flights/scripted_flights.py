@@ -15,9 +15,8 @@ from components.flights.geodesic_motion import geodesic_parameter_table
 from components.flights.leg_motion import Segment, segment_state
 from components.flights.legs import AnyLeg, LegBuilder, require
 from components.flights.sampled_flight import CELLS_AT_ONCE, TrajectoryState
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import FloatArray
-from components.geometry.wrapping import heading_from_deg, wrap_longitude_deg
+from components.geometry.angles import FloatArray, heading_from_deg, wrap_longitude_deg
+from components.geometry.ellipsoid import enu_to_geodetic
 
 LONGEST_FLIGHT_S = 1e12
 """Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""

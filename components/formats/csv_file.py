@@ -26,7 +26,7 @@ from components.formats.text_rows import (
     read_lines,
     shown_columns,
 )
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
 

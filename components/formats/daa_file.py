@@ -28,8 +28,8 @@ from components.formats.text_rows import (
     shown_columns,
     tokens,
 )
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import FloatArray, local_axes
+from components.geometry.angles import FloatArray, local_axes
+from components.geometry.ellipsoid import enu_to_geodetic
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
 

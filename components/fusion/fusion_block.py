@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.directions import unit_vectors
+from components.geometry import unit_vectors
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
-from components.navigation.effects import navigation_errs
+from components.navigation.errors import navigation_errs
 from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray

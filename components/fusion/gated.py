@@ -9,14 +9,14 @@ import numpy as np
 from pydantic import Field
 
 from components.fusion.fusion_block import FUSION_LADDER, Fusion, poses
-from components.geometry.attitude import (
+from components.geometry import (
+    angle_by_haversine,
     body_angles,
     body_to_ned,
+    line_of_sight_ned,
     ned_to_body,
     unit_vector_unchecked,
 )
-from components.geometry.directions import angle_by_haversine
-from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray, IntArray

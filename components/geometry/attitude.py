@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import FloatArray, common_shape, shaped, squarable
-from components.geometry.angles import sine_and_cosine
-from components.geometry.wrapping import wrap_pi
+from components.arguments.checks import common_shape, shaped, squarable
+from components.geometry.angles import sine_and_cosine, wrap_pi
+from dsa_des.arrays.types import FloatArray
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
 

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, angle, broadcast_flat, unflatten
+from components.arguments.checks import angle, broadcast_flat, unflatten
 from components.geometry.attitude import Triple, unit_vector_unchecked
+from dsa_des.arrays.types import FloatArray
 
 
 def angle_between(

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import FloatArray, common_shape, squarable
-from components.geometry.wrapping import TWO_PI, wrap_pi_unchecked
+from components.arguments.checks import common_shape, squarable
+from components.geometry.angles import TWO_PI, wrap_pi_unchecked
+from dsa_des.arrays.types import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -26,31 +27,7 @@ def inside(
     elevation_min_rad: float,
     elevation_max_rad: float,
 ) -> BoolArray:
-    """Tell which directions lie inside a field of view.
-
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Azimuth and elevation in the sensor's body axes, broadcast. Any number of turns of azimuth.
-    azimuth_min_rad, azimuth_max_rad : float
-        The field runs clockwise from min to max, each in [-2 pi, 2 pi]. It may be wider than pi
-        and may cross ±pi: 170 to 190 degrees and 170 to -170 degrees are the same field. A width
-        of 2 pi is the full circle.
-    elevation_min_rad, elevation_max_rad : float
-        In [-pi/2, pi/2], min not above max.
-
-    Returns
-    -------
-    ndarray of bool
-        The bounds belong to the field. An azimuth that is compared without adding a turn is
-        compared exactly; one that is a whole turn off the bounds, to within its rounding (2e-15 rad
-        and more for many turns), which cannot put a bound outside its own field.
-
-    Raises
-    ------
-    ValueError
-        A bound out of place, or NaN or infinity in the angles.
-    """
+    """Tell which directions lie inside a field of view."""
     low, high = _azimuth_bounds(azimuth_min_rad, azimuth_max_rad)
     _require("elevation_min_rad", elevation_min_rad, 0.5 * math.pi, "[-pi/2, pi/2]")
     _require("elevation_max_rad", elevation_max_rad, 0.5 * math.pi, "[-pi/2, pi/2]")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.normals import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 
 @dataclass(frozen=True)

@@ -95,12 +95,7 @@ class Altitudes:
         return np.take_along_axis(chosen, self._stands_for, axis=1)
 
     def flight_at(self, time_s: FloatArray) -> State:
-        """Return the straight flights at a time of each manoeuvre looked at, run back to 0.
-
-        Parameters
-        ----------
-        time_s : (n, looked at)
-        """
+        """Return the straight flights at a time of each manoeuvre looked at, run back to 0."""
         own = self.own
         values = self._level_m
         if self.instantaneous:
@@ -188,19 +183,7 @@ class AltitudeConflicts:
                 self._seconds.append(_Instants(time_s, due & nearly_equal(begin_s, time_s)))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which flights meet it.
-
-        Parameters
-        ----------
-        from_s : float or (n, 1)
-            From when on it counts.
-        horizon_s : float or (n, 1)
-            How long after the climb began to be held, and after the level-off.
-
-        Returns
-        -------
-        (n, k) of bool
-        """
+        """Tell which flights meet it."""
         end_s = np.minimum(self._after(horizon_s, self._level_s), self._lookahead_s)
         met = meets(self._level, np.maximum(from_s, self._level_s), end_s)
         if not self._altitudes.instantaneous:

@@ -6,12 +6,11 @@ the end is written state by state.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
+from components.alert_configuration.configuration import REGIONS, Configuration
 from components.guidance.intervals import (
     FULL_TURN,
     Band,
@@ -24,25 +23,17 @@ from components.guidance.kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
-from components.well_clear.detection import Bounds, some_bounds
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class Resolution(NamedTuple):
-    """Where the red band around the own value ends.
+    """Where the red band around the own value ends."""
 
-    Parameters
-    ----------
-    low, high : float
-        The nearest values that are not red to either side: left and right, or down and up;
-        infinite where there is none.
-    prefers_high : bool
-        Whether the right or upper one is nearer, or no farther.
-    """
-
+    # The nearest values that are not red to either side: left and right, or down and up;
+    # infinite where there is none
     low: float
     high: float
-    prefers_high: bool
+    prefers_high: bool  # Whether the right or upper one is nearer, or no farther
 
 
 def resolution(
@@ -116,73 +107,18 @@ _MOST_AT_ONCE = {"hdir": 32, "hs": 64, "vs": 64, "alt": 128}
 
 
 class Guidance(NamedTuple):
-    """The bands of one kind.
-
-    Parameters
-    ----------
-    own_value : float
-    bands : list of Band
-        In SI units and radians, from the lowest to the highest value.
-    recovery : Recovery or None
-        Where one was needed.
-    line : list of Band
-        The bands before NONE is called RECOVERY: what `components.guidance.memory` takes.
-    """
+    """The bands of one kind."""
 
     own_value: float
-    bands: list[Band]
-    recovery: Recovery | None
+    bands: list[Band]  # In SI units and radians, from the lowest to the highest value
+    recovery: Recovery | None  # Where one was needed
+    # The bands before NONE is called RECOVERY: what `components.guidance.memory` takes
     line: list[Band]
 
     @property
     def recovers(self) -> bool:
         """Whether what is free is shown as RECOVERY."""
         return self.recovery is not None and self.recovery.time_s >= 0.0
-
-
-@dataclass(frozen=True)
-class GuidedIntruder:
-    """One intruder as guidance sees it.
-
-    Parameters
-    ----------
-    state : State
-        In the ownship's plane.
-    alerter : Alerter
-    early_level : int
-        The level whose early alerting time counts; 0 for none.
-    bounds : Bounds of (), optional
-        How far the relative state may be wrong.
-    """
-
-    state: State
-    alerter: Alerter
-    early_level: int = 0
-    bounds: Bounds | None = None
-
-
-def guidance(
-    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruder]
-) -> Guidance:
-    """Return the bands of one kind at one instant, without memory.
-
-    Parameters
-    ----------
-    kind_name : {"hdir", "hs", "vs", "alt"}
-    configuration : Configuration
-    own : State
-    intruders : list of GuidedIntruder
-    """
-    alone = [
-        GuidedIntruders(
-            _one(i.state),
-            i.alerter,
-            np.array([i.early_level]),
-            bounds=None if i.bounds is None else some_bounds(i.bounds, np.newaxis),
-        )
-        for i in intruders
-    ]
-    return guidance_of_many(kind_name, configuration, _one(own), alone)[0]
 
 
 def guidance_of_many(
@@ -210,10 +146,6 @@ def guidance_of_many(
         part = [intruder.rows(rows) for intruder in intruders]
         made += _guidance_of(kind_name, configuration, own.rows(rows), part)
     return made
-
-
-def _one(state: State) -> State:
-    return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
 def _guidance_of(

@@ -38,13 +38,7 @@ class ConfParameters(Parameters):
         return value
 
     def read(self) -> tuple[Configuration, Alerter]:
-        """Return the configuration and the alerter.
-
-        Raises
-        ------
-        ValueError
-            The file has fewer alerters.
-        """
+        """Return the configuration and the alerter."""
         configuration = read_conf(self.conf)
         count = len(configuration.alerters)
         if self.alerter > count:

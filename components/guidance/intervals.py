@@ -43,18 +43,7 @@ def same_place(one: float, other: float) -> bool:
 def clear_intervals(
     values: FloatArray, clear: BoolArray, least: float, most: float, cyclic: bool
 ) -> list[Interval]:
-    """Return the intervals of values that are clear, within the limits.
-
-    Parameters
-    ----------
-    values : (n,)
-        Ascending.
-    clear : (n,) of bool
-        A clear value without a clear neighbour makes no interval.
-    least, most : float
-    cyclic : bool
-        Whether values are directions, of which 0 and a full turn are one place.
-    """
+    """Return the intervals of values that are clear, within the limits."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], clear.astype(int), [0]])))
     found = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
@@ -89,15 +78,7 @@ class Band(NamedTuple):
 def painted(
     layers: list[tuple[str, list[Interval], bool]], least: float, most: float
 ) -> list[Band]:
-    """Return the bands from the lowest to the highest value.
-
-    Parameters
-    ----------
-    layers : list of (region, intervals, outside)
-        From the bottom up: what lies within the intervals is painted, or where `outside`, what
-        does not. The ground is NONE.
-    least, most : float
-    """
+    """Return the bands from the lowest to the highest value."""
     places = [least, most]
     for _, intervals, _ in layers:
         for interval in intervals:

@@ -16,38 +16,18 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
 class Steps(NamedTuple):
-    """Manoeuvres of n ownships from the leftmost or lowest to the rightmost or highest.
+    """Manoeuvres of n ownships from the leftmost or lowest to the rightmost or highest."""
 
-    Parameters
-    ----------
-    number : (k,) of int
-        Signed number of steps from the own value, ascending; 0 is no manoeuvre.
-    there : (n, k) of bool
-        Whether an ownship has that manoeuvre within its limits.
-    time_s : (n, k) or (1, k)
-        When each manoeuvre ends.
-    step_time_s : (n, 1) or (1, 1)
-        Of one step; 0 for those that take no time.
-    flight : State of (n, k) or (n, 1)
-        The flight after it, run back to time 0.
-    """
-
+    # (k,) of int: signed number of steps from the own value, ascending; 0 is no manoeuvre
     number: IntArray
-    there: BoolArray
-    time_s: FloatArray
-    step_time_s: FloatArray
-    flight: State
+    there: BoolArray  # (n, k) of bool: whether an ownship has that manoeuvre within its limits
+    time_s: FloatArray  # (n, k) or (1, k): When each manoeuvre ends
+    step_time_s: FloatArray  # (n, 1) or (1, 1): Of one step; 0 for those that take no time
+    flight: State  # State of (n, k) or (n, 1): The flight after it, run back to time 0
 
 
 def direction_steps(own: State, values: Any) -> Steps:
-    """Return turns by multiples of a step to the left and right.
-
-    Parameters
-    ----------
-    own : State of (n,)
-    values : mapping
-        Values of a configuration, by key.
-    """
+    """Return turns by multiples of a step to the left and right."""
     own = own.columns()
     step = values["step_hdir"]
     # A flight slower than a step is turned as if it flew that fast.
@@ -106,15 +86,7 @@ def climb_steps(own: State, values: Any) -> Steps:
 
 
 def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the least and most values of a kind, also relative to the own value where set.
-
-    Parameters
-    ----------
-    name : {"hs", "vs", "alt"}
-    own_value : (n,)
-    values : mapping
-        Values of a configuration, by key.
-    """
+    """Return the least and most values of a kind, also relative to the own value where set."""
     below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
     least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
     most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
@@ -206,19 +178,7 @@ class StepConflicts:
         )
 
     def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which steps meet it after the manoeuvre.
-
-        Parameters
-        ----------
-        from_s : float or (n, 1)
-            From when on it counts.
-        horizon_s : float or (n, 1)
-            How long after the manoeuvre.
-
-        Returns
-        -------
-        (n, k) of bool
-        """
+        """Tell which steps meet it after the manoeuvre."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
         met = meets(self._span, begin_s, np.minimum(self._lookahead_s, horizon_s + self._after_s))
@@ -286,29 +246,15 @@ class Conflicts(Protocol):
 
 
 class ManoeuvreKind(Protocol):
-    """Manoeuvres of one kind, of n ownships, by the k values that they lead to.
+    """Manoeuvres of one kind, of n ownships, by the k values that they lead to."""
 
-    Attributes
-    ----------
-    values : (n, k)
-        Ascending; directions may lie outside of [0, 2 pi).
-    there : (n, k) of bool
-        Whether an ownship has that value.
-    own_value : (n,)
-    least, most : (n,)
-    cyclic : bool
-        Whether values a full turn apart are the same.
-    instantaneous : bool
-        Whether a manoeuvre takes no time.
-    """
-
-    values: AnyArray
-    there: BoolArray
-    own_value: FloatArray
+    values: AnyArray  # (n, k): ascending; directions may lie outside of [0, 2 pi)
+    there: BoolArray  # (n, k) of bool: whether an ownship has that value
+    own_value: FloatArray  # (n,)
     least: FloatArray
     most: FloatArray
-    cyclic: bool
-    instantaneous: bool
+    cyclic: bool  # Whether values a full turn apart are the same
+    instantaneous: bool  # Whether a manoeuvre takes no time
 
     def against(self, intruder: State, detector: Detector) -> Conflicts:
         """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
@@ -356,17 +302,7 @@ class _AltitudeKind:
 
 
 def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
-    """Return the manoeuvres of one kind.
-
-    Parameters
-    ----------
-    name : {"hdir", "hs", "vs", "alt"}
-        Direction over ground, ground speed, vertical speed, altitude.
-    own : State of (n,)
-        Of the ownships, each at the origin of its plane.
-    values : mapping
-        Values of a configuration, by key.
-    """
+    """Return the manoeuvres of one kind."""
     if name == "alt":
         return _AltitudeKind(own, values)
     if name == "hdir":

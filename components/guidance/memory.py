@@ -44,22 +44,7 @@ class BandMemory:
     def step(
         self, now_s: float, line: list[Band], own_value: float, recovery: Recovery | None
     ) -> list[Band]:
-        """Take in the bands of one instant, and return them as remembered.
-
-        Parameters
-        ----------
-        now_s : float
-        line : list of Band
-            As painted, before NONE is called RECOVERY.
-        own_value : float
-        recovery : Recovery or None
-            Of that instant.
-
-        Returns
-        -------
-        list of Band
-            From the lowest to the highest value.
-        """
+        """Take in the bands of one instant, and return them as remembered."""
         since_s = None if self._last_s is None else now_s - self._last_s
         if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
             self._clear()
@@ -242,18 +227,7 @@ class ResolutionMemory:
         own_value: float,
         recovery: Recovery | None,
     ) -> Resolution | None:
-        """Take in the resolution of one instant, and return the one that is shown.
-
-        Parameters
-        ----------
-        now_s : float
-        found : Resolution or None
-            Of the bands of that instant.
-        bands : list of Band
-            The bands as remembered.
-        own_value : float
-        recovery : Recovery or None
-        """
+        """Take in the resolution of one instant, and return the one that is shown."""
         since_s = None if self._last_s is None else now_s - self._last_s
         if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
             self._clear()
@@ -346,13 +320,7 @@ class ResolutionMemory:
 
 
 class Remembered(NamedTuple):
-    """The bands of one kind at one instant, and the way out of them.
-
-    Parameters
-    ----------
-    bands : list of Band
-    resolution : Resolution or None
-    """
+    """The bands of one kind at one instant, and the way out of them."""
 
     bands: list[Band]
     resolution: Resolution | None

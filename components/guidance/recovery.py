@@ -18,36 +18,19 @@ _SEARCHED_S = 0.5
 
 
 class Recovery(NamedTuple):
-    """How a violation that cannot be avoided is left.
+    """How a violation that cannot be avoided is left."""
 
-    Parameters
-    ----------
-    time_s : float
-        From when on the volume is clear; minus infinity where nothing avoids a collision.
-    cylinder_m : (float, float)
-        Radius and half height that stay clear until then.
-    shrinks : int
-        How often the cylinder was made smaller.
-    """
-
+    # From when on the volume is clear; minus infinity where nothing avoids a collision
     time_s: float
+    # (float, float): radius and half height that stay clear until then
     cylinder_m: tuple[float, float]
-    shrinks: int
+    shrinks: int  # How often the cylinder was made smaller
 
 
 def recover(
     kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruders]
 ) -> list[tuple[Recovery, list[Interval]]]:
-    """Return the earliest recovery of each of r ownships, and the values that lead to it.
-
-    Parameters
-    ----------
-    kind_name : str
-        As in `components.guidance.kinds.kind_of`.
-    configuration : Configuration
-    own : State of (r,)
-    intruders : list of GuidedIntruders
-    """
+    """Return the earliest recovery of each of r ownships, and the values that lead to it."""
     return _Search(kind_name, configuration, own, intruders).run()
 
 
@@ -58,12 +41,6 @@ def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> S
     """Return radius and half height that recovery keeps clear, before they are made smaller.
 
     Where the configuration has 0, those of the resolution advisories of TCAS II count.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    altitude_m : (n,)
-        Of the ownships.
     """
     keys = "min_horizontal_recovery", "min_vertical_recovery"
     given = (configuration[key] for key in keys)

@@ -19,26 +19,15 @@ _Key = tuple[int, Volume | TcasAdvisory, bool]
 
 
 class GuidedIntruders(NamedTuple):
-    """One intruder of each of n ownships.
+    """One intruder of each of n ownships."""
 
-    Parameters
-    ----------
-    state : State of (n,)
-        In the plane of its ownship.
-    alerter : Alerter
-        Of all of them.
-    early_level : (n,) of int
-        The level whose early alerting time counts; 0 for none.
-    present : (n,) of bool, optional
-        Where there is such an intruder; by default everywhere.
-    bounds : Bounds of (n,), optional
-        How far the relative states may be wrong, for levels that heed it.
-    """
-
-    state: State
-    alerter: Alerter
-    early_level: IntArray
+    state: State  # (n,): in the plane of its ownship
+    alerter: Alerter  # Of all of them
+    early_level: IntArray  # (n,) of int: the level whose early alerting time counts; 0 for none
+    # (n,) of bool, optional: where there is such an intruder; by default everywhere
     present: BoolArray | None = None
+    # (n,), optional: how far the relative states may be wrong, for levels that heed
+    # it
     bounds: Bounds | None = None
 
     def rows(self, which: AnyArray) -> "GuidedIntruders":
@@ -60,23 +49,12 @@ class GuidedIntruders(NamedTuple):
 
 
 class Concerned(NamedTuple):
-    """An intruder whose volume of a region counts, of some ownships.
+    """An intruder whose volume of a region counts, of some ownships."""
 
-    Parameters
-    ----------
-    place : int
-        Which of the intruders.
-    level : Level
-        Whose volume.
-    of_whom : (n,) of bool
-    horizon_s : (n, 1)
-        How long after a manoeuvre.
-    """
-
-    place: int
-    level: Level
-    of_whom: BoolArray
-    horizon_s: FloatArray
+    place: int  # Which of the intruders
+    level: Level  # Whose volume
+    of_whom: BoolArray  # (n,) of bool
+    horizon_s: FloatArray  # (n, 1): how long after a manoeuvre
 
 
 class Regions:

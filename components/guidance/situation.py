@@ -13,16 +13,9 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 
 
 class State(NamedTuple):
-    """Where aircraft are at time 0 and how fast, arrays that broadcast against each other.
+    """Where aircraft are at time 0 and how fast, arrays that broadcast against each other."""
 
-    Parameters
-    ----------
-    east_m, north_m, up_m : ndarray
-        In the ownship's plane; up is altitude.
-    east_mps, north_mps, climb_mps : ndarray
-    """
-
-    east_m: FloatArray
+    east_m: FloatArray  # In the ownship's plane; up is altitude
     north_m: FloatArray
     up_m: FloatArray
     east_mps: FloatArray
@@ -70,13 +63,6 @@ class Detector:
 
 
 def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
-    """Tell whether a volume is met in part of the time that was looked at; never in none.
-
-    Parameters
-    ----------
-    span : Span
-        When it is met, over a longer time: it is one interval, so that cutting it is enough.
-    begin_s, end_s : float or ndarray
-    """
+    """Tell whether a volume is met in part of the time that was looked at; never in none."""
     found = surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
     return np.asarray(found & (np.asarray(begin_s) < end_s))

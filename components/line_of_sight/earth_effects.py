@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from components.arguments.checks import FloatArray
 from components.environment.tables import Terrain
-from components.geometry.line_of_sight import SeenFromOwnship
-from components.geometry.sensor_angles import sensor_angles
-from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
-from components.terrain.rays import bent_elevation_rad
-from dsa_des.arrays.types import BoolArray
+from components.geometry import SeenFromOwnship, sensor_angles
+from components.terrain.rays import (
+    behind_terrain,
+    behind_the_limb,
+    bent_elevation_rad,
+    miss_bound_m,
+)
+from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
 _PLACE = ("lat_deg", "lon_deg", "alt_m")

@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.attitude import unit_vector
-from components.geometry.directions import angle_of_chord, chord_between
-from components.geometry.enu import enu_to_geodetic
-from components.geometry.line_of_sight import EARTH_MODELS, LineOfSight
-from components.geometry.wrapping import wrap_by_sines
+from components.geometry import (
+    EARTH_MODELS,
+    LineOfSight,
+    angle_of_chord,
+    chord_between,
+    enu_to_geodetic,
+    unit_vector,
+    wrap_by_sines,
+)
 from dsa_des.arrays.types import FloatArray
 
 ALTITUDE_M = 1000.0
@@ -25,21 +29,12 @@ _COLOURS = "viridis"
 
 @dataclass(frozen=True, eq=False)
 class ErrorMap:
-    """Errors of one model, the worst of all bearings, shape (latitudes, ranges).
-
-    Parameters
-    ----------
-    model : str
-    lat_deg, range_m : one axis each
-        Of the ownship, and the true slant range.
-    direction_rad, azimuth_rad, elevation_rad : ndarray
-        Angle between the model's line of sight and the true one, and its parts in NED.
-    range_error_m : ndarray
-    """
+    """Errors of one model, the worst of all bearings, shape (latitudes, ranges)."""
 
     model: str
-    lat_deg: FloatArray
+    lat_deg: FloatArray  # Of the ownship, and the true slant range
     range_m: FloatArray
+    # Angle between the model's line of sight and the true one, and its parts in NED
     direction_rad: FloatArray
     azimuth_rad: FloatArray
     elevation_rad: FloatArray
@@ -65,21 +60,7 @@ class ErrorMap:
 def error_maps(
     lat_deg: FloatArray | None = None, range_m: FloatArray | None = None
 ) -> list[ErrorMap]:
-    """Compute the errors of every model of the Earth over latitude and range.
-
-    Parameters
-    ----------
-    lat_deg, range_m : ndarray, optional
-        Latitudes of the ownship and slant ranges; by default from the equator to 6 m from the
-        pole, and from 100 m to 200 km. Both aircraft are 1 km high, the errors against the exact
-        line of sight on WGS-84.
-
-    Returns
-    -------
-    list of ErrorMap
-        One per model, crude to exact. The exact form is set against the offset its target was
-        placed at, which shows the rounding of both.
-    """
+    """Compute the errors of every model of the Earth over latitude and range."""
     if lat_deg is None:
         lat_deg = np.append(np.arange(0.0, 90.0, 2.0), [89.0, 89.9, 89.99995])
     if range_m is None:
@@ -119,18 +100,7 @@ def error_maps(
 
 
 def draw_error_map(folder: Path) -> list[Path]:
-    """Draw the error in angle and in range of every model over range and latitude.
-
-    Parameters
-    ----------
-    folder : Path
-        Receives ``error_map_angle.png`` and ``error_map_range.png``.
-
-    Returns
-    -------
-    list of Path
-        The two pictures.
-    """
+    """Draw the error in angle and in range of every model over range and latitude."""
     maps = error_maps()
     exact = maps[-1]
     off_rad, off_m = exact.direction_rad.max(), exact.range_error_m.max()

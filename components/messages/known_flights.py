@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Gives the states of the ownship and of some targets (columns of the roster) at times

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.field_of_view import FieldOfView
+from components.geometry import FieldOfView
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 ReasonArray = npt.NDArray[np.uint8]

@@ -12,8 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision

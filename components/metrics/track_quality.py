@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.geometry.attitude import unit_vector_unchecked
-from components.geometry.directions import angle_of_chord, chord_between
+from components.geometry import angle_of_chord, chord_between, unit_vector_unchecked
 from components.metrics.rows import (
     FUSED,
     TargetMetric,

@@ -6,8 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.attitude import body_angles_unchecked, ned_to_body_unchecked
-from components.geometry.ellipsoid import line_of_sight_ned, north_east_up
+from components.geometry import (
+    body_angles_unchecked,
+    line_of_sight_ned,
+    ned_to_body_unchecked,
+    north_east_up,
+)
 from components.messages.detections import SensorOffer
 from components.messages.reach import EVALUATE, Reach
 from components.metrics.separation import position_of, traffic_of

@@ -18,7 +18,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
-#: What the ownship may be told at once, and below what there is nothing to fly.
+#: Largest commands, and those below which there is nothing to fly.
 MOST_TURN_RAD, MOST_CLIMB_M = math.pi, 3000.0
 _LEAST_TURN_RAD, _LEAST_CLIMB_M = 1e-4, 0.01
 
@@ -118,13 +118,13 @@ class Console(Component):
             np.array([d.wall_time_s for _, d, _ in made]),
             self._targets,
         )
-        told = [(tick, self._told(d)) for tick, d, _ in made if _is_flown(d)]
-        if not told:
+        flown = [(tick, self._manoeuvre(d)) for tick, d, _ in made if _is_flown(d)]
+        if not flown:
             return {"decisions": decisions}
-        manoeuvres = Manoeuvres.of([tick for tick, _ in told], [one for _, one in told])
+        manoeuvres = Manoeuvres.of([tick for tick, _ in flown], [one for _, one in flown])
         return {"decisions": decisions, "manoeuvres": manoeuvres}
 
-    def _told(self, decision: OperatorDecision) -> Manoeuvre:
+    def _manoeuvre(self, decision: OperatorDecision) -> Manoeuvre:
         if decision.kind == TURN:
             rate_rad_s = math.radians(self.p.turn_rate_deg_s)
             return Manoeuvre(turn_rad=decision.turn_rad, rate_rad_s=rate_rad_s)
@@ -142,45 +142,39 @@ MOST_WAITING = 32
 
 
 @dataclass(frozen=True)
-class Laid:
-    """A decision on the desk, and who is told when it was taken in.
-
-    Parameters
-    ----------
-    decision : OperatorDecision
-    taken : callable
-        Called with the simulated time, s, from the thread of the simulation.
-    """
+class PendingDecision:
+    """A decision that waits on the desk, and what is called when it is taken in."""
 
     decision: OperatorDecision
+    # Called with the simulated time, s, from the thread of the simulation
     taken: Callable[[float], None]
 
 
 class Desk:
-    """Decisions in the order in which they came; one thread lays them down, another takes them."""
+    """Decisions in the order in which they came; one thread puts them there, another takes them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: list[Laid] = []
+        self._waiting: list[PendingDecision] = []
         self._open = True
 
-    def lay(self, laid: Laid) -> bool:
-        """Lay down a decision; False if the run is over or too many wait."""
+    def put(self, pending: PendingDecision) -> bool:
+        """Put a decision on the desk; False if the run is over or too many wait."""
         with self._lock:
             if not self._open or len(self._waiting) >= MOST_WAITING:
                 return False
-            self._waiting.append(laid)
+            self._waiting.append(pending)
             return True
 
     def take(self, time_s: float, tick: int) -> list[tuple[int, OperatorDecision]]:
-        """Take all that waits, at an instant of the simulation, and tell those who laid it."""
+        """Take all that waits, at an instant of the simulation, and acknowledge each."""
         with self._lock:
             found, self._waiting = self._waiting, []
-        for laid in found:
-            laid.taken(time_s)
-        return [(tick, laid.decision) for laid in found]
+        for pending in found:
+            pending.taken(time_s)
+        return [(tick, pending.decision) for pending in found]
 
-    def close(self) -> list[Laid]:
+    def close(self) -> list[PendingDecision]:
         """Take nothing more; return what was never taken in, and so never acknowledged."""
         with self._lock:
             self._open = False

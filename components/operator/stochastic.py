@@ -32,21 +32,12 @@ _DEGREE = math.pi / 180.0
 
 
 class Excess(NamedTuple):
-    """How far beyond the least change a pilot steers: a gamma distribution, shifted.
-
-    Parameters
-    ----------
-    shape : float
-    scale, less : float
-        What is drawn is multiplied by the one, and lessened by the other.
-    fixed : float
-        Of the deterministic pilot.
-    """
+    """How far beyond the least change a pilot steers: a gamma distribution, shifted."""
 
     shape: float
-    scale: float
+    scale: float  # What is drawn is multiplied by the one, and lessened by the other
     less: float
-    fixed: float
+    fixed: float  # Of the deterministic pilot
 
 
 TURN = Excess(6.21, 9.67 * _DEGREE, 30.0 * _DEGREE, 30.0 * _DEGREE)
@@ -71,15 +62,7 @@ def gamma(uniform: float, shape: float, scale: float) -> float:
 
 
 def pause_s(level: int, uniform: float) -> float:
-    """Return how long a pilot waits before deciding again.
-
-    Parameters
-    ----------
-    level : int
-        Of the alert; from 3 on all are warnings.
-    uniform : float
-        A draw in [0, 1).
-    """
+    """Return how long a pilot waits before deciding again."""
     least, mean = _PAUSES[min(max(level, 0), len(_PAUSES) - 1)]
     return least + exponential(uniform, mean)
 
@@ -91,12 +74,7 @@ def mean_pause_s(level: int) -> float:
 
 
 class Draws(NamedTuple):
-    """What is drawn for one steering decision, each in [0, 1).
-
-    Parameters
-    ----------
-    follows, side, size : float
-    """
+    """What is drawn for one steering decision, each in [0, 1)."""
 
     follows: float
     side: float
@@ -104,23 +82,7 @@ class Draws(NamedTuple):
 
 
 def steering(changes: tuple[float, float], turns: bool, draws: Draws | None) -> float:
-    """Return the change that a pilot makes, of the sign of its side.
-
-    Parameters
-    ----------
-    changes : (float, float)
-        Least changes that lead out: to the left or down, not positive, and to the right or up; rad
-        or m, infinite where nothing leads out.
-    turns : bool
-        Whether they are turns, and not changes of altitude.
-    draws : Draws or None
-        None for the deterministic pilot, who always makes the smaller change.
-
-    Returns
-    -------
-    float
-        0 if there is no way out, or if what is drawn would be a change to the wrong side.
-    """
+    """Return the change that a pilot makes, of the sign of its side."""
     low, high = changes
     if math.isinf(low) and math.isinf(high):
         return 0.0
@@ -145,15 +107,7 @@ def steering(changes: tuple[float, float], turns: bool, draws: Draws | None) -> 
 def response_s(
     uniforms: FloatArray | None, initial_s: float, coordination_s: float, execution_s: float
 ) -> float:
-    """Return how long a pilot takes from the decision to act until the manoeuvre begins.
-
-    Parameters
-    ----------
-    uniforms : (3,) or None
-        Draws in [0, 1); None for the deterministic pilot, who takes the means.
-    initial_s, coordination_s, execution_s : float
-        Mean times to react, to coordinate with air traffic control, and to execute; 0 for none.
-    """
+    """Return how long a pilot takes from the decision to act until the manoeuvre begins."""
     if uniforms is None:
         return initial_s + coordination_s + execution_s
     first, second, third = np.asarray(uniforms, dtype=np.float64).tolist()
@@ -204,29 +158,14 @@ class StochasticParameters(ConfParameters):
 
 
 class Mind(NamedTuple):
-    """What an operator has in mind, in one replica.
-
-    Parameters
-    ----------
-    replica : int
-    decisions : int
-        How many there were.
-    since : int or None
-        Tick from which on there was an alert.
-    acts_at : float or None
-        Tick from which on the latest decision is acted on.
-    free_from : float
-        Tick from which on there may be a next decision.
-    has_acted : bool
-        Whether this alert was acted on already.
-    """
+    """What an operator has in mind, in one replica."""
 
     replica: int
-    decisions: int = 0
-    since: int | None = None
-    acts_at: float | None = None
-    free_from: float = 0.0
-    has_acted: bool = False
+    decisions: int = 0  # How many there were
+    since: int | None = None  # Tick from which on there was an alert
+    acts_at: float | None = None  # Tick from which on the latest decision is acted on
+    free_from: float = 0.0  # Tick from which on there may be a next decision
+    has_acted: bool = False  # Whether this alert was acted on already
 
 
 class Stochastic(Component):
@@ -273,8 +212,8 @@ class Stochastic(Component):
             self._minds[run] = mind
             if acts:
                 acting.append((place, mind))
-        told = self._told_at(alerts, acting)
-        return Manoeuvres.at_rows(wake.ticks, told)
+        manoeuvres = self._manoeuvres_at(alerts, acting)
+        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
 
     def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
         """Take in the highest level of an instant; return also whether the operator acts at it."""
@@ -310,7 +249,7 @@ class Stochastic(Component):
             draws = np.array([self._draw(mind, self._response, k) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
-    def _told_at(
+    def _manoeuvres_at(
         self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
     ) -> dict[int, Manoeuvre]:
         """Return what operators who act at some rows of the alerts steer, by row."""

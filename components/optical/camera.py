@@ -11,24 +11,23 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.geometry.field_of_view import sector_width_rad
+from components.geometry import sector_width_rad
 from components.optical.area_of_cells import check_silhouette, fitted_otherwise
-from components.optical.centroid_accuracy import centroid_variance
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
     FAINTEST_PD,
+    FrameFalseAlarms,
     detection_probability,
     noise_equivalent_pixels,
 )
 from components.optical.detector import (
     CameraCalibration,
     CameraDetector,
+    centroid_variance,
     farthest_detection_m,
     settled,
 )
-from components.optical.dynamic_signature import DynamicSignature
-from components.optical.frame_false_alarms import FrameFalseAlarms
-from components.optical.signature import pixels_of_cells
+from components.optical.signature import DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import Visibility
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, Look

@@ -1,7 +1,9 @@
-"""The contrast of a target with its background, and the part of it that reaches the camera."""
+"""Contrast of a target with its background, and the part of it that reaches the camera."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,8 +11,12 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
 from components.atmosphere.visibility import KOSCHMIEDER
-from components.geometry.directions import angle_between
+from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
+from components.sensor.look import Cells
+from components.terrain.rays import dip_rad
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 def contrast_gain(
@@ -39,38 +45,6 @@ def contrast_gain(
     Either is multiplied by Koschmieder's exp(-3.912 range / visibility) if a visibility is given.
     P is not limited to 1: a sunlit aircraft may be several times brighter than the forest behind
     it.
-
-    Parameters
-    ----------
-    model : {"constant", "daylight"}
-    contrast : array_like
-        P of the thesis; under ``daylight`` a calibration factor.
-    azimuth_rad, elevation_rad : array_like, rad
-        Line of sight from us to the target, in the horizon's frame (north-east-down).
-    range_m : array_like, m
-        Slant range, for the visibility.
-    visibility_m : array_like, m, optional
-        Meteorological visibility (2 % contrast). None: the air is perfectly clear.
-    sun_azimuth_rad, sun_elevation_rad : array_like, rad
-        Direction of the sun, same frame; the sun must be up.
-    sun_exclusion_rad : array_like, rad
-        Half angle of the cone round the sun in which the camera sees nothing; 0 for none.
-    paint_reflectance, ground_reflectance : array_like
-        Diffuse reflectances, paint in [0, 1], ground in (0, 1]. The defaults 0.5 (grey) and 0.2
-        (grass, forest) are assumptions.
-    sky : {"clear", "partly_cloudy", "overcast"}
-    background : {"sky", "ground", "auto"}
-        What lies behind the target; ``auto`` is sky from elevation 0 up, ground below.
-
-    Returns
-    -------
-    array of the broadcast shape
-        P, 0 or more.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite, or a name is unknown.
     """
     if model not in ("constant", "daylight"):
         raise ValueError(f"model is {model!r}: it must be 'constant' or 'daylight'")
@@ -111,22 +85,6 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
 
     exp(-3.912 range / visibility), Koschmieder's law. Exact for a target against the horizon sky
     in even haze; used for every background here.
-
-    Parameters
-    ----------
-    range_m : array_like, m
-        0 or more.
-    visibility_m : array_like, m
-        Above 0: range at which 2 % of the contrast is left.
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If the range is negative, the visibility not above 0, or either not finite.
     """
     shape, (distance, visibility) = broadcast_flat(
         range_m=not_negative("range_m", range_m),
@@ -136,3 +94,54 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
     gone = distance * (1.0 / 200.0) >= visibility
     depth = np.where(gone, 0.0, distance) / np.where(gone, 1.0, visibility)
     return unflatten(np.where(gone, 0.0, np.exp(-KOSCHMIEDER * depth)), shape)
+
+
+class Background(Effect):
+    """Contrast of the painted target against sky or ground under the scene's sun."""
+
+    lockstep = True
+    name = "background and sun"
+    acts_on = "contrast"
+    neutral = False
+    outside_the_proof = "no sun leaves every target's contrast exactly as it is"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``background``."""
+        background = block.p.background
+        return Verdict(background != "none", f"background is {background!r}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return the factor on every cell's contrast."""
+        p = block.p
+        sun = {
+            "sun_azimuth_rad": math.radians(p.sun_azimuth_deg),
+            "sun_elevation_rad": math.radians(p.sun_elevation_deg),
+            "sun_exclusion_rad": math.radians(p.sun_exclusion_deg),
+        }
+
+        terrain = block.context.sections.get("terrain")
+
+        def gain_against(cells: Cells, background: str) -> FloatArray:
+            gain = contrast_gain(
+                model="daylight",
+                azimuth_rad=cells.azimuth_rad,
+                elevation_rad=cells.elevation_rad,
+                paint_reflectance=cells.of_target(cells.roster.column("paint_reflectance")),
+                ground_reflectance=p.ground_reflectance,
+                sky=p.sky,
+                background=background,
+                **sun,
+            )
+            return np.asarray(gain)
+
+        if p.background != "auto" or terrain is None or not terrain.horizon:
+            return lambda cells: gain_against(cells, p.background)
+        surface_m, refraction = terrain.height_m or 0.0, terrain.refraction
+
+        def factor(cells: Cells) -> FloatArray:
+            # From up here there is sky down to the dip of the horizon.
+            dip = dip_rad(cells.of_row("own_alt_m") - surface_m, refraction)
+            sky, ground = (gain_against(cells, name) for name in ("sky", "ground"))
+            return np.where(cells.elevation_rad >= -dip, sky, ground)
+
+        return factor

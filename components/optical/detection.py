@@ -23,6 +23,11 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
+from components.geometry import sector_width_rad
+from components.messages.detections import Detections
+from components.messages.false_detections import add_false_detections, in_measured_order
+from components.radar.detection.output import false_alarm_count
+from dsa_des.block.effect import Effect, Verdict
 
 _NORMAL = NormalDist()
 _PIXEL_VARIANCE = 1.0 / 12.0
@@ -35,25 +40,6 @@ FAINTEST_DEVIATIONS = -_NORMAL.inv_cdf(FAINTEST_PD)
 def noise_equivalent_pixels(blur_pixels: float) -> float:
     """Return over how many pixels the picture of a point is spread, to a filter that fits it.
 
-    Parameters
-    ----------
-    blur_pixels : float
-        Standard deviation of the blur, above 0.
-
-    Returns
-    -------
-    float
-        4 pi s², with s² the variance of the picture: that of the blur and of a pixel, 1/12. The
-        noise of the signal that a matched filter finds is that of a pixel times its root, and a
-        picture has one independent place for each such area.
-
-    Raises
-    ------
-    ValueError
-        If the blur is not above 0.
-
-    Notes
-    -----
     The inverse of the sum of the squared shares of its pixels, for a Gaussian spot; King, Accuracy
     of measurement of star images on a pixel array, Publications of the Astronomical Society of the
     Pacific 95, 1983.
@@ -63,28 +49,7 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
 
 
 def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: ArrayLike) -> Any:
-    """Return the probability that a sample of a signature with noise reaches the threshold.
-
-    Parameters
-    ----------
-    signature : array_like
-        Without noise.
-    threshold : array_like
-    noise : array_like
-        Standard deviation of the noise, 0 or more, in the unit of both.
-
-    Returns
-    -------
-    array of the broadcast shape
-        Q((threshold - signature) / noise), with its full relative precision in the tail, and 0
-        where that is below `FAINTEST_PD`. Without noise 1 where the signature reaches the
-        threshold, else 0 (eq. 19).
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, or the noise is negative.
-    """
+    """Return the probability that a sample of a signature with noise reaches the threshold."""
     from scipy.special import ndtr
 
     shape, (level, needed, deviation) = broadcast_flat(
@@ -99,13 +64,7 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
 
 
 def deviations_exceeded(probability: float) -> float:
-    """Return how many standard deviations Gaussian noise exceeds with some probability.
-
-    Parameters
-    ----------
-    probability : float
-        In (0, 1).
-    """
+    """Return how many standard deviations Gaussian noise exceeds with some probability."""
     return -_NORMAL.inv_cdf(probability)
 
 
@@ -125,26 +84,6 @@ def false_alarm_direction(
 ) -> tuple[Any, Any]:
     """Return where in the picture false alarms appear: every pixel is as likely.
 
-    Parameters
-    ----------
-    azimuth_uniform, elevation_uniform : array_like
-        In [0, 1), one of each per false alarm.
-    azimuth_start_rad, azimuth_width_rad : float, rad
-        The field of view runs clockwise from the start over the width, (0, 2π].
-    lowest_elevation_rad, highest_elevation_rad : float, rad
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad : arrays of the broadcast shape
-        Not yet rounded to the pixel grid; azimuth not wrapped.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-
-    Notes
-    -----
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """
     width = finite("azimuth_width_rad", azimuth_width_rad)
@@ -166,27 +105,7 @@ def false_alarm_direction(
 
 
 def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float) -> Any:
-    """Return the signature that false alarms have: noise, given that it reaches the threshold.
-
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per false alarm.
-    threshold : float
-        The signature that is detected (eq. 19); noise below 0 is no signature, whatever it is.
-    noise : float
-        Standard deviation of the noise, above 0.
-
-    Returns
-    -------
-    array of the shape of `uniform`
-        In the unit of the threshold, never below it, nor below 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-    """
+    """Return the signature that false alarms have: noise, given that it reaches the threshold."""
     draws = _unit("uniform", uniform)
     level = max(float(finite("threshold", threshold)), 0.0)
     deviation = float(positive("noise", noise))
@@ -200,3 +119,111 @@ def _unit(name: str, value: ArrayLike) -> Any:
     array = finite(name, value)
     refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "be in [0, 1)")
     return array
+
+
+MOST_PER_FRAME = 1e5
+# Draw 0 of a frame says how many; of each, by its number, where, how strong and which contrast.
+_HOW_MANY, _AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST = range(5)
+# Draws that belong to the frame and to no target.
+_NO_TARGET = np.uint64(0)
+
+
+class FrameFalseAlarms(Effect):
+    """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
+
+    lockstep = True
+    name = "false alarms"
+    acts_on = "report"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms`` and ``false_alarms_per_frame``."""
+        p = block.p
+        if not p.enabled:
+            return Verdict(False, "enabled is false")
+        if p.false_alarms is not None:
+            return Verdict.of_flag(p, "false_alarms")
+        if p.false_alarms_per_frame is None:
+            return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")
+        rate = p.false_alarms_per_frame
+        return Verdict(rate > 0, f"false_alarms_per_frame is {rate:g}")
+
+    def build(self, block: Any) -> AddedFalseAlarms:
+        """Return what adds the false alarms to the report."""
+        return AddedFalseAlarms(block)
+
+
+class AddedFalseAlarms:
+    """Draws the false alarms of a camera, keyed by its scans.
+
+    A false alarm is reported as a target would be: on the pixel grid, with the confidence of noise
+    that reaches the threshold (`false_alarm_signature`), and with the pixels that follow from its
+    signature as a target's do; where targets are seen without noise, it has the contrast of one of
+    them. Detections of a frame stand by what was measured of them. With ``marked_false_alarms`` a
+    false alarm comes last, with a confidence of 0 and no pixels.
+    """
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        self._reports = block.p.reports_noise and block.p.enabled
+        rate = block.detector.false_alarms
+        if self._reports and rate > MOST_PER_FRAME:
+            found = block.detector
+            raise ValueError(
+                f"{rate:,.0f} false alarms per frame: the threshold, {found.threshold:.4g}, is "
+                f"{found.threshold / found.noise:.3g} standard deviations of noise, and at most "
+                f"{MOST_PER_FRAME:,.0f} are allowed; give a higher threshold, a smaller "
+                "noise_equivalent_contrast, or false_alarms = false"
+            )
+        self._draws = block.stream("false alarms")
+
+    def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
+        """Return the report with its false alarms."""
+        if not self._reports:  # built all the same, it changes nothing
+            return detections
+        marked = self._block.p.marked_false_alarms
+        joined = self._with_alarms(detections, marked)
+        return joined if marked else in_measured_order(joined)
+
+    def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
+        block, reach = self._block, self._block.reach
+        found = block.detector
+        count = false_alarm_count(
+            self._draws.uniform(_NO_TARGET, detections.scan, _HOW_MANY),
+            cells=found.places,
+            false_alarm_probability=found.false_alarms / found.places,
+        )
+        row = np.repeat(np.arange(len(count)), count)
+        if len(row) == 0:
+            return detections
+        first = np.repeat(np.cumsum(count) - count, count)
+        number = (np.arange(len(row)) - first).astype(np.uint64)
+        scan = detections.scan[row]
+        azimuth_draw, elevation_draw, strength, contrast = (
+            self._draws.uniform(number, scan, draw)
+            for draw in (_AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST)
+        )
+        across, upward = false_alarm_direction(
+            azimuth_draw,
+            elevation_draw,
+            azimuth_start_rad=reach.azimuth_rad[0],
+            azimuth_width_rad=sector_width_rad(*reach.azimuth_rad),
+            lowest_elevation_rad=reach.elevation_rad[0],
+            highest_elevation_rad=reach.elevation_rad[1],
+        )
+        where = {"azimuth": across, "elevation": upward, "range": np.full(len(row), np.nan)}
+        signature = false_alarm_signature(
+            strength, threshold=found.threshold, noise=found.alarm_noise
+        )
+        contrasts = block.contrasts_of(detections.roster)
+        which = contrast * len(contrasts)
+        signal = block.signal_of(signature, contrasts[which.astype(np.int64)])
+        azimuth, elevation, _, measured = block.report_noise(where, signal)
+        return add_false_detections(
+            detections,
+            row,
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            confidence=0.0 if marked else signature - found.threshold,
+            extras={} if marked else {"pixels": signal["pixels"]},
+            measured=measured,
+        )

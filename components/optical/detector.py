@@ -1,4 +1,4 @@
-"""The detector of a camera: its threshold and noise by what a scene states, and how far it sees."""
+"""A camera's threshold in its picture, and the accuracy of the centres that it finds."""
 
 import math
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
 from components.aircraft.known_targets import known_targets
+from components.arguments.checks import not_negative, positive
 from components.optical.contrast import visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -19,6 +20,34 @@ from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import own_band
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Parameters
+
+_PIXEL_VARIANCE = 1.0 / 12.0
+
+
+def centroid_variance(
+    pixels: FloatArray, contrast_to_noise: FloatArray, blur_pixels: float
+) -> FloatArray:
+    """Return the variance of a target's centre along one axis of the picture.
+
+    sigma² = 8 pi s⁴ / N², where N is the target's whole signal over the noise of a pixel and s²
+    the variance of its picture: that of the blur, of a square of as many pixels, and of a pixel,
+    1/12. Thompson, Larson & Webb, Precise nanometer localization analysis for individual
+    fluorescent probes, Biophysical Journal 82, 2002, eq. 14, its term for background noise. It is
+    the bound of Winick, Cramér-Rao lower bounds on the performance of charge-coupled-device optical
+    position estimators, JOSA A 3, 1986, for a Gaussian spot. It holds where N is well above the
+    noise within the spot, N > 10 s, and the blur is half a pixel or more; a sharper spot falls
+    between pixels, and a target of many pixels with sharp edges is found better than this.
+    """
+    covered = np.asarray(not_negative("pixels", pixels))
+    ratio = np.asarray(not_negative("contrast_to_noise", contrast_to_noise))
+    blur = float(positive("blur_pixels", blur_pixels))
+    spread = blur**2 + _PIXEL_VARIANCE * covered + _PIXEL_VARIANCE
+    most = _PIXEL_VARIANCE * (covered + 1.0)
+    signal2 = (covered * ratio) ** 2
+    least2 = 8.0 * np.pi * spread**2 / most
+    variance: FloatArray = 8.0 * np.pi * spread**2 / np.maximum(signal2, least2)
+    return variance
+
 
 #: Of a frame, where a scene says nothing of noise: that of AFRL's flight tests at the higher
 #: threshold (thesis section 2.4.1: 0.01 %, read as per frame).
@@ -66,46 +95,20 @@ class CameraCalibration(Parameters):
 
 @dataclass(frozen=True)
 class CameraDetector:
-    """What a camera detects with.
+    """What a camera detects with."""
 
-    Parameters
-    ----------
-    threshold : float
-        Sample of a signature that is a detection.
-    noise : float
-        Standard deviation of the samples; 0 for a camera that sees signatures as they are.
-    alarm_noise : float
-        That of the samples that make false alarms; the same, where it is known.
-    places : int
-        Independent samples of noise in a frame.
-    false_alarms : float
-        Expected in a frame.
-    """
-
-    threshold: float
+    threshold: float  # Sample of a signature that is a detection
+    # Standard deviation of the samples; 0 for a camera that sees signatures as they are
     noise: float
-    alarm_noise: float
-    places: int
-    false_alarms: float
+    alarm_noise: float  # That of the samples that make false alarms; the same, where it is known
+    places: int  # Independent samples of noise in a frame
+    false_alarms: float  # Expected in a frame
 
 
 def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
     """Return a camera's detector: what the scene leaves open follows from what it states.
 
     Any two of threshold, noise, false alarms and a known range give the others.
-
-    Parameters
-    ----------
-    camera : Camera
-    places : int
-        Independent samples in a frame.
-    noise_of_contrast : float
-        Noise of a signature, for a pixel whose noise is as much as a contrast of 1.
-
-    Raises
-    ------
-    ValueError
-        If what is stated contradicts itself.
     """
     p = camera.p
     threshold, alarms, known = p.threshold, p.false_alarms_per_frame, p.calibrate
@@ -198,18 +201,7 @@ class _OneLook:
 
 
 def known_signature(camera: Any, known: CameraCalibration) -> float:
-    """Return the signature of the target whose probability of detection is known.
-
-    Parameters
-    ----------
-    camera : Camera
-    known : CameraCalibration
-
-    Raises
-    ------
-    ValueError
-        If there is none, or the visibility is not that of the camera's band.
-    """
+    """Return the signature of the target whose probability of detection is known."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
         area_m2 = known.area_m2 or 0.0
@@ -247,14 +239,6 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     Infinite where that is not so: where noise alone reaches the threshold more often than that,
     with a rate of the line of sight in the signature, with areas from a table, with effects that
     can add to area or contrast, or with targets that the camera was not told of.
-
-    Parameters
-    ----------
-    camera : Camera
-        After its effects were built.
-    areas, contrast : str
-        The roster's columns, ``"eo"`` or ``"ir"``, ``"contrast"`` or ``"contrast_ir"``; empty for
-        a camera that shows other areas.
     """
     rosters = known_targets(camera.context)
     adding = [

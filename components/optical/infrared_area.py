@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.aircraft.known_targets import known_targets
 from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
-from components.optical.silhouette import visible_area
-from components.optical.silhouette_exact import line_of_sight_in_target_axes
+from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 # Assumption: the plume seen from dead astern, as a share of the back area. Table 4.5 only ranks the
 # engines: a propeller's airflow is cold, a turbofan mixes much cold with little hot air, a
@@ -33,26 +37,6 @@ def plume_area(
     from us to it: 0 head-on, where the airframe hides the plume, half abeam, all of it from
     astern. The law and the shares are assumptions (the thesis gives the order of the engines and
     folds the plume into the areas of Tables 3.2 and 4.6).
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
-        As in `components.optical.silhouette.visible_area`.
-    back_m2 : array_like, m²
-        Back sphere.
-    engine : {"propeller", "turbofan", "turbojet"}
-        Selects the share; see `PLUME_SHARE_OF_BACK`.
-    plume_share_of_back : array_like, optional
-        Used instead of the engine's own share.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-
-    Raises
-    ------
-    ValueError
-        If the engine is unknown, or an argument is negative or not finite.
     """
     if engine not in PLUME_SHARE_OF_BACK:
         raise ValueError(
@@ -91,30 +75,6 @@ def infrared_area(
     The silhouette with separate front and back, plus the plume if an engine is named. Without an
     engine this is the thesis's model, whose tables already hold the doubled back (errata 23c):
     naming an engine adds to it, so pair it with a back that is not doubled.
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
-        As in `components.optical.silhouette.visible_area`.
-    front_m2, back_m2, side_m2, horizontal_m2 : array_like, m²
-        Table 3.2 (first) or Table 4.6 (refined), in `configs/aircraft/`.
-    engine : {"propeller", "turbofan", "turbojet"}, optional
-        Adds `plume_area`.
-    plume_share_of_back : array_like, optional
-        Used instead of the engine's own share.
-    model : {"exact", "thesis", "convex_hull"}
-        Rung of the silhouette.
-    validate : bool
-        False skips the silhouette's checks, see `visible_area`.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-
-    Raises
-    ------
-    ValueError
-        As `visible_area` and `plume_area`, or if a share is given without an engine.
     """
     area = visible_area(
         relative_heading_rad,
@@ -141,3 +101,50 @@ def infrared_area(
         engine=engine,
         plume_share_of_back=plume_share_of_back,
     )
+
+
+class Plume(Effect):
+    """Each aircraft's exhaust plume by its engine; those without one are not computed."""
+
+    lockstep = True
+    name = "plume"
+    acts_on = "area"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``plume``, and for a target whose engine has one."""
+        if not block.p.plume:
+            return Verdict(False, "plume is false")
+        rosters = known_targets(block.context)
+        if not rosters:
+            return Verdict(True, "plume is true and the targets are not known before the run")
+        for roster in rosters:
+            for name, engine in zip(roster.names, roster.engines.tolist(), strict=True):
+                if PLUME_SHARE_OF_BACK[engine] > 0.0:
+                    return Verdict(True, f"plume is true and {name!r} has a {engine}")
+        return Verdict(False, "plume is true, but no target's engine has one")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return what is added to every cell's area."""
+        scale = 1.0 if block.p.plume else 0.0
+        shares = {engine: scale * share for engine, share in PLUME_SHARE_OF_BACK.items()}
+
+        def added(cells: Cells) -> FloatArray:
+            engines = cells.of_target(cells.roster.engines)
+            back = cells.of_target(cells.roster.column("ir.back_m2"))
+            area = np.zeros(len(cells))
+            for engine in np.unique(engines).tolist():
+                if PLUME_SHARE_OF_BACK[engine] == 0.0:
+                    continue
+                chosen = np.flatnonzero(engines == engine)
+                area[chosen] = plume_area(
+                    cells.relative_heading_rad[chosen],
+                    cells.target_pitch_rad[chosen],
+                    cells.target_roll_rad[chosen],
+                    cells.elevation_rad[chosen],
+                    back_m2=back[chosen],
+                    engine=engine,
+                    plume_share_of_back=shares[engine],
+                )
+            return area
+
+        return added

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from components.aircraft.aspect_tables import SilhouetteTable
-from components.arguments.checks import FloatArray, finite
+from components.arguments.checks import finite
+from dsa_des.arrays.types import FloatArray
 from dsa_des.files.input_files import InputFileError, status_of
 from dsa_des.text.safe_text import shortened
 
@@ -157,30 +158,7 @@ def load_mesh(
     axes: str = "frd",
     rows: int = DEFAULT_ROWS,
 ) -> TriangleMesh:
-    """Read a closed mesh from STL, OBJ or another format that the trimesh library reads.
-
-    Parameters
-    ----------
-    path : path of the file
-    unit_m : float
-        Length of one unit of the file in metres (0.001 for a file in millimetres).
-    axes : str
-        Where the file's x, y and z point, one letter each: f(orward), b(ack), r(ight), l(eft),
-        u(p), d(own). "frd" is the body frame used here; "flu" is common in robotics.
-    rows : int
-        See `TriangleMesh`.
-
-    Returns
-    -------
-    TriangleMesh
-
-    Raises
-    ------
-    ImportError
-        If trimesh is not installed.
-    ValueError
-        If the mesh is not closed, or `axes` or `unit_m` make no sense.
-    """
+    """Read a closed mesh from STL, OBJ or another format that the trimesh library reads."""
     if len(axes) != 3 or {_AXES.get(letter, (-1, 0.0))[0] for letter in axes} != {0, 1, 2}:
         raise ValueError(
             f"axes is {axes!r}: it must be three letters, one of f/b, one of r/l and one of u/d"

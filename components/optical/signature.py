@@ -1,21 +1,80 @@
-"""The strength of a target's signature on the image, and the threshold of its detection."""
+"""Signature of a target on the image, its smear by the turning line of sight included."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    FloatArray,
+    angle,
     broadcast_flat,
     finite,
     not_negative,
     positive,
     unflatten,
 )
-from components.optical.line_of_sight_rate import line_of_sight_rate
+from components.geometry import angle_between, wrap_by_sines
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+
+
+def line_of_sight_rate(
+    azimuth_rad: ArrayLike,
+    elevation_rad: ArrayLike,
+    previous_azimuth_rad: ArrayLike,
+    previous_elevation_rad: ArrayLike,
+    interval_s: ArrayLike,
+    *,
+    seen_before: ArrayLike = True,
+    model: str = "exact",
+) -> Any:
+    """Give the angular rate of the line of sight between two looks: the dynamic signature V.
+
+    - ``exact``: angle between the two lines of sight / interval (errata 11). No jump where the
+      azimuth wraps, none near the zenith.
+    - ``thesis``: hypot(Δp, Δq) / interval (eq. 16-17) with Δp wrapped into [-pi, pi]; up to
+      1/cos(elevation) too fast, so useless near the zenith.
+
+    A target without a previous look has no rate: 0. The caller keeps the previous angles per
+    target and drops them when the target leaves the field of view, so that it starts anew.
+
+    Thesis eq. 16-17, errata 11.
+    """
+    if model not in ("exact", "thesis"):
+        raise ValueError(f"model is {model!r}: it must be 'exact' or 'thesis'")
+    seen = np.asarray(seen_before, dtype=bool)
+    azimuth = angle("azimuth_rad", azimuth_rad)
+    elevation = angle("elevation_rad", elevation_rad)
+    previous_azimuth = angle(
+        "previous_azimuth_rad", np.where(seen, _floats(previous_azimuth_rad), 0.0)
+    )
+    previous_elevation = angle(
+        "previous_elevation_rad", np.where(seen, _floats(previous_elevation_rad), 0.0)
+    )
+    interval = positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
+    shape, (p, q, p_before, q_before, time, seen_flag) = broadcast_flat(
+        azimuth_rad=azimuth,
+        elevation_rad=elevation,
+        previous_azimuth_rad=previous_azimuth,
+        previous_elevation_rad=previous_elevation,
+        interval_s=interval,
+        seen_before=seen.astype(np.float64),
+    )
+    if model == "exact":
+        moved = angle_between(p_before, q_before, p, q)
+    else:
+        turn = p - p_before
+        moved = np.hypot(wrap_by_sines(turn), q - q_before)
+    return unflatten(np.where(seen_flag > 0.0, moved, 0.0) / time, shape)
+
+
+def _floats(value: ArrayLike) -> Any:
+    return np.asarray(value, dtype=np.float64)
+
 
 __all__ = [
     "confidence",
@@ -41,28 +100,6 @@ def pixels_covered(
 
     Q = area / (R² · pixel azimuth · pixel elevation), capped at the sensor's own pixel count
     (errata 10). At range 0 a target of any area fills the sensor.
-
-    Parameters
-    ----------
-    area_m2 : array_like, m²
-        Visible area.
-    range_m : array_like, m
-        Slant range, 0 or more.
-    pixel_azimuth_rad, pixel_elevation_rad : array_like, rad
-        Angular size of one pixel: field of view / number of pixels.
-    sensor_pixels : array_like
-        Pixels of the whole sensor (azimuth count times elevation count).
-
-    Returns
-    -------
-    array of the broadcast shape
-        Pixels, not rounded to whole ones.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, an area or range is negative, or a pixel size or count is
-        not above 0.
     """
     shape, (area, distance, across, upward, most) = broadcast_flat(
         area_m2=not_negative("area_m2", area_m2),
@@ -132,21 +169,6 @@ def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
     """Give the margin of the signature over the threshold, C = E - threshold (thesis eq. 19).
 
     The target is detected when C >= 0 (errata 10). C is in the units of E: weighted pixels.
-
-    Parameters
-    ----------
-    signature : array_like
-        E of `total_signature`.
-    threshold : array_like
-
-    Returns
-    -------
-    array of the broadcast shape
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite.
     """
     return finite("signature", signature) - finite("threshold", threshold)
 
@@ -168,28 +190,6 @@ def detection_range(
     the speed alone reaches the threshold. With `sensor_pixels`, 0 where not even an image that
     fills the sensor is enough.
 
-    Parameters
-    ----------
-    area_m2 : array_like, m²
-    pixel_azimuth_rad, pixel_elevation_rad : array_like, rad
-    contrast_gain, static_weight, threshold : array_like
-        P, a and the threshold of eq. 18-19, each 0 or more.
-    dynamic_signature : array_like
-        b · V.
-    sensor_pixels : array_like, optional
-        Pixels of the whole sensor.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative or not finite, or a pixel has no size.
-
-    Notes
-    -----
     Thesis eq. 14, 15, 18 and 19 solved for R; errata 10 and 23.
     """
     pixels = np.float64(1.0) if sensor_pixels is None else positive("sensor_pixels", sensor_pixels)
@@ -211,3 +211,87 @@ def detection_range(
     if sensor_pixels is not None:
         distance = np.where(weight * gain * most >= wanted, distance, 0.0)
     return unflatten(np.where(needs_image, distance, np.inf), shape)
+
+
+class DynamicSignature(Effect):
+    """The rate of the line of sight adds b·V to the signature."""
+
+    name = "dynamic signature"
+    acts_on = "signature"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for the weight b."""
+        weight = block.p.dynamic_weight
+        return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return what is added to every cell's signature."""
+        return MovingTargets(block.p.dynamic_weight, block.p.rate, block.context.ticks_per_s)
+
+
+class MovingTargets:
+    """Remembers where each target was at the last scan, and weighs how fast it moves.
+
+    Parameters
+    ----------
+    weight_s : float
+        b of eq. 18, s/rad.
+    model : {"exact", "thesis"}
+    ticks_per_s : int
+    """
+
+    def __init__(self, weight_s: float, model: str, ticks_per_s: int) -> None:
+        self.weight_s = weight_s
+        self.model = model
+        self._ticks_per_s = ticks_per_s
+        # Of each replica, tick and NED angles of its last scan, one column per target; NaN where
+        # it saw none.
+        self._tick: IntArray = np.empty(0, dtype=np.int64)
+        self._angles: FloatArray = np.empty((2, 0, 0))
+
+    def __call__(self, cells: Cells) -> FloatArray:
+        """Return b·V of every cell."""
+        return self.weight_s * self.rate(cells)
+
+    def rate(self, cells: Cells) -> FloatArray:
+        """Return each cell's rate of the line of sight since the scan before, rad/s.
+
+        A target's first look has none, nor has the first after a scan that did not see it.
+        """
+        replica, targets = cells.replica_of_scan, len(cells.roster)
+        self._remember(int(replica.max(initial=0)) + 1, targets)
+        begins = np.append(True, replica[1:] != replica[:-1])
+        # Before the scans of each replica stands its last one.
+        place = np.arange(len(replica)) + np.cumsum(begins)
+        of, earlier = replica[begins], place[begins] - 1
+        angles = np.full((2, len(replica) + len(of), targets), np.nan)
+        tick = np.zeros(len(replica) + len(of), dtype=np.int64)
+        angles[:, earlier], tick[earlier] = self._angles[:, of], self._tick[of]
+        here = place[cells.row]
+        angles[:, here, cells.target] = cells.azimuth_rad, cells.elevation_rad
+        tick[place] = cells.scan_ticks
+        last = np.append(earlier[1:], len(tick)) - 1
+        self._tick[of], self._angles[:, of] = tick[last], angles[:, last]
+        azimuth, elevation = angles[:, here - 1, cells.target]
+        interval = (tick[here] - tick[here - 1]) / self._ticks_per_s
+        return np.asarray(
+            line_of_sight_rate(
+                cells.azimuth_rad,
+                cells.elevation_rad,
+                azimuth,
+                elevation,
+                np.where(np.isnan(azimuth), 1.0, interval),
+                seen_before=~np.isnan(azimuth),
+                model=self.model,
+            )
+        )
+
+    def _remember(self, replicas: int, targets: int) -> None:
+        """Remember so many replicas at least."""
+        known = len(self._tick)
+        if known < replicas:
+            angles = np.full((2, replicas, targets), np.nan)
+            angles[:, :known] = self._angles.reshape(2, known, targets)
+            self._angles = angles
+            self._tick = np.append(self._tick, np.zeros(replicas - known, dtype=np.int64))

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.arguments.checks import positive
+from components.geometry.angles import TWO_PI
 from components.geometry.field_of_view import sector_width_rad
-from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
 from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells

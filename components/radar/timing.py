@@ -9,8 +9,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.arguments.checks import positive
+from components.geometry.angles import TWO_PI
 from components.geometry.field_of_view import sector_width_rad
-from components.geometry.wrapping import TWO_PI
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.resolution import ResolutionParameters
 from dsa_des.block.effect import Effect, Verdict

@@ -6,9 +6,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
+from components.atmosphere.attenuation import gas_specific_attenuation
+from components.atmosphere.slant_path import (
+    AttenuationTable,
+    attenuation_table,
+    one_way_attenuation_db,
+    two_way_transmission,
+)
 from components.environment.tables import Weather
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo

@@ -11,7 +11,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
-from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
+from components.geometry import body_angles, body_to_ned, ned_to_body, unit_vector
 from components.messages.detections import LastingPart
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray

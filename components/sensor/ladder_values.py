@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.directions import angle_between_vectors
-from components.geometry.wrapping import wrap_pi
+from components.geometry import angle_between_vectors, wrap_pi
 from components.messages.reach import RANGE
 from components.messages.targets import RelativeTargets
 from components.sensor.look import Cells

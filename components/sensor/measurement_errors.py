@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.wrapping import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart
 from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_of_step
 from components.sensor.look import Cells, Look

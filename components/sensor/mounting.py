@@ -5,9 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from components.geometry.angle_variances import turned_variances
-from components.geometry.attitude import body_angles, body_to_ned, unit_vector
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import (
+    body_angles,
+    body_to_ned,
+    sensor_angles,
+    turned_variances,
+    unit_vector,
+)
 from components.messages.reach import Reach, ReasonArray
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.effect import Effect, Verdict

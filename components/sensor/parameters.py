@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from components.geometry.field_of_view import rising_sector
-from components.geometry.wrapping import TWO_PI
+from components.geometry import TWO_PI, rising_sector
 from components.messages.reach import Reach
 from components.sensor.grid import Grid
 from dsa_des.block.component import ClockedParameters

@@ -18,7 +18,7 @@ from components.messages.detections import Detections, LastingError, SensorOffer
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.navigation.effects import NavigationReport, lasting_navigation, navigation_noise
+from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from components.sensor.glint import Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF

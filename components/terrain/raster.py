@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
-from components.arguments.checks import FloatArray
-from components.geometry.ellipsoid import radii_of_curvature
-from components.geometry.normals import RAD_PER_DEG
-from components.geometry.wrapping import past
+from components.geometry import radii_of_curvature
+from components.geometry.angles import RAD_PER_DEG, past
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import ScenePath
+from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.text.safe_text import shortened
 
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
 _EDGE = 1e-6
@@ -33,31 +40,15 @@ def refuse_many_nodes(name: str, rows: int, columns: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class ElevationRaster:
-    """Heights at nodes, between which they are bilinear.
+    """Heights at nodes, between which they are bilinear."""
 
-    Parameters
-    ----------
-    south_deg, west_deg : float
-        Latitude of the first row, longitude of the first column.
-    lat_step_deg, lon_step_deg : float
-        Above 0.
-    height_m : (rows, columns)
-        Rows from south to north, columns from west to east; finite.
-    name : str
-        The file, for messages.
-
-    Raises
-    ------
-    ValueError
-        If there are holes, or the grid is none.
-    """
-
-    south_deg: float
+    south_deg: float  # Latitude of the first row, longitude of the first column
     west_deg: float
-    lat_step_deg: float
+    lat_step_deg: float  # Above 0
     lon_step_deg: float
+    # (rows, columns): rows from south to north, columns from west to east; finite
     height_m: npt.NDArray[np.floating[Any]]
-    name: str = "raster"
+    name: str = "raster"  # The file, for messages
 
     def __post_init__(self) -> None:
         rows, columns = self.height_m.shape
@@ -131,18 +122,7 @@ class ElevationRaster:
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return the heights of the ground (m) at some places, and which lie on the raster.
-
-        Parameters
-        ----------
-        lat_deg, lon_deg : arrays of one shape
-
-        Returns
-        -------
-        height_m : array
-            Bilinear between nodes; -inf beside the raster, where no ground is known.
-        inside : array of bool
-        """
+        """Return the heights of the ground (m) at some places, and which lie on the raster."""
         rows, columns = self.height_m.shape
         v, u = self.place(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
@@ -162,3 +142,193 @@ def _holes(count: int) -> str:
     if count == 1:
         return "1 hole (a node without a height)"
     return f"{count:,} holes (nodes without a height), the first"
+
+
+# Nodes of neighbours must fall onto each other to this share of a step.
+_FIT = 1e-3
+
+
+def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
+    """Return one raster of several with the same steps, whose nodes fall onto each other.
+
+    Parameters
+    ----------
+    rasters : sequence of ElevationRaster
+        At least one; together they fill a rectangle. Where two overlap, the later one counts.
+
+    Raises
+    ------
+    ValueError
+        If their steps differ, their nodes do not fit, or the rectangle is not filled.
+    """
+    first = rasters[0]
+    if len(rasters) == 1:
+        return first
+    steps = first.lat_step_deg, first.lon_step_deg
+    corners = []
+    for one in rasters:
+        if not np.allclose((one.lat_step_deg, one.lon_step_deg), steps, rtol=1e-6):
+            raise ValueError(
+                f"{one.name} has nodes every {one.lat_step_deg:.6g} by {one.lon_step_deg:.6g} "
+                f"degrees, {first.name} every {steps[0]:.6g} by {steps[1]:.6g}: they must be alike"
+            )
+        # The short way round, so that tiles on both sides of the antimeridian are neighbours.
+        east = (one.west_deg - first.west_deg + 180.0) % 360.0 - 180.0
+        corner = (one.south_deg - first.south_deg) / steps[0], east / steps[1]
+        if any(abs(value - round(value)) > _FIT for value in corner):
+            raise ValueError(
+                f"the nodes of {one.name} do not fall onto those of {first.name}: one grid must "
+                "hold them all"
+            )
+        corners.append((round(corner[0]), round(corner[1])))
+    low = [min(corner[axis] for corner in corners) for axis in (0, 1)]
+    high = [
+        max(
+            corner[axis] + one.height_m.shape[axis]
+            for corner, one in zip(corners, rasters, strict=True)
+        )
+        for axis in (0, 1)
+    ]
+    rows, columns = high[0] - low[0], high[1] - low[1]
+    refuse_many_nodes(f"{first.name} with the others", rows, columns)
+    height = np.full((rows, columns), np.nan, dtype=np.float32)
+    for (south, west), one in zip(corners, rasters, strict=True):
+        at = slice(south - low[0], None), slice(west - low[1], None)
+        height[at][: one.height_m.shape[0], : one.height_m.shape[1]] = one.height_m
+    return ElevationRaster(
+        first.south_deg + low[0] * steps[0],
+        first.west_deg + low[1] * steps[1],
+        *steps,
+        height,
+        f"{first.name} and {len(rasters) - 1} more",
+    )
+
+
+#: A raster of 3601 by 3601 nodes has 26 MB as .hgt; GeoTIFFs of several degrees are larger.
+LARGEST_RASTER_BYTES = 1024 * 1024 * 1024
+
+_VOID = -32768
+_CORNER = re.compile(r"([NS])(\d{1,2})([EW])(\d{1,3})", re.IGNORECASE)
+_TIFF = (".tif", ".tiff")
+_PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
+
+
+@dataclass(frozen=True)
+class RasterOfFile:
+    """A raster read while the scene was checked; equal where the same file was read once."""
+
+    paths: tuple[Path, ...]  # Of one file, or of several that lie side by side
+    raster: ElevationRaster
+
+
+def read_raster(path: Path) -> ElevationRaster:
+    """Read an elevation raster; the file's ending says which kind it is.
+
+    Parameters
+    ----------
+    path : Path
+        ``.hgt``: one degree by one degree, its south-west corner in its name (N45W076.hgt), rows
+        from north to south of big-endian 16-bit metres, as many rows as columns, the edges
+        included. ``.tif``, ``.tiff``: GeoTIFF in longitude and latitude, north up.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read, is of another kind, has holes, or needs a package that is missing.
+    """
+    name = shortened(path.name, 80)
+    if path.suffix.lower() == ".hgt":
+        return _read_hgt(path, name)
+    if path.suffix.lower() in _TIFF:
+        return _read_geotiff(path, name)
+    raise ValueError(f"{name}: an elevation raster must be .hgt (SRTM), .tif or .tiff (GeoTIFF)")
+
+
+def _read_hgt(path: Path, name: str) -> ElevationRaster:
+    match = _CORNER.match(path.stem)
+    if match is None:
+        raise ValueError(
+            f"{name}: the name of an .hgt file must say its south-west corner, as N45W076.hgt does"
+        )
+    nodes = math.isqrt(path.stat().st_size // 2)
+    refuse_many_nodes(name, nodes, nodes)
+    data = path.read_bytes()
+    if nodes < 2 or 2 * nodes * nodes != len(data):
+        raise ValueError(
+            f"{name} has {len(data):,} bytes: an .hgt file holds as many rows as columns of two "
+            "bytes each (1201 or 3601 of them in SRTM)"
+        )
+    rows = np.frombuffer(data, dtype=">i2").reshape(nodes, nodes)[::-1]
+    height = np.where(rows == _VOID, np.nan, rows).astype(np.float32)
+    south = int(match[2]) * (1.0 if match[1].upper() == "N" else -1.0)
+    west = int(match[4]) * (1.0 if match[3].upper() == "E" else -1.0)
+    step = 1.0 / (nodes - 1)
+    return ElevationRaster(south, west, step, step, height, name)
+
+
+def _read_geotiff(path: Path, name: str) -> ElevationRaster:
+    try:
+        import rasterio
+        from rasterio.errors import RasterioError
+    except ImportError:
+        raise ValueError(
+            f"{name}: reading a GeoTIFF needs the package rasterio: "
+            "pip install 'dsa-des[geotiff]', or give the raster as .hgt"
+        ) from None
+    try:
+        with rasterio.open(path) as file:
+            refuse_many_nodes(name, file.height, file.width)
+            band = file.read(1, masked=True)
+            crs, transform = file.crs, file.transform
+    except (RasterioError, OSError) as error:
+        raise ValueError(f"{name} is no GeoTIFF that can be read: {error}") from None
+    if crs is None or not crs.is_geographic:
+        raise ValueError(
+            f"{name} is in the coordinate system {crs}: it must be in longitude and latitude "
+            "(such as EPSG:4326); gdalwarp -t_srs EPSG:4326 makes one"
+        )
+    if transform.b or transform.d or transform.a <= 0.0 or transform.e >= 0.0:
+        raise ValueError(f"{name} is turned or upside down: its rows must run from north to south")
+    height = np.ma.filled(band.astype(np.float32), np.nan)[::-1]
+    # The transform gives the corners of pixels; heights are those of their middles.
+    west = transform.c + 0.5 * transform.a
+    south = transform.f + (height.shape[0] - 0.5) * transform.e
+    return ElevationRaster(south, west, transform.a, -transform.e, np.array(height), name)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, changed_ns: int, size: int) -> ElevationRaster:
+    # Runs of a study that name the same file share one raster.
+    return read_raster(path)
+
+
+@lru_cache(maxsize=2)
+def _together(rasters: tuple[ElevationRaster, ...]) -> ElevationRaster:
+    return mosaic(rasters)
+
+
+def _validated(value: Any) -> RasterOfFile:
+    if isinstance(value, RasterOfFile):
+        return value
+    if isinstance(value, list) and not value:
+        raise ValueError("must name at least one file")
+    paths, rasters = [], []
+    for item in value if isinstance(value, list) else [value]:
+        path = _PATH.validate_python(item)
+        name = shortened(str(path), 300)
+        try:
+            status = status_of(path, LARGEST_RASTER_BYTES)
+            rasters.append(_read(path, status.st_mtime_ns, status.st_size))
+        except InputFileError as error:
+            raise ValueError(f"must be a raster that can be read: {name}: {error}") from None
+        paths.append(path)
+    return RasterOfFile(tuple(paths), _together(tuple(rasters)))
+
+
+def _named(file: RasterOfFile) -> str | list[str]:
+    names = [str(path) for path in file.paths]
+    return names[0] if len(names) == 1 else names
+
+
+#: An elevation raster, .hgt or GeoTIFF, or a list of such that lie side by side.
+RasterFile = Annotated[RasterOfFile, PlainValidator(_validated), PlainSerializer(_named)]

@@ -17,8 +17,7 @@ from components.aircraft.aircraft import Aircraft
 from components.display.flights import Flights
 from components.examples import folder
 from components.optical.camera import Camera
-from components.optical.eo import ElectroOptical
-from components.optical.ir import Infrared
+from components.optical.sensors import ElectroOptical, Infrared
 from components.radar.swerling import SwerlingParameters
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.component import Context

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.optical.silhouette import visible_area
-from components.optical.silhouette_exact import front_and_back_area
+from components.optical.silhouette import front_and_back_area, visible_area
 from components.thesis.drawing import BLUE, GREEN, ORANGE, panels
 from components.thesis.rows import Cells, Made, Row, configured, predicted
 from components.thesis.scenes import areas

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.display.flights import Flights
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.wrapping import wrap_by_sines
+from components.geometry import line_of_sight_ned, wrap_by_sines
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
 from components.thesis.drawing import (

@@ -9,7 +9,7 @@ from components.messages.columns import POSE
 from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
-from components.navigation.effects import navigation_errs
+from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters

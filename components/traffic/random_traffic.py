@@ -14,7 +14,7 @@ from components.aircraft.aircraft import Aircraft, Roster
 from components.flights.fleet import ScriptedFleet
 from components.flights.sample_times import RegularTimes, SampleTimes
 from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
-from components.geometry.enu import enu_to_geodetic
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles

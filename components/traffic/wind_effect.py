@@ -11,7 +11,7 @@ import numpy as np
 from components.flights.attitude import Wind, attitude_in_wind, scene_wind
 from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
 from components.flights.steered_flight import SteeredFlight
-from components.geometry.normals import FloatArray
+from components.geometry.angles import FloatArray
 from components.geometry.state import TrajectoryState
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect, Verdict

@@ -21,14 +21,9 @@ LEAST_BOUND = 1e-3
 
 
 class Bounds(NamedTuple):
-    """How far the true relative state may lie from the one given, each (n,) and not negative.
+    """How far the true relative state may lie from the one given, each (n,) and not negative."""
 
-    Parameters
-    ----------
-    position_m, height_m, velocity_mps, climb_mps : ndarray
-        Radius of the horizontal position, of the height, of the velocity, of the climb rate.
-    """
-
+    # Radius of the horizontal position, of the height, of the velocity, of the climb rate
     position_m: FloatArray
     height_m: FloatArray
     velocity_mps: FloatArray

@@ -65,23 +65,12 @@ def nearly_zero(values: FloatArray) -> BoolArray:
 
 
 class Horizontal(NamedTuple):
-    """Products of the relative position s and the relative velocity v, arrays of one shape.
+    """Products of the relative position s and the relative velocity v, arrays of one shape."""
 
-    Parameters
-    ----------
-    range_sq_m2 : ndarray
-        s·s.
-    closing_m2_s : ndarray
-        s·v, negative while the aircraft come closer.
-    speed_sq_m2_s2 : ndarray
-        v·v.
-    cross_m2_s : ndarray
-        East times north rate less north times east rate: miss distance times speed.
-    """
-
-    range_sq_m2: FloatArray
-    closing_m2_s: FloatArray
-    speed_sq_m2_s2: FloatArray
+    range_sq_m2: FloatArray  # s·s
+    closing_m2_s: FloatArray  # s·v, negative while the aircraft come closer
+    speed_sq_m2_s2: FloatArray  # v·v
+    # East times north rate less north times east rate: miss distance times speed
     cross_m2_s: FloatArray
 
 

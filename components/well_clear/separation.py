@@ -16,33 +16,20 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class PairSeparation(NamedTuple):
-    """Present and projected distances of pairs of aircraft, each (n,).
+    """Present and projected distances of pairs of aircraft, each (n,)."""
 
-    Parameters
-    ----------
-    horizontal_m, vertical_m : ndarray
-        Distances now.
-    horizontal_mps, vertical_mps : ndarray
-        Relative speeds (not rates of the distances).
-    miss_horizontal_m, miss_vertical_m : ndarray
-        Projected closest distances within the lookahead.
-    time_to_closest_s, closest_m : ndarray
-        Of the horizontal closest approach; 0 and the distance now if it is past.
-    time_to_level_s : ndarray
-        Until the aircraft are at one height; NaN where they do not come closer.
-    modified_tau_s : ndarray
-        NaN where the aircraft are within the distance or do not come closer.
-    """
-
-    horizontal_m: FloatArray
+    horizontal_m: FloatArray  # Distances now
     vertical_m: FloatArray
-    horizontal_mps: FloatArray
+    horizontal_mps: FloatArray  # Relative speeds (not rates of the distances)
     vertical_mps: FloatArray
-    miss_horizontal_m: FloatArray
+    miss_horizontal_m: FloatArray  # Projected closest distances within the lookahead
     miss_vertical_m: FloatArray
+    # Of the horizontal closest approach; 0 and the distance now if it is past
     time_to_closest_s: FloatArray
     closest_m: FloatArray
+    # Until the aircraft are at one height; NaN where they do not come closer
     time_to_level_s: FloatArray
+    # NaN where the aircraft are within the distance or do not come closer
     modified_tau_s: FloatArray
 
 

@@ -29,15 +29,9 @@ class Thresholds(NamedTuple):
 
 @dataclass(frozen=True)
 class TcasAdvisory:
-    """An advisory of TCAS II as the volume of an alert level; its sizes follow the altitude.
+    """An advisory of TCAS II as the volume of an alert level; its sizes follow the altitude."""
 
-    Parameters
-    ----------
-    resolution : bool
-        Resolution advisory; otherwise traffic advisory.
-    """
-
-    resolution: bool
+    resolution: bool  # Resolution advisory; otherwise traffic advisory
 
 
 def _sizes(tau_s: float, nmi: float, height_ft: float, miss_ft: float = np.inf) -> Thresholds:

@@ -39,28 +39,13 @@ class Volume:
     time variable lies in [0, `horizontal_time_s`]. Vertically: the height difference is at most
     `vertical_m`, or the aircraft approach each other and are level within `vertical_time_s`.
 
-    Parameters
-    ----------
-    horizontal_m, vertical_m : float
-        Above 0, m.
-    horizontal_time_s, vertical_time_s : float
-        Not negative, s; 0 leaves the sizes alone.
-    time_variable : {"modified_tau", "time_to_closest", "time_to_entry", "none"}
-
-    Raises
-    ------
-    ValueError
-        Naming the size, its value and what is allowed.
-
-    Notes
-    -----
     C. Muñoz, A. Narkawicz, J. Chamberlain et al., "A family of well-clear boundary models for the
     integration of UAS in the NAS", AIAA Aviation 2014.
     """
 
-    horizontal_m: float
+    horizontal_m: float  # Above 0, m
     vertical_m: float
-    horizontal_time_s: float = 0.0
+    horizontal_time_s: float = 0.0  # Not negative, s; 0 leaves the sizes alone
     vertical_time_s: float = 0.0
     time_variable: str = "modified_tau"
 

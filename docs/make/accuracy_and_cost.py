@@ -203,8 +203,8 @@ rungs are on the front: none is both cheaper and nearer to the reference. Costs 
 than 10 % come in another order in another run and are given one value.
 
 The *union* of sphere, cylinder and plate is the reference of cameras: one hides the other, where
-the thesis's model adds them up. The plate's shape is an assumption (`components/optical/convex_hull.py`),
-so is the one-dimensional projection (`components/optical/projection.py`), of which the thesis says
+the thesis's model adds them up. The plate's shape is an assumption (`components/optical/silhouette.py`),
+so is the one-dimensional projection (`components/optical/sensors.py`), of which the thesis says
 no more than size, range and colour. A range boundary shows no area: the one that is just detected
 at the boundary stands for it. The Gram-Charlier series holds for steady targets: it is run on a
 sampled cross-section and compared with the exact Pd of the same sample. Fusion is compared with the

@@ -2,7 +2,7 @@
 
 The thesis takes an aircraft's areas as measured for those of sphere, cylinder and plate and adds
 them: a Beech 99 of 90 m² from above shows 132. Here the bodies are made so that their union
-(`components.optical.convex_hull`) shows the totals themselves. ``python -m
+(`components.optical.silhouette`) shows the totals themselves. ``python -m
 docs.make.fitted_areas FRONT,ABEAM,ABOVE`` prints them; the files
 ``configs/aircraft/*_fitted.toml`` were made so.
 """

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import ellipsoid, geodesic
-from components.geometry.angles import longitude_difference_deg
-from components.geometry.attitude import body_angles
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import (
+    body_angles,
+    earth_models,
+    ellipsoid,
+    longitude_difference_deg,
+    sensor_angles,
+)
 from components.high_precision.multiprecision import multiprecision
 from components.sensor.grid import round_to_grid
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
@@ -135,7 +138,7 @@ def _longitudes() -> NumericalCase:
 def _quarter_meridian() -> NumericalCase:
     mpmath = multiprecision()
     naive = 90.0 * 111_195.0
-    ours = float(geodesic.line_of_sight(0.0, 0.0, 0.0, 90.0, 0.0, 0.0)[2])
+    ours = float(earth_models.geodesic_line_of_sight(0.0, 0.0, 0.0, 90.0, 0.0, 0.0)[2])
     with mpmath.workdps(40):
         flattening = 1 / mpmath.mpf("298.257223563")
         truth = float(6378137 * mpmath.ellipe(flattening * (2 - flattening)))

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.high_precision.multiprecision import multiprecision
-from components.optical.line_of_sight_rate import line_of_sight_rate
-from components.optical.signature import pixels_covered
+from components.optical.signature import line_of_sight_rate, pixels_covered
 from components.optical.silhouette import visible_area
 from components.radar.detection import (
     detection_probability,

@@ -20,11 +20,11 @@ import numpy as np
 
 import dsa_des
 from components.estimation.motion import CoordinatedTurn, Motion
-from components.geometry.enu import enu_to_geodetic
+from components.geometry.ellipsoid import enu_to_geodetic
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_of
 from components.metrics.true_states import states_in_frame
-from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary
+from components.optical.sensors import OpticalRangeBoundary as CameraBoundary
 from components.radar.radar import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray

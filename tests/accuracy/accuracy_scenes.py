@@ -6,9 +6,7 @@ from random import Random
 
 import numpy as np
 
-from components.geometry.attitude import unit_vector
-from components.geometry.ellipsoid import line_of_sight
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import line_of_sight, sensor_angles, unit_vector
 from components.messages.reach import EVALUATE
 from components.messages.targets import GatedTargets, TrafficStates
 from dsa_des.record.recording import Recorder

@@ -9,7 +9,7 @@ import pytest
 from accuracy_scenes import Listener, run, true_errors, write_scene
 from click.testing import CliRunner
 
-from components.line_of_sight.rung_planning import PickedModels
+from components.line_of_sight.rungs import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder

@@ -8,9 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import ellipsoid, geodesic
-from components.geometry.attitude import unit_vector
-from components.geometry.enu import enu_to_geodetic
+from components.geometry import (
+    LineOfSight,
+    earth_models,
+    ellipsoid,
+    enu_to_geodetic,
+    sensor_angles,
+    unit_vector,
+)
 from components.geometry.error_bounds import (
     Envelope,
     ErrorBound,
@@ -18,13 +23,11 @@ from components.geometry.error_bounds import (
     azimuth_error_rad,
     error_bound,
 )
-from components.geometry.line_of_sight import LineOfSight
-from components.geometry.sensor_angles import sensor_angles
 
 MODELS = {
     "flat_earth": LineOfSight("flat_earth").in_ned,
     "local_radii": LineOfSight("local_radii").in_ned,
-    "geodesic": partial(geodesic.line_of_sight, backend="pyproj"),
+    "geodesic": partial(earth_models.geodesic_line_of_sight, backend="pyproj"),
 }
 LOW, HIGH, DEEP = (0.0, 500.0), (9000.0, 12000.0), (-400.0, 3000.0)
 USUAL = [(0.0, 0.4), (30.0, 30.5), (-52.0, -51.8), (69.5, 70.0)]

@@ -5,7 +5,7 @@ import re
 import pytest
 from wired import HEARS_ALL, chain
 
-from components.atmosphere.gas import gas_specific_attenuation
+from components.atmosphere.attenuation import gas_specific_attenuation
 from dsa_des.library.scenes import load_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import warnings_of

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.atmosphere.altitude_table import STANDARD_RAIN_HEIGHT_M, attenuation_table
-from components.atmosphere.attenuated_range import attenuated_range_m
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.rain import rain_specific_attenuation
+from components.atmosphere.attenuation import gas_specific_attenuation, rain_specific_attenuation
 from components.atmosphere.slant_path import (
+    STANDARD_RAIN_HEIGHT_M,
+    attenuated_range_m,
+    attenuation_table,
     one_way_attenuation_db,
     two_way_transmission,
 )

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.atmosphere.fog import (
+from components.atmosphere.attenuation import (
     fog_specific_attenuation,
     fog_specific_attenuation_coefficient,
+    gas_specific_attenuation,
+    rain_coefficients,
+    rain_specific_attenuation,
 )
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.rain import rain_coefficients, rain_specific_attenuation
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 
 with open(Path(__file__).with_name("itur_table.csv"), newline="") as _file:

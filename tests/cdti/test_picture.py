@@ -13,7 +13,7 @@ from components.cdti.camera import silhouette
 from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines
 from components.cdti.scope import Scope, lost_area
 from components.messages.tracks import Tracks
-from components.optical.convex_hull import union_area
+from components.optical.silhouette import union_area
 from components.well_clear.volume import Volume, violates
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink

@@ -11,7 +11,7 @@ import pymap3d
 import pytest
 from click.testing import CliRunner
 
-from components.line_of_sight.ladder import EARTH
+from components.line_of_sight.transform import EARTH
 from components.radar.detection.ladder import DETECTION
 from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from components.aircraft.known_targets import known_targets
-from components.optical.convex_hull import union_area
-from components.optical.projection import fuselage_length_m
-from components.optical.sampled_silhouette import body_mesh, sampled_table
-from components.optical.silhouette import visible_area
+from components.optical.area_of_cells import body_mesh, sampled_table
+from components.optical.sensors import fuselage_length_m
+from components.optical.silhouette import union_area, visible_area
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

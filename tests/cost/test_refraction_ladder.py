@@ -5,7 +5,7 @@ import pymap3d
 import pytest
 
 import dsa_des
-from components.line_of_sight.ladder import EARTH, REFRACTION
+from components.line_of_sight.transform import EARTH, REFRACTION
 from dsa_des.commands.cost import comparison
 from dsa_des.costs.climb import applies, climb
 from dsa_des.costs.variants import Variants

@@ -9,9 +9,7 @@ from matplotlib.figure import Figure
 from components.display import symbols as module
 from components.display.symbols import Labels, by_target, evenly, staggered, styles_of
 from components.fusion.gated import Gated
-from components.optical.eo import ElectroOptical
-from components.optical.ir import Infrared
-from components.optical.projection import Projection
+from components.optical.sensors import ElectroOptical, Infrared, Projection
 from components.radar.radar import RangeBoundary
 from components.radar.swerling import SwerlingRadar
 from components.sensor import marks

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.angles import longitude_difference_deg
-from components.geometry.wrapping import (
+from components.geometry.angles import (
     TWO_PI,
     heading_from_deg,
+    longitude_difference_deg,
     past,
     wrap_by_sines,
     wrap_difference_rad,

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.attitude import (
+from components.geometry import (
     aspect_angles,
     body_angles,
     body_to_ned,
     line_of_sight_in_target_axes,
     ned_to_body,
     relative_attitude,
+    sensor_angles,
     unit_vector,
 )
-from components.geometry.sensor_angles import sensor_angles
 
 fast = settings(derandomize=True, deadline=None, max_examples=100)
 angle = st.floats(-np.pi, np.pi)

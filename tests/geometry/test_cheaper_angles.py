@@ -4,8 +4,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from components.geometry.angles import direction_angle, sine_and_cosine, slope_angle
-from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
+from components.geometry import (
+    direction_angle,
+    sensor_angles,
+    sensor_angles_of_offsets,
+    sine_and_cosine,
+    slope_angle,
+)
 
 MP = mpmath.MPContext()
 MP.dps = 40

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.attitude import unit_vector
-from components.geometry.directions import (
+from components.geometry import (
     angle_between,
     angle_between_vectors,
     angle_by_haversine,
     angle_of_chord,
     chord_between,
+    unit_vector,
     unit_vectors,
 )
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import ellipsoid
-from components.geometry.enu import enu_to_geodetic
+from components.geometry import ellipsoid, enu_to_geodetic
 
 MP = mpmath.MPContext()  # our own precision: the global context is left alone
 MP.dps = 40

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
-from components.geometry.enu import enu_to_geodetic
+from components.geometry.ellipsoid import enu_to_geodetic, line_of_sight, line_of_sight_ned
 
 offset = st.floats(-200e3, 200e3)
 

@@ -9,8 +9,7 @@ from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import ellipsoid, geodesic
-from components.geometry.line_of_sight import EARTH_MODELS, LineOfSight
+from components.geometry import EARTH_MODELS, LineOfSight, earth_models, ellipsoid
 
 ALL = {name: LineOfSight(name).in_ned for name in EARTH_MODELS}
 RUNGS = {name: line for name, line in ALL.items() if name != "ellipsoid"}
@@ -93,7 +92,7 @@ def test_radii_of_curvature_against_geographiclib():
 
 def test_geodesic_is_geographiclibs_inverse():
     pairs = pairs_at(20e3, count=60, seed=8)
-    azimuth, elevation, slant_range = geodesic.line_of_sight(*pairs)
+    azimuth, elevation, slant_range = earth_models.geodesic_line_of_sight(*pairs)
     for i, (lat1, lon1, alt1, lat2, lon2, alt2) in enumerate(zip(*pairs, strict=True)):
         solution = Geodesic.WGS84.Inverse(lat1, lon1, lat2, lon2)
         ground, rise = solution["s12"], alt2 - alt1
@@ -104,7 +103,9 @@ def test_geodesic_is_geographiclibs_inverse():
 
 def test_published_geodesic():
     # Wellington to Salamanca, the worked example in the documentation of GeographicLib (JavaScript)
-    _, elevation, ground = geodesic.line_of_sight(-41.32, 174.81, 0, 40.96, 360 - 5.50, 0)
+    _, elevation, ground = earth_models.geodesic_line_of_sight(
+        -41.32, 174.81, 0, 40.96, 360 - 5.50, 0
+    )
     assert elevation == 0.0
     assert round(float(ground), 3) == 19959679.267
 
@@ -112,24 +113,24 @@ def test_published_geodesic():
 def test_both_backends_agree():
     pytest.importorskip("pyproj")
     pairs = pairs_at(20e3, count=200, seed=2)
-    ours = geodesic.line_of_sight(*pairs)
-    theirs = geodesic.line_of_sight(*pairs, backend="pyproj")
+    ours = earth_models.geodesic_line_of_sight(*pairs)
+    theirs = earth_models.geodesic_line_of_sight(*pairs, backend="pyproj")
     np.testing.assert_allclose(theirs[0], ours[0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(theirs[1], ours[1], rtol=0, atol=1e-12)
     np.testing.assert_allclose(theirs[2], ours[2], rtol=0, atol=1e-8)
-    same = geodesic.line_of_sight(10, 20, 5, 10, 380, 5, backend="pyproj")
+    same = earth_models.geodesic_line_of_sight(10, 20, 5, 10, 380, 5, backend="pyproj")
     assert same == (0.0, 0.0, 0.0)
 
 
 def test_missing_pyproj_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(ImportError, match=r"pip install 'dsa-des\[geodesic\]'"):
-        geodesic.line_of_sight(1, 2, 3, 4, 5, 6, backend="pyproj")
+        earth_models.geodesic_line_of_sight(1, 2, 3, 4, 5, 6, backend="pyproj")
 
 
 def test_unknown_backend_is_named():
     with pytest.raises(ValueError, match="backend is 'proj': it must be 'geographiclib' or"):
-        geodesic.line_of_sight(1, 2, 3, 4, 5, 6, backend="proj")
+        earth_models.geodesic_line_of_sight(1, 2, 3, 4, 5, 6, backend="proj")
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.geometry import ellipsoid
-from components.geometry.line_of_sight import ATTITUDE_MODELS, EARTH_MODELS, LineOfSight
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry import ellipsoid, sensor_angles
+from components.geometry.earth_models import ATTITUDE_MODELS, EARTH_MODELS, LineOfSight
 
 OWN = SimpleNamespace(
     lat_deg=np.array([-43.5]), lon_deg=np.array([172.6]), alt_m=np.array([900.0]),

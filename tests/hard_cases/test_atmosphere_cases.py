@@ -5,15 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from components.atmosphere.altitude_table import attenuation_table
-from components.atmosphere.attenuated_range import attenuated_range_m
-from components.atmosphere.fog import fog_specific_attenuation
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.rain import rain_specific_attenuation
-from components.atmosphere.slant_path import one_way_attenuation_db
+from components.atmosphere.attenuation import (
+    fog_specific_attenuation,
+    gas_specific_attenuation,
+    rain_specific_attenuation,
+)
+from components.atmosphere.slant_path import (
+    attenuated_range_m,
+    attenuation_table,
+    one_way_attenuation_db,
+)
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
-from components.navigation.error_model import position_with_error
+from components.navigation.errors import position_with_error
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.detection.output import false_alarm_count

@@ -9,9 +9,9 @@ import pytest
 from components.geometry import ellipsoid
 from components.geometry.angles import longitude_difference_deg
 from components.geometry.attitude import body_angles, relative_attitude
+from components.geometry.earth_models import EARTH_MODELS, LineOfSight
 from components.geometry.field_of_view import inside
-from components.geometry.line_of_sight import EARTH_MODELS, LineOfSight
-from components.geometry.sensor_angles import sensor_angles
+from components.geometry.sensor_axes import sensor_angles
 
 DEG = math.pi / 180
 

@@ -39,7 +39,7 @@ def test_every_fault_has_a_name_of_its_own_and_tests_that_exist():
 
 
 def test_a_definition_is_found_by_its_name_and_one_of_several_by_its_module():
-    assert definition("wrapping.TWO_PI").file == FILE
+    assert definition("angles.TWO_PI").file == FILE
     with pytest.raises(ValueError, match="no_such_function is defined nowhere"):
         definition("no_such_function")
     with pytest.raises(
@@ -49,7 +49,7 @@ def test_a_definition_is_found_by_its_name_and_one_of_several_by_its_module():
 
 
 def test_layout_of_code_counts_for_nothing_and_only_its_place_changes():
-    where, before = definition("wrapping.wrap_pi"), (ROOT / FILE).read_text(encoding="utf-8")
+    where, before = definition("angles.wrap_pi"), (ROOT / FILE).read_text(encoding="utf-8")
     body = where.nodes[0].body[1:]
     last = ast.unparse(body[-1])
     laid_out = parsed(f"{last}  # says why", statements=True)
@@ -106,7 +106,7 @@ from faulty_copy import ROOT, FaultyCopy, Trial
 with tempfile.TemporaryDirectory() as folder:
     copy, found = FaultyCopy(Path(folder)), []
     for old, new in json.loads(sys.argv[1]):
-        fault = Fault("wrapping", "none", "wrapping.TWO_PI", old, new, (sys.argv[2],))
+        fault = Fault("wrapping", "none", "angles.TWO_PI", old, new, (sys.argv[2],))
         trial = Trial(fault, copy)
         while (outcome := trial.outcome()) is None:
             time.sleep(0.02)
@@ -115,7 +115,7 @@ with tempfile.TemporaryDirectory() as folder:
     assert not copy.folder.is_relative_to(ROOT)
 print(json.dumps(found))
 """
-FILE = "components/geometry/wrapping.py"
+FILE = "components/geometry/angles.py"
 TESTS = "test_angle_wrapping"
 
 

@@ -11,7 +11,7 @@ from wired import rows, run
 
 import dsa_des
 from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, OperatorDecision
-from components.operator.human import MOST_WAITING, Desk, Laid
+from components.operator.human import MOST_WAITING, Desk, PendingDecision
 from components.operator.recorded import read_decisions
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -40,7 +40,7 @@ class Person(Desk):
 
     def take(self, time_s, tick):
         while self.acts and self.acts[0][0] <= time_s:
-            self.lay(Laid(self.acts.pop(0)[1], self.told.append))
+            self.put(PendingDecision(self.acts.pop(0)[1], self.told.append))
         return super().take(time_s, tick)
 
 
@@ -204,11 +204,12 @@ def test_what_is_no_table_of_decisions_is_refused(tmp_path, text, says):
 
 def test_a_desk_takes_no_more_than_a_person_lays_down():
     desk, taken = Desk(), []
-    laid = [desk.lay(Laid(OperatorDecision(SHOWN), taken.append)) for _ in range(MOST_WAITING + 2)]
-    assert laid == [True] * MOST_WAITING + [False] * 2
+    decision = PendingDecision(OperatorDecision(SHOWN), taken.append)
+    accepted = [desk.put(decision) for _ in range(MOST_WAITING + 2)]
+    assert accepted == [True] * MOST_WAITING + [False] * 2
     assert len(desk.take(1.5, 15)) == MOST_WAITING and taken == [1.5] * MOST_WAITING
-    assert desk.lay(Laid(OperatorDecision(SHOWN), taken.append))
-    assert len(desk.close()) == 1 and not desk.lay(Laid(OperatorDecision(SHOWN), taken.append))
+    assert desk.put(decision)
+    assert len(desk.close()) == 1 and not desk.put(decision)
 
 
 def test_without_a_person_nothing_is_decided_and_it_says_so(tmp_path):

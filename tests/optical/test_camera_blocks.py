@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.optical.background import Background
-from components.optical.contrast import contrast_gain
-from components.optical.eo import ElectroOptical, ElectroOpticalParameters
-from components.optical.infrared_area import infrared_area
-from components.optical.ir import Infrared, InfraredParameters
-from components.optical.plume import Plume
+from components.optical.contrast import Background, contrast_gain
+from components.optical.infrared_area import Plume, infrared_area
+from components.optical.sensors import (
+    ElectroOptical,
+    ElectroOpticalParameters,
+    Infrared,
+    InfraredParameters,
+)
 from components.optical.silhouette import visible_area
 from dsa_des.block.component import Context
 from dsa_des.errors import SceneError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.optical.centroid_accuracy import centroid_variance
+from components.optical.detector import centroid_variance
 
 
 def bound(signal: float, spread: float) -> float:

@@ -5,15 +5,13 @@ import pytest
 
 from components.optical.contrast import contrast_gain, visibility_transmission
 from components.optical.luminance import (
-    background_luminance,
-    inherent_contrast,
-    target_luminance,
-)
-from components.optical.sun_and_sky import (
     SKIES,
+    background_luminance,
     beam_illuminance,
+    inherent_contrast,
     sky_illuminance,
     sky_luminance,
+    target_luminance,
 )
 
 SUN = {"sun_azimuth_rad": 0.5, "sun_elevation_rad": 0.6}

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.directions import angle_between
-from components.optical.dynamic_signature import MovingTargets
+from components.geometry import angle_between
 from components.optical.signature import (
+    MovingTargets,
     confidence,
     detection_range,
     line_of_sight_rate,

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.optical.silhouette import visible_area
-from components.optical.silhouette_exact import line_of_sight_in_target_axes
+from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
 
 AREAS = {"front_m2": 12.0, "side_m2": 30.0, "horizontal_m2": 90.0}
 angles = st.floats(-10.0, 10.0)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from components.optical.convex_hull import PLATE_ASPECT_RATIO
-from components.optical.silhouette import visible_area
+from components.optical.silhouette import PLATE_ASPECT_RATIO, visible_area
 
 AIRCRAFT = {
     "Beech 99": (12.0, 30.0, 90.0),
@@ -76,7 +75,7 @@ def union_by_strips(u, front, side, horizontal, strips=4001):
     ],
 )
 def test_agrees_with_measuring_the_image(name, view):
-    from components.optical.silhouette_exact import line_of_sight_in_target_axes
+    from components.optical.silhouette import line_of_sight_in_target_axes
 
     u = np.array([a[0] for a in line_of_sight_in_target_axes(*(np.array([v]) for v in view))[:3]])
     area = visible_area(*view, **sizes(*AIRCRAFT[name]), model="convex_hull")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from components.atmosphere.attenuated_range import attenuated_range_m
+from components.atmosphere.slant_path import attenuated_range_m
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from components.environment.tables import Navigation
-from components.navigation.effects import NavigationErrors
-from components.navigation.error_model import position_with_error
+from components.navigation.errors import NavigationErrors, position_with_error
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 

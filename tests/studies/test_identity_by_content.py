@@ -13,7 +13,7 @@ from dsa_des.studies.study_file import read_study
 CONFIGS = Path(__file__).parents[2] / "configs"
 TABLE = "az_deg,el_deg,dbsm\n0,-90,1\n0,90,2\n180,-90,3\n180,90,4\n"
 RADAR = "from components.radar.swerling import SwerlingRadar as Radar\n"
-CAMERA = "from components.optical.eo import ElectroOptical as Camera\n"
+CAMERA = "from components.optical.sensors import ElectroOptical as Camera\n"
 REPLAYED = """
 extends = "own_base.toml"
 duration_s = 2

@@ -8,11 +8,16 @@ import pymap3d
 import pytest
 from scipy.ndimage import map_coordinates
 
-from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
-from components.terrain.mosaic import mosaic
-from components.terrain.raster import ElevationRaster
-from components.terrain.raster_files import read_raster
-from components.terrain.rays import bent_elevation_rad, dip_rad, geodetic_of, rays_between
+from components.terrain.raster import ElevationRaster, mosaic, read_raster
+from components.terrain.rays import (
+    behind_terrain,
+    behind_the_limb,
+    bent_elevation_rad,
+    dip_rad,
+    geodetic_of,
+    miss_bound_m,
+    rays_between,
+)
 from docs.make.synthetic_raster import NAME, main, synthetic_heights_m
 
 R = 6371008.8

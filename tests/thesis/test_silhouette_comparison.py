@@ -33,7 +33,7 @@ SIMPLE = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 40.0}
     ],
 )
 def test_camera_passes_the_stations_of_each_axis(axis, stations):
-    from components.optical.silhouette_exact import line_of_sight_in_target_axes
+    from components.optical.silhouette import line_of_sight_in_target_axes
 
     angle_deg, view = camera_rotation(axis)
     np.testing.assert_array_equal(angle_deg, np.arange(0.0, 181.0, 10.0))

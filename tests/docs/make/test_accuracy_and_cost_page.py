@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from components.line_of_sight.ladder import EARTH
-from components.optical.ladder import VISIBLE
+from components.line_of_sight.transform import EARTH
+from components.optical.sensors import VISIBLE
 from docs.make.accuracy_and_cost import DOCS, error_map_section, main
 from dsa_des.commands.cost import comparison
 from dsa_des.costs.climb import climb

@@ -6,8 +6,7 @@ import pytest
 from covering import covers
 from wired import HEARS_ALL, chain, first_look
 
-from components.atmosphere.gas import gas_specific_attenuation
-from components.atmosphere.rain import rain_coefficients
+from components.atmosphere.attenuation import gas_specific_attenuation, rain_coefficients
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 
 FREQUENCY_HZ = 35e9

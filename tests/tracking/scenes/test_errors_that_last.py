@@ -6,7 +6,7 @@ import pytest
 import dsa_des
 from components.estimation.kalman import variance_of_what_is_new
 from components.messages.detections import LastingError, SensorOffer
-from components.optical.range_boundary import OpticalRangeBoundary
+from components.optical.sensors import OpticalRangeBoundary
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
 from dsa_des.running.simulation import Simulation

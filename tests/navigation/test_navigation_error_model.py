@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.navigation.error_model import attitude_with_error, position_with_error
+from components.navigation.errors import attitude_with_error, position_with_error
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)

@@ -1,18 +1,20 @@
-"""The direction of a target in the ownship's body axes: the thesis's angles p and q."""
+"""Angles in a sensor's axes, and their variances where the axes are turned."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import FloatArray, shaped
-from components.geometry.angles import direction_angle, slope_angle
+from components.arguments.checks import shaped
+from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
     azimuth_off_nose,
     body_angles,
     body_angles_unchecked,
+    body_to_ned,
     checked,
     ned_to_body,
     ned_to_body_unchecked,
@@ -20,7 +22,56 @@ from components.geometry.attitude import (
     unit_vector,
     unit_vector_unchecked,
 )
-from components.geometry.wrapping import wrap_pi_unchecked
+from dsa_des.arrays.types import FloatArray
+
+# Of an azimuth of which nothing is known: uniform over the circle.
+_ANY_AZIMUTH_RAD2 = math.pi**2 / 3.0
+
+
+def turned_variances(
+    azimuth_rad: FloatArray,
+    elevation_rad: FloatArray,
+    azimuth_variance_rad2: FloatArray,
+    elevation_variance_rad2: FloatArray,
+    mounting_rad: tuple[float, float, float],
+) -> tuple[FloatArray, FloatArray]:
+    """Return the variances of a direction's azimuth and elevation in the axes it is turned into.
+
+    Small errors turn with the tangent plane: those of the elevation and, shortened by the cosine
+    of the elevation, of the azimuth are turned by the angle between the two verticals there. What
+    the turn leaves correlated is not returned.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad : (n,) arrays
+        Direction in the sensor's axes.
+    azimuth_variance_rad2, elevation_variance_rad2 : (n,) arrays
+        In the sensor's axes, uncorrelated.
+    mounting_rad : (azimuth, elevation, roll)
+        Turn from body axes to the sensor's, ZYX.
+
+    Returns
+    -------
+    azimuth_variance_rad2, elevation_variance_rad2 : (n,) arrays
+        In body axes; that of the azimuth at most π²/3, any azimuth, which straight up it is.
+    """
+    body = body_to_ned(*unit_vector_unchecked(azimuth_rad, elevation_rad), *mounting_rad)
+    p, q = body_angles_unchecked(*(np.ascontiguousarray(axis) for axis in body))
+    # The direction a quarter turn above another is the upward tangent there.
+    up = body_to_ned(
+        *unit_vector_unchecked(azimuth_rad, elevation_rad + 0.5 * np.pi), *mounting_rad
+    )
+    level_up = unit_vector_unchecked(p, q + 0.5 * np.pi)
+    cosine2 = (up[0] * level_up[0] + up[1] * level_up[1] + up[2] * level_up[2]) ** 2
+    sine2 = (up[1] * np.cos(p) - up[0] * np.sin(p)) ** 2
+    across = np.cos(elevation_rad) ** 2 * azimuth_variance_rad2
+    level2 = np.cos(q) ** 2
+    sideways = cosine2 * across + sine2 * elevation_variance_rad2
+    azimuth = np.full(len(level2), _ANY_AZIMUTH_RAD2)
+    known = sideways < level2 * _ANY_AZIMUTH_RAD2
+    np.divide(sideways, level2, out=azimuth, where=known)
+    return azimuth, sine2 * across + cosine2 * elevation_variance_rad2
+
 
 MODELS = ("exact", "small_angle")
 
