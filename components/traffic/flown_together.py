@@ -33,8 +33,7 @@ from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
 from components.traffic.steered_ownship import arrived_manoeuvres
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.replica_runs import ReplicaRuns
-from dsa_des.block.wake import Wake
+from dsa_des.block.wake import ReplicaRuns, Wake
 
 
 class RowFlights:

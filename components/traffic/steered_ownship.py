@@ -14,8 +14,7 @@ from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.steering import Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Context
-from dsa_des.block.ports import Input
+from dsa_des.block.component import Component, Context, Input
 from dsa_des.block.wake import Wake
 
 #: The truth is recorded without being asked for where aircraft times seconds, of all runs that are
