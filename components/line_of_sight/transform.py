@@ -68,7 +68,6 @@ class Transform(Component):
     Parameters = TransformParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
     hooks = {
         "ownship": "(states) -> what the ownship believes of itself, by name",
@@ -210,7 +209,6 @@ class FlatEarth(Transform):
 
     earth = "flat_earth"
     lockstep = True
-    side_by_side = True
 
 
 class LocalRadii(Transform):
@@ -218,7 +216,6 @@ class LocalRadii(Transform):
 
     earth = "local_radii"
     lockstep = True
-    side_by_side = True
 
 
 class DaidalusSphere(Transform):
@@ -226,7 +223,6 @@ class DaidalusSphere(Transform):
 
     earth = "daidalus_sphere"
     lockstep = True
-    side_by_side = True
 
 
 class Geodesic(Transform):
@@ -234,7 +230,6 @@ class Geodesic(Transform):
 
     earth = "geodesic"
     lockstep = True
-    side_by_side = True
 
 
 class Ellipsoid(Transform):
@@ -242,4 +237,3 @@ class Ellipsoid(Transform):
 
     earth = "ellipsoid"
     lockstep = True
-    side_by_side = True

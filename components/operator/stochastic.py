@@ -243,7 +243,6 @@ class Stochastic(Component):
     Parameters = StochasticParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

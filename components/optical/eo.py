@@ -59,7 +59,6 @@ class ElectroOptical(Camera):
     mark = EO
     Parameters = ElectroOpticalParameters
     lockstep = True
-    side_by_side = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), Night(), *Camera.effects)
     ladders = (VISIBLE,)

@@ -35,7 +35,6 @@ class Infrared(Camera):
     mark = IR
     Parameters = InfraredParameters
     lockstep = True
-    side_by_side = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), BandExtinction(), *Camera.effects)
     ladders = (INFRARED,)

@@ -34,7 +34,6 @@ class Projection(Camera):
     mark = EO
     Parameters = ProjectionParameters
     lockstep = True
-    side_by_side = True
     effects = (Night(), *Camera.effects)
     ladders = (VISIBLE,)
 

@@ -36,7 +36,6 @@ class OpticalRangeBoundary(Sensor):
     Parameters = CameraBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    side_by_side = True
     ladders = (VISIBLE,)
 
     def setup(self) -> None:
