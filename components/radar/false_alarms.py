@@ -45,13 +45,6 @@ class Alarms:
     rate: FloatArray
 
 
-def alarms_are_asked_for(parameters: Any) -> Verdict:
-    """Return whether a radar that is switched on has false alarms."""
-    if parameters.false_alarms and not parameters.enabled:
-        return Verdict(False, "enabled is false")
-    return Verdict.of_flag(parameters, "false_alarms")
-
-
 class FalseAlarms(Effect):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
@@ -71,7 +64,9 @@ class FalseAlarms(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``false_alarms``, and whether the radar is switched on."""
-        return alarms_are_asked_for(block.p)
+        if block.p.false_alarms and not block.p.enabled:
+            return Verdict(False, "enabled is false")
+        return Verdict.of_flag(block.p, "false_alarms")
 
     def build(self, block: Any) -> "NoiseReports":
         """Return what adds false alarms to a report."""

@@ -4,7 +4,7 @@ A range rate is of two aircraft: who estimates the other one's velocity from it 
 so radars that measure rates report it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -22,7 +22,13 @@ from components.radar.beam import BeamSweep, Sweep
 from components.radar.detection.cfar import Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
 from components.radar.detection.probability import required_snr
-from components.radar.doppler import LASTS_S, DopplerFilter, RangeRate, folded_range_rate
+from components.radar.doppler import (
+    LASTS_S,
+    DopplerFilter,
+    DopplerProcessing,
+    RangeRate,
+    folded_range_rate,
+)
 from components.radar.ground_clutter import BoundaryClutter, Echo, clutter_as_signal, terrain_of
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.parameters import RadarParameters
@@ -149,7 +155,7 @@ class Radar(Sensor):
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
         self._merging: Merging | None = None
-        self.doppler: Any = None
+        self.doppler: DopplerProcessing | None = None
         self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
@@ -190,7 +196,7 @@ class Radar(Sensor):
         return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
-    def _rates(self) -> list[Any]:
+    def _rates(self) -> list[Callable[[Cells, IntArray], FloatArray]]:
         return self.built("range rate")
 
     @property

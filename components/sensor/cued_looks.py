@@ -1,4 +1,4 @@
-"""Cues as an effect: which targets lie in a cone that was told, where a sensor looks harder."""
+"""Cues as an effect: which targets lie in a cone of a cue, where a sensor looks harder."""
 
 from dataclasses import replace
 from typing import Any
@@ -31,10 +31,10 @@ class CuedLooks(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for a wire that brings cues."""
-        told = [one.block for one in block.context.producers if one.port == PORT]
-        if not told:
+        sources = [one.block for one in block.context.producers if one.port == PORT]
+        if not sources:
             return Verdict(False, "no wire brings cues")
-        return Verdict(True, f"{' and '.join(told)} cues it")
+        return Verdict(True, f"{' and '.join(sources)} cues it")
 
     def build(self, block: Any) -> "ConesAhead":
         """Return what finds targets in cones."""
@@ -138,11 +138,11 @@ CUED_INPUTS = {
 
 def refuse_cues(block: Any) -> None:
     """Raise ValueError if a sensor that cannot look harder is cued."""
-    told = [one.block for one in block.context.producers if one.port == PORT]
-    if told:
+    sources = [one.block for one in block.context.producers if one.port == PORT]
+    if sources:
         raise ValueError(
-            f"{told[0]} cues it, and it takes no cues: all inside its range is detected, there is "
-            "no threshold to lower; cue a sensor that has one, or leave the wire out"
+            f"{sources[0]} cues it, and it takes no cues: all inside its range is detected, "
+            "there is no threshold to lower; cue a sensor that has one, or leave the wire out"
         )
 
 
@@ -153,11 +153,11 @@ def cue_warnings(block: Any) -> list[str]:
         for name in type(block.p).model_fields
         if name.startswith("cued_") and getattr(block.p, name) not in (None, False)
     ]
-    told = any(one.port == PORT for one in block.context.producers)
-    if told and not given:
+    cued = any(one.port == PORT for one in block.context.producers)
+    if cued and not given:
         return [
             "is cued, and nothing says what it then does otherwise: give one of its cued_* keys"
         ]
-    if given and not told:
+    if given and not cued:
         return [f"{given[0]} is given, and no wire brings cues"]
     return []
