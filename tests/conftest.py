@@ -37,8 +37,6 @@ def keep_bytecode_elsewhere() -> None:
 if sys.dont_write_bytecode and hasattr(os, "getuid"):
     keep_bytecode_elsewhere()
 
-from lab import lab  # noqa: E402, F401 (a fixture, found by the path above)
-
 ROOT = Path(__file__).parent.parent
 
 
@@ -46,6 +44,14 @@ ROOT = Path(__file__).parent.parent
 def configs() -> Path:
     """The folder of the project's scenes."""
     return ROOT / "configs"
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """Scenes of small test blocks, with a folder to write in (`lab.lab_in`)."""
+    from lab import lab_in
+
+    return lab_in(tmp_path)
 
 
 @cache

@@ -58,9 +58,8 @@ def problems_of(path, **load):
     return caught.value.problems
 
 
-@pytest.fixture
-def lab(tmp_path):
-    """Everything above, with a folder to write in."""
+def lab_in(tmp_path):
+    """Return everything above, with a folder to write in."""
     return SimpleNamespace(
         folder=tmp_path,
         configs=CONFIGS,
