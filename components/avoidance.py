@@ -65,7 +65,6 @@ class TurnOut(Component):
     Parameters = TurnOutParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
@@ -156,7 +155,6 @@ class TurnAway(Component):
     Parameters = TurnAwayParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

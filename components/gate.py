@@ -24,7 +24,6 @@ class Gate(Component):
     outputs = {"targets": Output(GatedTargets, "The same, with a decision for each sensor.")}
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:

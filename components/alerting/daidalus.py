@@ -76,7 +76,6 @@ class DaidalusAlerting(Component):
     Parameters = DaidalusParameters
     windowed = True
     lockstep = True
-    side_by_side = True
 
     def request(self, port: str) -> Any:
         """Ask for no poses beside what is fused: the ownship's own come with the states."""

@@ -47,7 +47,6 @@ class ClosestApproachPassed(Component):
     Parameters = ClosestApproachPassedParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:

@@ -181,7 +181,6 @@ class Gated(Fusion):
 
     Parameters = GatedParameters
     lockstep = True
-    side_by_side = True
     ladders = (FUSION_LADDER,)
 
     def window_s(self) -> Any:

@@ -24,7 +24,6 @@ class PassThrough(Fusion):
 
     Parameters = Parameters
     lockstep = True
-    side_by_side = True
 
     def window_s(self) -> Any:
         """Return 0: nothing waits for anything."""

@@ -106,7 +106,6 @@ class PickBest(Fusion):
 
     Parameters = PickBestParameters
     lockstep = True
-    side_by_side = True
     ladders = (FUSION_LADDER,)
 
     def left_out(self) -> list[str]:

@@ -179,7 +179,6 @@ class Transform(Component):
     Parameters = TransformParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
     hooks = {
         "ownship": "(states) -> what the ownship believes of itself, by name",
@@ -321,7 +320,6 @@ class FlatEarth(Transform):
 
     earth = "flat_earth"
     lockstep = True
-    side_by_side = True
 
 
 class LocalRadii(Transform):
@@ -329,7 +327,6 @@ class LocalRadii(Transform):
 
     earth = "local_radii"
     lockstep = True
-    side_by_side = True
 
 
 class DaidalusSphere(Transform):
@@ -337,7 +334,6 @@ class DaidalusSphere(Transform):
 
     earth = "daidalus_sphere"
     lockstep = True
-    side_by_side = True
 
 
 class Geodesic(Transform):
@@ -345,7 +341,6 @@ class Geodesic(Transform):
 
     earth = "geodesic"
     lockstep = True
-    side_by_side = True
 
 
 class Ellipsoid(Transform):
@@ -353,4 +348,3 @@ class Ellipsoid(Transform):
 
     earth = "ellipsoid"
     lockstep = True
-    side_by_side = True

@@ -182,7 +182,6 @@ class Stochastic(Component):
     Parameters = StochasticParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

@@ -163,7 +163,6 @@ class ElectroOptical(Camera):
     mark = EO
     Parameters = ElectroOpticalParameters
     lockstep = True
-    side_by_side = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), Night(), *Camera.effects)
     ladders = (VISIBLE,)
@@ -198,7 +197,6 @@ class Infrared(Camera):
     mark = IR
     Parameters = InfraredParameters
     lockstep = True
-    side_by_side = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), BandExtinction(), *Camera.effects)
     ladders = (INFRARED,)
@@ -231,7 +229,6 @@ class Projection(Camera):
     mark = EO
     Parameters = ProjectionParameters
     lockstep = True
-    side_by_side = True
     effects = (Night(), *Camera.effects)
     ladders = (VISIBLE,)
 
@@ -299,7 +296,6 @@ class OpticalRangeBoundary(Sensor):
     Parameters = CameraBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    side_by_side = True
     ladders = (VISIBLE,)
 
     def setup(self) -> None:

@@ -331,7 +331,6 @@ class RangeBoundary(Radar):
     Parameters = RangeBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    side_by_side = True
     hooks = {
         "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",

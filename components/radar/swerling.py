@@ -155,7 +155,6 @@ class SwerlingRadar(LinkBudgetRadar):
 
     Parameters = SwerlingParameters
     lockstep = True
-    side_by_side = True
     hooks = {
         "RCS": "which Swerling model each cell has",
         "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",

@@ -342,7 +342,6 @@ class ThresholdRadar(LinkBudgetRadar):
 
     Parameters = ThresholdParameters
     lockstep = True
-    side_by_side = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

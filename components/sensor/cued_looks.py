@@ -26,7 +26,6 @@ class CuedLooks(Effect):
     """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
 
     lockstep = True
-    side_by_side = True
     name = "cues"
     acts_on = "cue"
 

@@ -140,7 +140,6 @@ class CovarianceIntersection(Component):
     Parameters = IntersectionParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
     ladders = (RULE,)
 

@@ -79,7 +79,6 @@ class Cues(Component):
     Parameters = CueParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:

@@ -26,7 +26,6 @@ class ExtendedKalman(Tracker):
     """
 
     lockstep = True
-    side_by_side = True
 
 
 class UnscentedParameters(TrackerParameters):
@@ -44,7 +43,6 @@ class Unscented(Tracker):
 
     Parameters = UnscentedParameters
     lockstep = True
-    side_by_side = True
 
     def estimator(self) -> UnscentedKalmanFilter:
         """Return an unscented filter of nearly constant velocity."""
@@ -122,7 +120,6 @@ class InteractingModels(Tracker):
 
     Parameters = InteractingParameters
     lockstep = True
-    side_by_side = True
 
     def estimator(self) -> InteractingMultipleModels:
         """Return a filter for each model."""

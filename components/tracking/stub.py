@@ -46,7 +46,6 @@ class TrackerStub(Component):
     Parameters = StubParameters
     windowed = True
     lockstep = True
-    side_by_side = True
     rewindable = True
 
     def request(self, port: str) -> str:

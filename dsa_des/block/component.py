@@ -141,13 +141,11 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or keeps replicas apart by `Wake.replica`. A class says so of its
-    #: own code only: a subclass that does not say it again gets an instance for each replica.
+    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others;
+    #: where a wake is a stretch of time of all of them (`Wake.side_by_side`) the next one comes
+    #: back to each. A class says so of its own code only: a subclass that does not say it again
+    #: gets an instance for each replica.
     lockstep: ClassVar[bool] = False
-    #: Whether replicas may share it in lock step even where they go side by side: a wake is then a
-    #: stretch of time of all of them, and the next one comes back to each (`Wake.side_by_side`), so
-    #: it must remember all of them, or nothing. A class says so of its own code only.
-    side_by_side: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
@@ -169,7 +167,6 @@ class Component:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
-        cls.side_by_side = vars(cls).get("side_by_side", False)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -285,7 +282,7 @@ class Component:
 
     def goes_side_by_side(self) -> bool:
         """Return whether this block, which may serve replicas, may serve them side by side."""
-        return type(self).side_by_side
+        return True
 
     def together(self, replicas: "ReplicaRuns") -> "Runner | None":
         """Return what runs this block for all replicas in lock step, or None: one instance each.

@@ -10,13 +10,12 @@ from typing import Any
 
 from dsa_des.block.foreign import Foreign, Imports, imports
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.running.effect_plan import Planned
-from dsa_des.running.long_run import say_if_long
+from dsa_des.running.effects import Planned
 from dsa_des.running.pacing import Pacer, parse_factor
 from dsa_des.running.recorded_run import record_run
 from dsa_des.running.reports import load_reports
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import say_warnings, warnings_of
+from dsa_des.running.warnings import say_if_long, say_warnings, warnings_of
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene, load_scene
@@ -147,11 +146,11 @@ def _say_if_slowed(simulation: Simulation) -> None:
     """Say which blocks keep a feedback loop from looking ahead."""
     scene = simulation.scene
     looped = in_cycles(scene.graph)
-    if not looped or not simulation.unwound:
+    if not looped or not simulation.slow:
         return
-    # A window is rewound as a whole, so a block outside of the loop counts as well.
+    # A window holds all blocks, so one outside of the loop counts as well.
     say(f"note: the feedback loop of {', '.join(sorted(looped))} runs scan by scan, which is slow:")
-    for name, why in simulation.unwound.items():
+    for name, why in simulation.slow.items():
         say(f"  {name} ({scene.classes[name].path()}) {why}")
 
 

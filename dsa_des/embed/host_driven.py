@@ -24,7 +24,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.ports import Input
 from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import BlockFailure, Problem, SceneError
-from dsa_des.running.inputs import Inputs
+from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import in_cycles

@@ -13,8 +13,7 @@ import numpy as np
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
-from dsa_des.running.channel import Channel, joined
-from dsa_des.running.wire_faults import WireFaults
+from dsa_des.running.channel import Channel, WireFaults, joined
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
 from dsa_des.time.run_ends import RunEnds

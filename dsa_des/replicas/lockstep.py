@@ -19,18 +19,15 @@ from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.drawn_columns import ReplicaScenes
-from dsa_des.replicas.lookahead import Edge, lookahead_ticks, opened_loops
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.replicas.windows import ReplicaWindows, SideBySideWindows
+from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.channel import Channel
-from dsa_des.running.effect_plan import plan, unspent
-from dsa_des.running.grain import Grain
-from dsa_des.running.rewind import Rewinder
+from dsa_des.running.effects import may_be_late, plan, unspent
+from dsa_des.running.grain import Grain, opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.timing_effects import may_be_late
-from dsa_des.running.windows import Window, Windows
+from dsa_des.running.windows import EqualWindows, Rewinder, Window, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
@@ -104,7 +101,6 @@ class Replicas(Timeline):
         self._seeds = _seeds_of(self._scenes)
         #: Wires at which feedback loops are opened: a window is no longer than their delay.
         self._opened = opened_loops(self.scene)
-        self._delays: dict[Edge, int] = {}
         self.streams = ReplicaStreams(self._seeds)
 
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
@@ -265,16 +261,17 @@ class Replicas(Timeline):
         found = self.together.get(component.name)
         return self.split.get(component.name, component) if found is None else found
 
-    def windows(self, longest_ticks: int, rewinder: Rewinder | None) -> Windows:
+    def windows(
+        self, longest_ticks: int, lookahead_ticks: int | None, rewinder: Rewinder | None
+    ) -> Windows:
         """Return windows that hold many whole replicas, or parts of one."""
-        if not self.time.side_by_side:
+        if lookahead_ticks is None:
             return ReplicaWindows(self.time, longest_ticks)
-        lookahead = lookahead_ticks(self._delays, self._opened)
         scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
-        if self.time.run_ticks > lookahead * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
-            said = f"{lookahead / self.scene.ticks_per_s:.2g} s"
+        if self.time.run_ticks > lookahead_ticks * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
+            said = f"{lookahead_ticks / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
-        return SideBySideWindows(self.time, longest_ticks, lookahead)
+        return EqualWindows(self.time.run_ticks, min(longest_ticks, lookahead_ticks))
 
     def grain(self, window: int | None) -> Grain:
         """Return the grain: in loops, all blocks run in windows that nothing comes back in."""
@@ -284,8 +281,6 @@ class Replicas(Timeline):
 
     def channel(self, wire: Wire, delay_ticks: int) -> Channel:
         """Return the receiving end of a wire in all replicas."""
-        edge = wire.source, wire.target
-        self._delays[edge] = min(delay_ticks, self._delays.get(edge, delay_ticks))
         faults = None
         if may_be_late(wire, everything=False):
             arguments = self._fault_arguments(wire)

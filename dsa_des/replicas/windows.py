@@ -1,23 +1,7 @@
-"""Windows over replicas that lie end to end, or go side by side."""
+"""Windows over replicas that lie end to end."""
 
 from dsa_des.running.windows import EqualWindows, Window
 from dsa_des.time.timeline import ReplicaTime
-
-
-class SideBySideWindows(EqualWindows):
-    """Windows that hold a stretch of time of all replicas, in which nothing comes back.
-
-    Parameters
-    ----------
-    time : ReplicaTime
-    longest_ticks
-        As for `EqualWindows`.
-    lookahead_ticks : int
-        Before so long, nothing that is sent comes back.
-    """
-
-    def __init__(self, time: ReplicaTime, longest_ticks: int, lookahead_ticks: int) -> None:
-        super().__init__(time.run_ticks, min(longest_ticks, lookahead_ticks))
 
 
 class ReplicaWindows(EqualWindows):

@@ -1,18 +1,58 @@
-"""The buffer at the receiving end of one wire.
+"""Wires: rows on their way to an input, what is lost or late, and what a block sees when it runs.
 
 Rows are kept in order of arrival. A look-ahead sender may deposit rows long before they arrive; a
-reader only ever sees those that have arrived by the instant it asks about.
+reader only ever sees those that have arrived by the instant it asks about. What a block sees is
+the same whether SimPy wakes it, at whatever grain, or a host program calls it.
 """
 
 from collections import deque
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
-from dsa_des.running.wire_faults import WireFaults
+from dsa_des.block.ports import Input
+from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.randomness import Stream
+
+
+@dataclass(frozen=True)
+class WireFaults:
+    """Keyed faults of one wire; a row's fate depends on the wire and on its instant only.
+
+    Parameters
+    ----------
+    jitter_ticks : float
+        Largest extra delay; each row takes a uniformly drawn part of it.
+    drop_probability : float
+    jitter, drops : Stream
+        Draws named after the wire.
+    ticks_per_s : int
+    """
+
+    jitter_ticks: float
+    drop_probability: float
+    jitter: Stream
+    drops: Stream
+    ticks_per_s: int
+
+    def kept(self, ticks: IntArray) -> BoolArray:
+        """Return which rows sent at `ticks` are not lost."""
+        return self._drawn(self.drops, ticks) >= self.drop_probability
+
+    def lateness(self, ticks: IntArray) -> IntArray:
+        """Return the extra delay of the rows sent at `ticks`, in ticks."""
+        return np.rint(self._drawn(self.jitter, ticks) * self.jitter_ticks).astype(np.int64)
+
+    def _drawn(self, stream: Stream, ticks: IntArray) -> FloatArray:
+        instant = nanosecond_of(ticks, self.ticks_per_s).astype(np.uint64)
+        return stream.uniform(instant, 0)
 
 
 class Channel:
@@ -161,3 +201,100 @@ def joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | 
     arrivals = np.concatenate([part[0] for part in parts])
     message = type(parts[0][1]).concatenate([part[1] for part in parts])
     return arrivals, message
+
+
+class WireEnd(Protocol):
+    """The receiving end of a wire, as `dsa_des.running.channel.Channel` has it."""
+
+    source: str
+
+    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return what is held at each of `ticks`, all before `end`."""
+
+    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+        """Remove and return the rows that arrive before `end`."""
+
+
+class Inputs:
+    """The wires into a block, by how it reads them.
+
+    Parameters
+    ----------
+    declared : mapping
+        The block's inputs.
+    wires : mapping
+        The wires into each.
+    ticks_per_s : int
+    span_ticks, side_by_side
+        As for `Wake`.
+    """
+
+    def __init__(
+        self,
+        declared: Mapping[str, Input],
+        wires: Mapping[str, Sequence[WireEnd]],
+        ticks_per_s: int,
+        span_ticks: int = 0,
+        *,
+        side_by_side: bool = False,
+    ) -> None:
+        every = [(port, wire) for port in declared for wire in wires.get(port, ())]
+        self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].held]
+        self._queued = [(p, wire) for p, wire in every if not declared[p].held]
+        self._ticks_per_s, self._span_ticks = ticks_per_s, span_ticks
+        self._side_by_side = side_by_side
+
+    def seen(
+        self,
+        ticks: IntArray,
+        scans: IntArray,
+        end: int,
+        demand: Callable[[IntArray], Mapping[str, IntArray]] | None = None,
+        *,
+        complete: bool = True,
+    ) -> Wake | None:
+        """Return what the block sees at some instants, or None if it cannot run at any.
+
+        Parameters
+        ----------
+        ticks, scans : ndarray of int64, shape (rows,)
+            As for `Wake`.
+        end : int
+            First tick that is no longer seen.
+        demand : callable, optional
+            Given the instants of the wake, returns what `Wake.demand` is.
+        complete : bool
+            Leave out instants at which a required input holds nothing yet.
+        """
+        held: dict[str, tuple[Message, IntArray]] = {}
+        missing: np.ndarray | None = None
+        for port, wire, required in self._held:
+            sample = wire.sample(ticks, end)
+            if sample is not None:
+                held[port] = sample
+            if required and complete and _some_missing(sample):
+                absent = np.ones(len(ticks), bool) if sample is None else sample[1] < 0
+                missing = absent if missing is None else missing | absent
+        if missing is not None:  # before the first messages
+            there = np.flatnonzero(~missing)
+            if len(there) == 0:
+                return None
+            ticks, scans = ticks[there], scans[there]
+            held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
+        arrived: dict[str, list[Arrivals]] = {}
+        for port, wire in self._queued:
+            new = wire.collect(end)
+            if new is not None:
+                arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
+        asked = None if demand is None else partial(demand, ticks)
+        return Wake(
+            ticks, scans, self._ticks_per_s, held, arrived, asked, self._span_ticks,
+            side_by_side=self._side_by_side,
+        )  # fmt: skip
+
+
+def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:
+    if sample is None:
+        return True
+    rows = sample[1]
+    return bool(rows[0] < 0 if len(rows) == 1 else (rows < 0).any())

@@ -1,11 +1,153 @@
-"""At which grain each block of a scene runs: scan by scan, in windows, or in windows rewound."""
+"""At which grain blocks run, where loops are opened, and how long look-ahead windows are."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 
-from dsa_des.running.loops import before_loops, cannot_rewind, cut_loops
+import networkx as nx
+
+from dsa_des.block.component import Component
+from dsa_des.block.run_end import ends_its_run
+from dsa_des.errors import SceneError
+from dsa_des.errors.budgets import MOST_SCANS
+from dsa_des.running.node import Node
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import ScanClock
+from dsa_des.time.timeline import ReplicaTime
+
+#: From which block to which.
+Edge = tuple[str, str]
+
+
+def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
+    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+
+    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
+
+    Parameters
+    ----------
+    graph : networkx.DiGraph
+        From `dsa_des.scene.graph.build_graph`.
+    classes : mapping
+        The class of each block.
+    """
+    looped = in_cycles(graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
+    cut = set()
+    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
+    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            cut.add(edge)
+    return cut
+
+
+def before_loops(graph: nx.DiGraph) -> set[str]:
+    """Return the blocks that no loop leads to; none where there is no loop."""
+    looped = in_cycles(graph)
+    behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
+    return set(graph) - behind if looped else set()
+
+
+def _optional(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
+) -> bool:
+    """Whether the receiving block can do without what comes over an edge."""
+    inputs = classes[edge[1]].inputs
+    return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
+
+
+def opened_loops(scene: Scene) -> set[Edge]:
+    """Return delayed edges without which the scene has no loop, those of the longest delays.
+
+    An edge is taken out only if it closes a loop of edges that are as short or shorter: so the
+    shortest of those taken out is as long as can be.
+    """
+    looped = in_cycles(scene.graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(scene.graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    lasts = {edge: shortest_s(scene, edge) for edge in inside}
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not scene.graph.edges[edge]["delayed"])
+    opened = set()
+    delayed = [edge for edge in inside if scene.graph.edges[edge]["delayed"]]
+    for edge in sorted(delayed, key=lambda edge: (lasts[edge], edge)):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            opened.add(edge)
+    return opened
+
+
+def shortest_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the shortest delay of the wires from one block to another, s."""
+    wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
+    return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
+
+
+def _period_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the time between scans that delays on an edge count in; 0 where there are none."""
+    for name in reversed(edge):
+        block = scene.blocks[name]
+        spec = block.cls.clock_of(block.parameters)
+        if spec is not None:
+            return spec.period_s
+    return Fraction(0)
+
+
+def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
+    """Return the place of each block in the order in which blocks tell each other what they offer.
+
+    Requests go the other way. Both pass over wires with and without delay; loops are opened where
+    an input can be done without, and else at a delay.
+    """
+    looped = in_cycles(graph)
+    opened = nx.DiGraph(graph)
+    opened.remove_edges_from(
+        edge
+        for edge in graph.edges
+        if edge[0] in looped
+        and looped[edge[0]] == looped.get(edge[1])
+        and _optional(graph, classes, edge)
+    )
+    return window_order(opened, set(graph), cut_loops(opened, classes))
+
+
+def _without_windows(scene: Scene) -> dict[str, str]:
+    """Return the blocks of a scene that no window of a loop can hold, and why each."""
+    found = {}
+    for name, block in sorted(scene.blocks.items()):
+        if block.cls.process is not None:
+            found[name] = "has a process of its own"
+        elif not block.cls.windowed:
+            found[name] = "runs scan by scan (windowed is False)"
+        elif block.options.processor:
+            found[name] = "shares a processor"
+    return found
+
+
+def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
+    """Return the blocks that send over the wires that are shorter than scans are apart."""
+    clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
+    per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
+    return {
+        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound"
+        for edge in sorted(opened)
+        if shortest_s(scene, edge) * per_s < 1
+    }
 
 
 @dataclass(frozen=True)
@@ -20,8 +162,8 @@ class Grain:
         Whether windows are run as if nothing came back, and undone if something did.
     cut_edges : set of (source, target)
         Over which something may come back.
-    unwound : dict
-        Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
+    slow : dict
+        Where loops run scan by scan: which blocks are the reason, and why each.
     queues : dict
         Shared processors that serve a window at once, and the blocks that line up at each.
     ahead : set of str
@@ -32,7 +174,7 @@ class Grain:
     windowed: set[str]
     rewinds: bool
     cut_edges: set[tuple[str, str]]
-    unwound: dict[str, str]
+    slow: dict[str, str]
     queues: dict[str, list[str]] = field(default_factory=dict)
     ahead: set[str] = field(default_factory=set)
 
@@ -42,15 +184,65 @@ class Grain:
 
 
 def grain_of(scene: Scene, window: int | None) -> Grain:
-    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`."""
-    queued = {name for name, block in scene.blocks.items() if block.options.processor}
-    unwound = cannot_rewind(scene.classes, queued)
+    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`.
+
+    Loops run in windows: as long as an open loop's, which are undone if something came back, where
+    all blocks let themselves be rewound; else no longer than what is sent takes to come back.
+    """
     if window == 1:
-        return Grain(set(), False, set(), unwound)
-    if not unwound and in_cycles(scene.graph):
-        return Grain(
-            set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound,
-            ahead=before_loops(scene.graph),
-        )  # fmt: skip
+        return Grain(set(), False, set(), {})
+    slow: dict[str, str] = {}
+    if in_cycles(scene.graph):
+        slow, opened, every = _without_windows(scene), opened_loops(scene), set(scene.blocks)
+        # Who looks ahead of a run's end must not fail there.
+        ending = any(ends_its_run(cls) for cls in scene.classes.values())
+        ahead = before_loops(scene.graph)
+        if not slow and all(cls.rewindable for cls in scene.classes.values()):
+            return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
+        slow = slow or _hurried(scene, opened)
+        if not slow:
+            return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
-    return Grain(scene.look_ahead_blocks(), False, set(), unwound, queues)
+    return Grain(scene.look_ahead_blocks(), False, set(), slow, queues)
+
+
+# A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
+CELLS_PER_WINDOW = 131072
+
+
+def scans_of(nodes: Mapping[str, Node], time: ReplicaTime) -> float:
+    """Return how many scans of all clocks together each run has, about."""
+    return float(sum(time.run_ticks / clock.period for clock in _clocks(nodes.values())))
+
+
+def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
+    """Raise SceneError if a run has more scans than are ever simulated."""
+    if scans > MOST_SCANS:
+        message = (
+            f"is {duration_s:.4g} s, in which the clocks of this scene make "
+            f"{scans:.2g} scans: at most {MOST_SCANS:.0e} are simulated"
+        )
+        raise SceneError([scene.problem("duration_s", message)])
+
+
+def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | None) -> int:
+    """Return the ticks of a window that holds about the wanted number of scans.
+
+    Parameters
+    ----------
+    nodes : mapping
+    time : ReplicaTime
+    window : int, optional
+        Scans of all clocks together; by default, and where blocks run scan by scan anyway, as
+        many as make a window of `CELLS_PER_WINDOW`.
+    """
+    width = max(node.component.width for node in nodes.values())
+    scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
+    per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
+    if time.side_by_side and window is None:  # each of them makes these scans
+        per_tick *= time.replicas
+    return max(1, int(scans / per_tick)) if per_tick else time.end_tick
+
+
+def _clocks(nodes: Iterable[Node]) -> list[ScanClock]:
+    return [node.clock for node in nodes if node.clock is not None]

@@ -20,16 +20,36 @@ from dsa_des.block.message import Message, by_output
 from dsa_des.block.run_end import RunEnd
 from dsa_des.block.wake import Wake
 from dsa_des.errors import RunRefused
-from dsa_des.running.block_environment import BlockEnvironment
-from dsa_des.running.channel import Channel
-from dsa_des.running.demand import Demand
-from dsa_des.running.events import Bell, WakeUp
-from dsa_des.running.inputs import Inputs
+from dsa_des.running.channel import Channel, Inputs
+from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
-from dsa_des.running.run_state import RunState
 from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
 from dsa_des.time.clock import ScanClock
+from dsa_des.time.timeline import ReplicaTime
+
+
+@dataclass
+class Demand:
+    """A clocked block downstream, and how long before its scan it needs our row."""
+
+    block: str
+    clock: ScanClock
+    lead_ticks: int
+    time: ReplicaTime
+
+    def between(self, start: int, end: int) -> IntArray:
+        """Return the ticks in [start, end) at which this block needs a row."""
+        if not self.lead_ticks:
+            return self.clock.between(start, end)[1]
+        # A row that would arrive after the end of the run is not needed.
+        last = min(end + self.lead_ticks, self.time.end_tick)
+        _, ticks = self.clock.between(start + self.lead_ticks, last)
+        if self.time.span_ticks and not self.time.side_by_side:
+            # Rows from before a replica's start do not exist.
+            ticks = ticks[ticks % self.time.span_ticks >= self.lead_ticks]
+        return ticks - self.lead_ticks
+
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0

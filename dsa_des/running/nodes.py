@@ -1,7 +1,7 @@
-"""The running blocks of a simulation: each with its place in an instant, clock and processor."""
+"""From the blocks and wires of a scene to running blocks with channels between them."""
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import simpy
 
@@ -9,15 +9,18 @@ from dsa_des.block.component import Component
 from dsa_des.block.message import Message
 from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import SceneError
-from dsa_des.running.grain import Grain
-from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Node
+from dsa_des.running.events import RunState
+from dsa_des.running.grain import Edge, Grain
+from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
-from dsa_des.running.run_state import RunState
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.scene.graph import depths, queue_key
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
+from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.randomness import Streams
+from dsa_des.time.timeline import ReplicaTime
 
 
 def build_nodes(
@@ -106,3 +109,108 @@ def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Cal
     if shuffle is None:
         return lambda: by_name
     return lambda: base + shuffle.random()
+
+
+def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
+    """Lay every wire, and tell each block whose scans its rows are for.
+
+    Parameters
+    ----------
+    scene : Scene
+    nodes : mapping
+        Running blocks by name.
+    timeline : Timeline
+        Makes the channels; has been laid.
+
+    Raises
+    ------
+    SceneError
+        If a wire's delay makes no sense, or a block that runs on demand has no block to demand
+        anything.
+    """
+    for wire in scene.wires:
+        delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
+        channel = timeline.channel(wire, delay)
+        if isinstance(wire.holds, dict):
+            declared = nodes[wire.target].component.inputs[wire.input].message
+            channel.hold(declared.initial(wire.holds), 0)
+        target = nodes[wire.target]
+        target.channels.setdefault(wire.input, []).append(channel)
+        nodes[wire.source].subscribers.setdefault(wire.output, []).append(
+            (channel, target, wire.input)
+        )
+    for name, node in nodes.items():
+        node.demands = find_demands(nodes, name, timeline.time)
+        if node.on_demand and not node.demands:
+            message = "runs when blocks downstream scan, and none of them has a scan clock"
+            raise SceneError([scene.problem(f"blocks.{name}", message)])
+
+
+def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> list[Demand]:
+    """Return the first clocked blocks on every way downstream, and the delay on the way."""
+    found: dict[tuple[str, int], Demand] = {}
+    seen = {(name, 0)}
+    todo = [(name, 0)]
+    while todo:
+        block, lead = todo.pop()
+        for channel, node, _ in (
+            item for items in nodes[block].subscribers.values() for item in items
+        ):
+            reached = (node.name, lead + channel.delay_ticks)
+            if node.clock is not None:
+                found[reached] = Demand(node.name, node.clock, reached[1], time)
+            elif reached not in seen and len(seen) < 1000:
+                seen.add(reached)
+                todo.append(reached)
+    return [found[key] for key in sorted(found)]
+
+
+def lookahead_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
+    """Return how long what is sent takes at least over some edges, or None without any."""
+    return min(
+        (
+            channel.delay_ticks
+            for name, node in nodes.items()
+            for channels in node.channels.values()
+            for channel in channels
+            if (channel.source, name) in opened
+        ),
+        default=None,
+    )
+
+
+def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
+    """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
+    delays = sum(
+        channel.delay_ticks
+        for node in nodes.values()
+        for channels in node.channels.values()
+        for channel in channels
+    )
+    jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
+    if run_ticks + delays + jitter >= MAX_TICK:
+        longest_s = MAX_TICK / scene.ticks_per_s
+        message = (
+            f"the run lasts {run_ticks / scene.ticks_per_s:.4g} s and the wires take up to "
+            f"{(delays + jitter) / scene.ticks_per_s:.4g} s: this scene's ticks reach "
+            f"{longest_s:.4g} s"
+        )
+        raise SceneError([scene.problem("duration_s", message)])
+
+
+def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
+    if not wire.delay_scans:
+        return 0
+    clock = nodes[wire.target].clock or nodes[wire.source].clock
+    if clock is None:
+        message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
+        raise SceneError([scene.problem("wires", message)])
+    # Rounded down: a message must not arrive a tick after the scan it was sent for.
+    delay = wire.delay_scans * int(clock.period)
+    if delay >= MAX_TICK:
+        message = (
+            f"{wire}: {wire.delay_scans} scans take longer than this scene's ticks reach, "
+            f"{MAX_TICK / scene.ticks_per_s:.4g} s"
+        )
+        raise SceneError([scene.problem("wires", message)])
+    return delay

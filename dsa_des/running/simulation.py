@@ -23,17 +23,19 @@ from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.running.assembly import Assembly, WrapEffect
-from dsa_des.running.connections import check_reach, connect
-from dsa_des.running.effect_plan import Planned
+from dsa_des.running.effects import Planned, timing_plan
+from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.node import Abort
-from dsa_des.running.nodes import build_nodes, start_processors
+from dsa_des.running.nodes import (
+    build_nodes,
+    check_reach,
+    connect,
+    lookahead_ticks,
+    start_processors,
+)
 from dsa_des.running.processors import Processing
-from dsa_des.running.rewind import Rewinder
-from dsa_des.running.run_state import RunningBlock
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.timing_effects import timing_plan
-from dsa_des.running.window_size import longest_window, refuse_endless_work, scans_of
-from dsa_des.running.windows import Failure, Window, Windows
+from dsa_des.running.windows import Failure, Rewinder, RunningBlock, Window, Windows
 from dsa_des.scene.scene import Scene
 
 #: Up to so many scans a run that failed in a window is run again, to say at which of them.
@@ -132,8 +134,8 @@ class Simulation:
         self.failure: Failure | None = None
         self._has_run = False
         grain = self.timeline.grain(window)
-        #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
-        self.unwound = grain.unwound
+        #: Where loops run scan by scan: which blocks are the reason, and why each.
+        self.slow = grain.slow
         assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
         self.components: Mapping[str, Component] = assembly.components
         self.duration_s: Fraction = assembly.duration_s
@@ -158,7 +160,9 @@ class Simulation:
             rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace, self.ends)
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
-        self.windows: Windows = self.timeline.windows(longest, rewinder)
+        self.windows: Windows = self.timeline.windows(
+            longest, lookahead_ticks(self.nodes, grain.cut_edges), rewinder
+        )
 
     @property
     def timing_plan(self) -> list[Planned]:

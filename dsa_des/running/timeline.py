@@ -10,12 +10,17 @@ from typing import Any
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
-from dsa_des.running.channel import Channel
+from dsa_des.running.channel import Channel, WireFaults
+from dsa_des.running.effects import may_be_late
 from dsa_des.running.grain import Grain, grain_of
-from dsa_des.running.rewind import Rewinder, RewindingWindows
-from dsa_des.running.timing_effects import may_be_late
-from dsa_des.running.windows import EqualWindows, Window, Windows
-from dsa_des.running.wire_faults import WireFaults
+from dsa_des.running.windows import (
+    EqualWindows,
+    Rewinder,
+    RewindingWindows,
+    SureWindows,
+    Window,
+    Windows,
+)
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
@@ -108,18 +113,24 @@ class Timeline:
         """Return what handles the wakes of a block: itself, or what stands in for it."""
         return component
 
-    def windows(self, longest_ticks: int, rewinder: Rewinder | None) -> Windows:
+    def windows(
+        self, longest_ticks: int, lookahead_ticks: int | None, rewinder: Rewinder | None
+    ) -> Windows:
         """Return the windows of all runs.
 
         Parameters
         ----------
         longest_ticks : int
+        lookahead_ticks : int, optional
+            If feedback loops are run in windows: before so long, nothing that is sent comes back.
         rewinder : Rewinder, optional
-            If feedback loops are run in windows.
+            If windows may be undone.
         """
-        if rewinder is None:
-            return EqualWindows(self.time.end_tick, longest_ticks)
-        return RewindingWindows(self.time.end_tick, longest_ticks, rewinder)
+        if rewinder is not None:
+            return RewindingWindows(self.time.end_tick, longest_ticks, rewinder)
+        if lookahead_ticks is not None:
+            return SureWindows(self.time.end_tick, longest_ticks, lookahead_ticks)
+        return EqualWindows(self.time.end_tick, longest_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""

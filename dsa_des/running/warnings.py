@@ -1,4 +1,4 @@
-"""Warnings of blocks about their own values before a run: defaults that decide, slips."""
+"""Warnings before a run: of blocks about their own values, and of a run that will take long."""
 
 from dsa_des.record.sinks import attempt
 from dsa_des.running.simulation import Simulation
@@ -30,3 +30,14 @@ def say_warnings(warnings: list[str], word: str) -> None:
         say(f"{word}: {text}", err=True)
     if len(warnings) > MOST_WARNINGS:
         say(f"{word}: and {len(warnings) - MOST_WARNINGS} more", err=True)
+
+
+# Half a minute of the processor, for most scenes.
+_MANY_SCANS = 1e7
+
+
+def say_if_long(simulation: Simulation) -> None:
+    """Say on standard error that a run will take long, before it does."""
+    if simulation.scans > _MANY_SCANS:
+        message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
+        say(f"{message}{simulation.scans:.2g} scans", err=True)

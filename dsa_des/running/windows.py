@@ -1,15 +1,30 @@
 """Windows: what of a run is simulated at a time.
 
 A run asks its windows which one comes next, runs it, and tells them what came of it. They decide
-whether it stands or is to be run otherwise; nothing that is recorded depends on them. Some wrap
-others: what waits for the wall clock (`dsa_des.running.pacing`) works with windows of any kind.
+whether it stands or is to be run otherwise; nothing that is recorded depends on them. What waits
+for the wall clock (`dsa_des.running.pacing`) wraps windows of any kind.
+
+In a loop every way back has a delay. A window is run with its feedback wires cut: blocks see what
+had come back before the window began. If then a message turns out to arrive inside the window,
+everything from that instant on was wrong; the run goes back to the window's start and runs it
+again up to that instant, where it was right. Windows start small after such a message and double
+while nothing comes back; they are never shorter than the delay of what comes back, as within it
+nothing can.
 """
 
+from collections import deque
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
+from dsa_des.record.recording import Recorder
+from dsa_des.running.channel import Channel
+from dsa_des.time.run_ends import RunEnds
 
 
 class Window(NamedTuple):
@@ -33,6 +48,24 @@ class Failure:
     said: BlockFailure
     cause: BaseException
     ticks: IntArray
+
+
+class RunningBlock(Protocol):
+    """A block as its run sees it; `runner` is what handles its wakes."""
+
+    runner: Any
+
+    @property
+    def name(self) -> str:
+        """Its name in the scene."""
+
+    @property
+    def component(self) -> Component:
+        """The block itself."""
+
+    @property
+    def channels(self) -> Mapping[str, Sequence[Channel]]:
+        """The wires into it, by input."""
 
 
 class Windows(Protocol):
@@ -87,3 +120,181 @@ class EqualWindows:
         """Go on where a window ended."""
         self.start = window.end
         return window.end
+
+
+# At the start, and after something came back, a window has this part of its full length.
+_RESTART = 32
+_CONTAINERS = (list, dict, set, deque, np.ndarray)
+
+
+class SureWindows(EqualWindows):
+    """Windows of a loop in which nothing that is sent comes back.
+
+    Blocks before the loops run ahead of them, in windows of full length. The length is the
+    lookahead of conservative parallel simulation (Chandy and Misra, "Distributed simulation: a
+    case study in design and verification of distributed programs", IEEE Transactions on Software
+    Engineering SE-5, 1979).
+
+    Parameters
+    ----------
+    end_tick, longest_ticks
+        As for `EqualWindows`.
+    lookahead_ticks : int
+        The shortest delay over which something comes back.
+    """
+
+    def __init__(self, end_tick: int, longest_ticks: int, lookahead_ticks: int) -> None:
+        super().__init__(end_tick, longest_ticks)
+        self._lookahead = lookahead_ticks
+        self._ahead = 0  # up to when blocks before the loops have run
+
+    def next(self) -> Window | None:
+        """Return the next window, which does not reach beyond what is there of those before."""
+        if self.start >= self.end_tick:
+            return None
+        ahead = self.start
+        if self._ahead <= self.start:
+            ahead = self._ahead = self.end_after(self.longest_ticks)
+        end = self.end_after(min(self.longest_ticks, self._lookahead))
+        return Window(self.start, min(end, self._ahead), False, ahead)
+
+
+class Rewinder:
+    """Takes all blocks, wires and the record of a run back to how they were.
+
+    Parameters
+    ----------
+    nodes : collection of RunningBlock
+    cut_edges : collection of (source, target)
+        Over the wires between these blocks messages come back.
+    recorder : Recorder or None
+    trace : list or None
+    ends : RunEnds
+        What is known of when runs end.
+    """
+
+    def __init__(
+        self,
+        nodes: Collection[RunningBlock],
+        cut_edges: Collection[tuple[str, str]],
+        recorder: Recorder | None,
+        trace: list[tuple[int, str]] | None,
+        ends: RunEnds,
+    ) -> None:
+        self._recorder, self._trace = recorder, trace
+        self._things: list[Any] = [
+            thing
+            for node in nodes
+            for thing in (node.component, *node.component.context.effects.values())
+            if hasattr(thing, "__dict__")
+        ]
+        self._things.append(ends)
+        into = [(n.name, c) for n in nodes for wires in n.channels.values() for c in wires]
+        self._channels = [channel for _, channel in into]
+        self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
+
+    def mark(self) -> None:
+        """Remember how everything is now."""
+        self._states = [_copied(vars(thing)) for thing in self._things]
+        self._wires = [channel.state() for channel in self._channels]
+        self._recorded = None if self._recorder is None else self._recorder.mark()
+        self._traced = 0 if self._trace is None else len(self._trace)
+
+    def restore(self) -> None:
+        """Bring everything back to how it was at `mark`."""
+        for thing, state in zip(self._things, self._states, strict=True):
+            vars(thing).clear()
+            vars(thing).update(_copied(state))
+        for channel, wire in zip(self._channels, self._wires, strict=True):
+            channel.set_state(wire)
+        if self._recorder is not None and self._recorded is not None:
+            self._recorder.rewind(self._recorded)
+        if self._trace is not None:
+            del self._trace[self._traced :]
+
+    @property
+    def sure_ticks(self) -> int:
+        """How long a window may be in which nothing that is sent in it can come back."""
+        return min((channel.delay_ticks for channel in self._feedback), default=0)
+
+    def came_back(self) -> int | None:
+        """Return when the first message arrives that came back since `mark` or `restore`."""
+        ticks = [channel.earliest_pushed() for channel in self._feedback]
+        return min((tick for tick in ticks if tick is not None), default=None)
+
+
+class RewindingWindows(EqualWindows):
+    """Windows in which nothing came back unseen.
+
+    Parameters
+    ----------
+    end_tick, longest_ticks
+        As for `EqualWindows`.
+    rewinder : Rewinder
+    """
+
+    def __init__(self, end_tick: int, longest_ticks: int, rewinder: Rewinder) -> None:
+        super().__init__(end_tick, longest_ticks)
+        self._rewinder = rewinder
+        self._length = 0
+        self._least = rewinder.sure_ticks
+        self._came = 0  # when something came back last
+        self._right: Window | None = None  # what is right of a window that was undone
+        self._ahead = 0  # up to when blocks before the loops have run
+        self._careful = False  # whether they run no farther than the rest, after a failure
+
+    def next(self) -> Window | None:
+        """Return what was right of the last window, or a new one that may be undone."""
+        if self._right is not None or self.start >= self.end_tick:
+            return self._right
+        self._rewinder.mark()
+        length = max(self._length or self._small(), self._least)
+        end = self.end_after(min(length, self.longest_ticks))
+        ahead = end if self._careful else self.end_after(self.longest_ticks)
+        if self._ahead > self.start:
+            # A window does not reach beyond what is there of them.
+            end, ahead = min(end, self._ahead), self.start
+        return Window(self.start, end, True, ahead)
+
+    def heard(self, window: Window, failure: Failure | None) -> int | None:
+        """Undo a window inside of which a message came back."""
+        back = self._rewinder.came_back()
+        early = window.end if back is None else back
+        if failure is not None and window.ahead is not None and window.ahead > window.end:
+            # Perhaps it lies beyond the window: again, and nobody runs ahead.
+            self._rewinder.restore()
+            self._right, self._careful = None, True
+            return None
+        if self._right is None and failure is not None:
+            if early < window.end or len(failure.ticks) > 1:
+                # What failed may never have happened: look less far.
+                self._rewinder.restore()
+                middle = int(failure.ticks[len(failure.ticks) // 2])
+                self._length, self._least = max(1, min(early, middle) - self.start), 0
+                return None
+        elif self._right is None and early < window.end:
+            self._rewinder.restore()
+            self._right = Window(self.start, early, True, window.ahead)
+            return None
+        self._right, self._least = None, self._rewinder.sure_ticks
+        self._ahead = max(self._ahead, window.end if window.ahead is None else window.ahead)
+        self._careful = False
+        if back is None:
+            self._length = min(2 * (self._length or self._small()), self.longest_ticks)
+        else:  # what comes back often comes regularly; at first, or after a hurry, start small
+            length = max(1, back - self._came) if self._came else self._small()
+            self._length = min(length, self.longest_ticks)
+            self._came = back
+        return super().heard(window, failure)
+
+    def _small(self) -> int:
+        small = self.longest_ticks // _RESTART
+        return max(1, min(small, self._rewinder.sure_ticks or small))
+
+
+def _copied(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy what a block might change in place; messages and tables are never changed so."""
+    return {
+        name: value.copy() if isinstance(value, _CONTAINERS) else value
+        for name, value in state.items()
+    }

@@ -377,7 +377,7 @@ def test_which_blocks_may_look_ahead(lab):
     run = lab.run(lab.write(*MIXED, duration_s=1))
     assert run.outcome.windowed == ["a", "c", "sampled", "split"]
     assert lab.run(lab.write(*TWO_SENSORS)).outcome.windowed == sorted(TWO_SENSORS[0])
-    assert lab.run(lab.write(*FEEDBACK)).outcome.windowed == ["traffic"]
+    assert lab.run(lab.write(*FEEDBACK)).outcome.windowed == ["radar", "tracker", "traffic"]
     assert lab.run(lab.write(*TWO_SENSORS), window=1).outcome.windowed == []
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.running.effect_plan import plan, unspent
+from dsa_des.running.effects import plan, unspent
 
 
 class _Bounded(Effect):

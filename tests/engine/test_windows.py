@@ -2,7 +2,6 @@
 
 import random
 
-import engine_blocks
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -14,7 +13,7 @@ from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import EqualWindows, Window
+from dsa_des.running.windows import EqualWindows, SureWindows, Window
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.timeline import ReplicaTime
 
@@ -52,28 +51,56 @@ def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
     assert len(found) == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
 
 
-@pytest.mark.parametrize("able", [True, False])
-@pytest.mark.parametrize("back", ['"end -> sink"', FEEDBACK])
-def test_check_says_which_block_slows_a_loop(lab, monkeypatch, able, back):
-    for cls in (engine_blocks.Pulse, engine_blocks.Cued):
-        monkeypatch.setattr(cls, "rewindable", True)
-    monkeypatch.setattr(engine_blocks.Relay, "rewindable", able)
-    path = lab.write(
-        {"src": "Pulse; scan_rate_hz = 20", "cue": "Cued; scan_rate_hz = 10", "end": "Relay",
-         "sink": "Relay"},
-        ['"src -> cue.in"', '"cue -> end"', '"cue -> sink"', back][: 3 if "sink" in back else 4],
-    )  # fmt: skip
-    said = CliRunner().invoke(main, ["check", str(path)]).output
-    slowed = back == FEEDBACK and not able
-    assert ("feedback loop of cue, end runs scan by scan" in said) == slowed
-    assert ("end (" in said and "rewindable is False" in said) == slowed
+def a_loop(lab, end, back):
+    return lab.write(
+        {"src": "Pulse; scan_rate_hz = 20", "cue": "Cued; scan_rate_hz = 10", "end": end},
+        ['"src -> cue.in"', '"cue -> end"', *back],
+        duration_s=4,
+    )
+
+
+@pytest.mark.parametrize(
+    ("end", "back", "why"),
+    [
+        ("SlowRelay", [FEEDBACK], "windowed is False"),
+        ("SlowRelay", [], ""),
+        ("Relay", [FEEDBACK], ""),
+        ("Relay", [FEEDBACK.replace("1 scan", "0.03 s")], "sooner than the next scan"),
+    ],
+)
+def test_check_says_which_block_slows_a_loop(lab, end, back, why):
+    back = [text.replace('delay = "0.03 s"', "delay_s = 0.03") for text in back]
+    said = CliRunner().invoke(main, ["check", str(a_loop(lab, end, back))]).output
+    assert ("feedback loop of cue, end runs scan by scan" in said) == bool(why)
+    assert why in said and ("  end (" in said) == bool(why)
+
+
+@pytest.mark.parametrize("jitter", ["", ", jitter_s = 0.4, drop_probability = 0.2"])
+def test_a_loop_that_cannot_be_rewound_runs_in_windows_that_nothing_comes_back_in(lab, jitter):
+    path = a_loop(lab, "Relay", [FEEDBACK.replace('delay = "1 scan"', f"delay_s = 0.35{jitter}")])
+    alone = lab.run(path, window=1)
+    assert alone.outcome.windowed == []
+    for window in (None, 2, 3, 7):
+        run = lab.run(path, window=window)
+        assert run.outcome.windowed == ["cue", "end", "src"]
+        for name, table in alone.tables.items():
+            assert table.equals(run.tables[name]), (name, window)
+
+
+def test_blocks_before_a_loop_run_ahead_of_it():
+    windows, found = SureWindows(100, 40, 15), []
+    while (window := windows.next()) is not None:
+        assert windows.heard(window, None) == window.end
+        found.append((window.start, window.end, window.ahead))
+    assert found == [(0, 15, 40), (15, 30, 15), (30, 40, 30), (40, 55, 80), (55, 70, 55),
+                     (70, 80, 70), (80, 95, 100), (95, 100, 95)]  # fmt: skip
 
 
 class Wilful(Timeline):
     """One run in windows of lengths that a die throws."""
 
-    def windows(self, longest_ticks, rewinder):
-        inner = super().windows(longest_ticks, rewinder)
+    def windows(self, longest_ticks, lookahead_ticks, rewinder):
+        inner = super().windows(longest_ticks, lookahead_ticks, rewinder)
         self.made = WilfulWindows(inner)
         return self.made
 

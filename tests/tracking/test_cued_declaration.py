@@ -84,8 +84,8 @@ def test_no_cue_no_cost():
 
 def test_windows_of_a_cue_loop_are_as_long_as_its_delay(monkeypatch):
     """Nothing that is sent can come back sooner: no window is run twice but at the first cue."""
-    from dsa_des.running.rewind import Rewinder
     from dsa_des.running.simulation import Simulation
+    from dsa_des.running.windows import Rewinder
 
     done = {"mark": 0, "restore": 0}
     for name in done:
