@@ -11,8 +11,7 @@ from components.guidance.daidalus import ConfParameters, changes_out, smaller
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
-from dsa_des.block.component import Component, NonNegativeRational, Parameters
-from dsa_des.block.ports import Input, Output
+from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.wake import Wake
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}

@@ -6,9 +6,8 @@ import numpy as np
 
 from components.messages.reach import Decision, FarthestLook, Reach, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 

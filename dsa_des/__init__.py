@@ -28,9 +28,8 @@ from typing import TYPE_CHECKING, Any  # noqa: E402
 from dsa_des.record.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:
-    from dsa_des.block.component import Component, Parameters
+    from dsa_des.block.component import Component, Input, Output, Parameters
     from dsa_des.block.message import Message
-    from dsa_des.block.ports import Input, Output
     from dsa_des.errors import BlockFailure, OutputError, Problem, SceneError, UsageError
     from dsa_des.library.runs import run
     from dsa_des.library.scenes import load_scene
@@ -45,9 +44,9 @@ if TYPE_CHECKING:
 _HOMES = {
     "BlockFailure": "dsa_des.errors",
     "Component": "dsa_des.block.component",
-    "Input": "dsa_des.block.ports",
+    "Input": "dsa_des.block.component",
     "Message": "dsa_des.block.message",
-    "Output": "dsa_des.block.ports",
+    "Output": "dsa_des.block.component",
     "OutputError": "dsa_des.errors",
     "Parameters": "dsa_des.block.component",
     "Problem": "dsa_des.errors",

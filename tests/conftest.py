@@ -37,6 +37,8 @@ def keep_bytecode_elsewhere() -> None:
 if sys.dont_write_bytecode and hasattr(os, "getuid"):
     keep_bytecode_elsewhere()
 
+from lab import lab  # noqa: E402, F401 (a fixture, found by the path above)
+
 ROOT = Path(__file__).parent.parent
 
 

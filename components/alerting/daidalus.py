@@ -22,9 +22,8 @@ from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.well_clear.separation import separation
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import ClockedParameters, Component, ScenePath
+from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
 from dsa_des.block.message import offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")

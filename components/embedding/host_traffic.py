@@ -8,8 +8,7 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.messages.reach import farthest_look
 from components.messages.targets import TrafficStates
-from dsa_des.block.component import Component, Parameters
-from dsa_des.block.ports import Output
+from dsa_des.block.component import Component, Output, Parameters
 
 # A host says itself when it ends; effects that ask for the length of the run are told a year.
 _NO_END_S = Fraction(365 * 86400)

@@ -55,11 +55,11 @@ class EncounterTable:
             )
         return self.columns[name]
 
-    def place(self, row: int) -> str:
+    def row_name(self, row: int) -> str:
         """Return how a row is named in a message."""
         name = next((n for n in _NAMES if n in self.columns), None)
-        told = f"encounter {self.columns[name][row]}" if name else f"encounter {row + 1}"
-        return f"{told} (line {self.lines[row]})"
+        name_of_row = f"encounter {self.columns[name][row]}" if name else f"encounter {row + 1}"
+        return f"{name_of_row} (line {self.lines[row]})"
 
 
 def read_table(text: str) -> EncounterTable:
@@ -164,7 +164,7 @@ def kept_rows(table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool
     kept[list(found)] = False
     if found and (not skip or not kept.any()):
         rows = sorted(found)
-        lines = [f"{table.path}: {table.place(row)}: {'; '.join(found[row])}" for row in rows]
+        lines = [f"{table.path}: {table.row_name(row)}: {'; '.join(found[row])}" for row in rows]
         more = [f"and {len(rows) - _MOST} more"] if len(rows) > _MOST else []
         raise UsageError(*lines[:_MOST], *more)
     return kept
@@ -220,7 +220,7 @@ def show_risk(
             found["classes"] = {name: asdict(one) for name, one in classes.items()}
         say_json(found)
         return
-    for line in _told(whole, confidence, skipped):
+    for line in _lines(whole, confidence, skipped):
         say(line)
     if by is not None:
         _show_classes(by, classes, confidence)
@@ -270,7 +270,7 @@ def _edges(text: str) -> FloatArray:
     return bounds
 
 
-def _told(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
+def _lines(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
     low, high = found.interval
     alone = found.clusters == found.encounters
     clusters = "" if alone else f" in {found.clusters} clusters"
@@ -297,15 +297,15 @@ def _told(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
 def _show_classes(by: str, classes: dict[str, RiskRatio], confidence: float) -> None:
     rows = []
     for name, one in classes.items():
-        told = [name or "(none)", str(one.encounters), str(one.nominal_events)]
-        told.append(str(one.mitigated_events))
+        counts = [name or "(none)", str(one.encounters), str(one.nominal_events)]
+        counts.append(str(one.mitigated_events))
         if one.reason:
-            rows.append([*told, "-", "-", "-", "-", one.reason])
+            rows.append([*counts, "-", "-", "-", "-", one.reason])
             continue
         low, high = one.interval
         values = (one.ratio, one.unresolved, one.induced)
         interval = f"{low:.4g} to {high:.4g}"
-        rows.append([*told, *(f"{v:.4g}" for v in values), interval, "few" if one.few else ""])
+        rows.append([*counts, *(f"{v:.4g}" for v in values), interval, "few" if one.few else ""])
     headings = [by, "encounters", "nominal", "mitigated", "ratio", "unresolved", "induced",
                 f"{100 * confidence:g} % interval", "note"]  # fmt: skip
     print_table(console(), "", headings, rows, right=range(1, 7), below=8)

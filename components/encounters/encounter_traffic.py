@@ -192,7 +192,7 @@ class _EncounterTraffic(RecordedTraffic):
         """Return the flights of the encounter."""
         if (self.p.lat_deg is None) != (self.p.lon_deg is None):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
-        self.found, self.place = _put(type(self), self.p)
+        self.found, self.place = _encounter_of(type(self), self.p)
         own, *others = encounter_flights(self.found, self.place, self.p.dynamics)
         notes = [f"encounter {self.found.numbers[self.place]} of {len(self.found)}"]
         if self.found.skipped:
@@ -206,7 +206,7 @@ class _EncounterTraffic(RecordedTraffic):
         for p in parameters[:MOST_FLOWN]:
             # What is wrong is said by the block that asks for it.
             with suppress(ValueError):
-                wanted.setdefault(p.dynamics, []).append(_put(cls, p))
+                wanted.setdefault(p.dynamics, []).append(_encounter_of(cls, p))
         for dynamics, encounters in wanted.items():
             prepare_flights(encounters, dynamics)
 
@@ -222,11 +222,11 @@ class _EncounterTraffic(RecordedTraffic):
 
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and the encounter with its weight."""
-        told = {
+        which = {
             "number": int(self.found.numbers[self.place]),
             "weight": float(self.found.weights[self.place]),
         }
-        return {**super().report(), "encounter": told}
+        return {**super().report(), "encounter": which}
 
 
 class SetTraffic(_EncounterTraffic):
@@ -261,10 +261,10 @@ def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     if issubclass(cls, ModelTraffic):
         return _made(_model_key(parameters), parameters.encounter), 0
     found = read_set(parameters.file, parameters.skip_damaged)
-    return found, found.place(parameters.encounter)
+    return found, found.index_of(parameters.encounter)
 
 
-def _put(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
+def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter where the scene puts it, and its place there."""
     found, place = chosen_encounter(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
@@ -291,7 +291,7 @@ def _made(key: tuple[Path, Path, int], number: int) -> EncounterSet:
 def _make(key: tuple[Path, Path, int], numbers: range) -> None:
     pairs, rules = _sampler(*key).pairs(numbers, paths=False), PairingRules()
     for place, number in enumerate(numbers):
-        one = pairs if len(numbers) == 1 else pairs.some(np.array([place]))
+        one = pairs if len(numbers) == 1 else pairs.take(np.array([place]))
         made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
         _MADE[(*key, number)] = made
     while len(_MADE) > _MOST_MADE:

@@ -22,7 +22,7 @@ from components.formats.encounter_set import (
     EncounterSet,
     geometry_class,
 )
-from components.formats.set_file import is_place
+from components.formats.set_file import is_origin
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
@@ -143,7 +143,7 @@ class _Recipes:
         duration = self.number("duration_s", 120.0, 0.1, 86_400.0)
         weight = self.number("weight", 1.0, 1e-100, LARGEST_WEIGHT)
         at = self.tables.get("at", [0.0, 0.0])
-        if not is_place(at):
+        if not is_origin(at):
             self.add("at", "must be [latitude, longitude] in degrees, within ±89 and ±360")
         if self.wrong:
             raise UsageError(*self.wrong)

@@ -237,6 +237,6 @@ class EncounterModel:
         """Initial variables that change, in the file's order."""
         return tuple(sorted(self.targets.values()))
 
-    def place(self, label: str) -> int | None:
+    def index_of(self, label: str) -> int | None:
         """Return which initial variable has this name; None where the model has none."""
         return self.labels.index(label) if label in self.labels else None

@@ -17,7 +17,7 @@ from components.encounters.pairing import PairSampler, set_of_pairs
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
 from components.formats.public_formats import SET
-from components.formats.set_file import is_place, set_writer, streamed
+from components.formats.set_file import is_origin, set_writer, streamed
 from dsa_des.arrays.types import AnyArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import foreseen
@@ -166,7 +166,7 @@ def generate_set(
     out: str,
 ) -> None:
     """Write a set of paired encounters, or of those that a table describes."""
-    check_place(at)
+    check_origin(at)
     if made is not None:
         if model is not None or intruder_model is not None or count is not None:
             raise UsageError("--made says all of its encounters: no --model and no --count with it")
@@ -247,9 +247,9 @@ def _write_made(made: str, out: str) -> None:
     say(f"{path}: {len(found)} encounters of {recipe.duration_s:g} s")
 
 
-def check_place(at: tuple[float, float]) -> None:
+def check_origin(at: tuple[float, float]) -> None:
     """Raise UsageError unless a latitude and a longitude are usable as the origin of a set."""
-    if not is_place(at):
+    if not is_origin(at):
         raise UsageError(
             f"--at {at[0]} {at[1]}: latitude must lie within ±89, longitude within ±360 degrees"
         )

@@ -77,7 +77,7 @@ class Pairs:
     turn_rad_s: FloatArray
     acceleration_ft_s2: FloatArray
 
-    def some(self, rows: IntArray) -> "Pairs":
+    def take(self, rows: IntArray) -> "Pairs":
         """Return some of them, in this order."""
         return Pairs(**{name: values.take(rows, axis=-1) for name, values in vars(self).items()})
 
@@ -126,7 +126,7 @@ class PairSampler:
             if pairs is not None:
                 # Of several that are accepted the first attempt counts.
                 fresh, first = np.unique(rows[done], return_index=True)
-                parts.append((pairs if paths else pairs.at_start()).some(kept[first]))
+                parts.append((pairs if paths else pairs.at_start()).take(kept[first]))
                 left = np.setdiff1d(left, fresh, assume_unique=True)
             if len(left) and attempt[left].max() > _MOST_ATTEMPTS:
                 raise TrackError(
@@ -134,7 +134,7 @@ class PairSampler:
                     "do not meet"
                 )
         together = _together(parts)
-        return together.some(np.argsort(together.numbers))
+        return together.take(np.argsort(together.numbers))
 
     def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
         """Return which proposals may be accepted by their first second alone.
@@ -174,7 +174,7 @@ class PairSampler:
         # Whoever breaks a rule alone is not flown with the other.
         own = self._flight(0, numbers, attempts)
         rows = own.flies.nonzero()[0]
-        own, narrow, bound = own.some(rows), narrow[rows], bound[rows]
+        own, narrow, bound = own.take(rows), narrow[rows], bound[rows]
         other = self._flight(1, numbers[rows], attempts[rows])
         both = own, other
         drawn = self._draws.few(numbers[rows], _COURSES_FROM, attempts[rows])
@@ -202,7 +202,7 @@ class PairSampler:
             done = done[self._rules[k].inside(summed(altitude[k, done], climb))]
         if not len(done):
             return done, done, None
-        commands = [f.commands.some(done) for f in both]
+        commands = [f.commands.take(done) for f in both]
         for k, c in enumerate(commands):
             c.altitude_ft[:] = altitude[k, done]
         rows = rows[done]
@@ -296,8 +296,8 @@ class _Flight:
     low_ft: FloatArray
     high_ft: FloatArray
 
-    def some(self, rows: IntArray) -> "_Flight":
-        commands = self.commands.some(rows)
+    def take(self, rows: IntArray) -> "_Flight":
+        commands = self.commands.take(rows)
         return _Flight(commands, self.flies[rows], self.low_ft[rows], self.high_ft[rows])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.encounters.encounter_tables import kept_rows, numbers, read_table
-from components.encounters.model_commands import check_place
+from components.encounters.model_commands import check_origin
 from components.encounters.splitting import expected_copies, nearness, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
 from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
@@ -33,7 +33,7 @@ def convert_sets(
 ) -> None:
     """Write what is in some files as one set, or as a file of waypoints."""
     if at is not None:
-        check_place(at)
+        check_origin(at)
     path = named(out)
     if path.suffix.lower() not in (SET, *WAYPOINTS):
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")

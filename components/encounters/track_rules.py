@@ -63,7 +63,7 @@ class Commands:
     climb_ft_s: FloatArray
     turn_rad_s: FloatArray
 
-    def some(self, rows: IntArray) -> "Commands":
+    def take(self, rows: IntArray) -> "Commands":
         """Return those of some tracks."""
         return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
@@ -84,7 +84,7 @@ class TrackRules:
     def __init__(self, model: EncounterModel) -> None:
         self.model = model
         for label in _FLOWN:
-            if model.place(label) is None:
+            if model.index_of(label) is None:
                 raise TrackError(
                     f"the model has no variable {label!r}{did_you_mean(label, model.labels)}: its "
                     "tracks cannot be flown (--raw writes what it gives)"
@@ -100,7 +100,9 @@ class TrackRules:
                 )
             edges = np.array(LAYERS_FT[: bins.size + 1])
         self._edges_ft = edges
-        self._given = [p for p in map(model.place, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None]
+        self._given = [
+            p for p in map(model.index_of, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None
+        ]
         self._speed_ft_s, climbs = (
             self._limits(label) * factor
             for label, factor in ((SPEED, FT_S_PER_KT), (CLIMB, 1.0 / 60.0))
@@ -110,7 +112,7 @@ class TrackRules:
             self._speed_ft_s[0] = np.maximum(self._speed_ft_s[0], _SLOWEST_FIXED_WING_FT_S)
 
     def _at(self, label: str) -> int:
-        place = self.model.place(label)
+        place = self.model.index_of(label)
         assert place is not None
         return place
 

@@ -86,12 +86,12 @@ class OwnFlights:
         if not steered.any():
             return self._flights.each(ownship, time_s)
         which = self._part[ownship[steered], part[steered] - 1]
-        told = self._parts.state(which, time_s[steered])
+        steered_state = self._parts.state(which, time_s[steered])
         if steered.all():
-            return told
+            return steered_state
         own = self._flights.each(ownship[~steered], time_s[~steered])
         columns = []
-        for alone, after in zip(own.arrays(), told.arrays(), strict=True):
+        for alone, after in zip(own.arrays(), steered_state.arrays(), strict=True):
             column = np.empty(len(ownship), dtype=alone.dtype)
             column[~steered], column[steered] = alone, after
             columns.append(column)
@@ -105,7 +105,7 @@ class OwnFlights:
         begun = self._start_s[ownship] <= time_s[:, np.newaxis]
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
-    def steer(self, ownship: IntArray, time_s: FloatArray, told: Sequence[Manoeuvre]) -> None:
+    def steer(self, ownship: IntArray, time_s: FloatArray, manoeuvres: Sequence[Manoeuvre]) -> None:
         """Let ownships (each once) fly manoeuvres from times on, none before an earlier one."""
         around = self.each(
             np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
@@ -114,7 +114,7 @@ class OwnFlights:
             self._flown[self._part[own, self.count[own] - 1]] if self.count[own] else None
             for own in ownship.tolist()
         ]
-        new = flown_from("ownship", around, time_s, told, before)
+        new = flown_from("ownship", around, time_s, manoeuvres, before)
         table = LegTable(new)
         self._parts = table if self._parts is None else LegTable.joined(self._parts, table)
         if int(self.count[ownship].max()) + 1 >= self._start_s.shape[1]:

@@ -43,7 +43,7 @@ Pieces = tuple[tuple[float, float, float], ...]
 
 
 class SteeredFlight:
-    """A flight up to its first manoeuvre, then what it is told: turns, climbs, speeds together.
+    """A flight up to its first manoeuvre, then its manoeuvres: turns, climbs, speeds together.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
     climb. The flight's own script ends with the first one.
@@ -67,15 +67,15 @@ class SteeredFlight:
         part = np.searchsorted([start for start, _ in self.parts], time_s, side="right")
         return np.asarray(np.maximum.accumulate(speeds)[part])
 
-    def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
-        """Return the flight that does as it is told from a time on, beside what it still does.
+    def steered(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
+        """Return the flight with a manoeuvre from a time on, beside what it still does.
 
         A turn or a change of altitude begins and ends at once, without a change of speed along the
         path's projection and without acceleration upward; speeds change steadily.
         """
         around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
         before = self.parts[-1][1] if self.parts else None
-        (part,) = flown_from(self.name, around, np.array([time_s]), [told], [before])
+        (part,) = flown_from(self.name, around, np.array([time_s]), [manoeuvre], [before])
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -129,32 +129,34 @@ class SteeringPlan(NamedTuple):
             speeds=_left(self.speeds, elapsed_s),
         )
 
-    def told(self, told: Manoeuvre, alt_m: float) -> SteeringPlan:
-        """Return it with the parts that are told anew, from an altitude; the others stay."""
+    def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float) -> SteeringPlan:
+        """Return it with the parts that a manoeuvre changes, from an altitude; the others stay."""
         plan = self
-        if told.turn_rad != 0.0:
-            rate_deg_s = math.copysign(math.degrees(told.rate_rad_s), told.turn_rad)
-            angle_rad = math.radians(math.degrees(abs(told.turn_rad)))
+        if manoeuvre.turn_rad != 0.0:
+            rate_deg_s = math.copysign(math.degrees(manoeuvre.rate_rad_s), manoeuvre.turn_rad)
+            angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
             plan = plan._replace(
                 turns=((angle_rad / abs(math.radians(rate_deg_s)), rate_deg_s, 0.0),)
             )
-        if told.vertical_speed_mps != 0.0:
+        if manoeuvre.vertical_speed_mps != 0.0:
             climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
-                climbs=_ramp(climb_mps, told.vertical_speed_mps, told.vertical_acceleration_mps2),
-                climb_mps=climb_mps + told.vertical_speed_mps,
+                climbs=_ramp(
+                    climb_mps, manoeuvre.vertical_speed_mps, manoeuvre.vertical_acceleration_mps2
+                ),
+                climb_mps=climb_mps + manoeuvre.vertical_speed_mps,
             )
-        elif told.climb_m != 0.0:
-            rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
-            rise_s = (alt_m + told.climb_m - alt_m) / rate_mps
+        elif manoeuvre.climb_m != 0.0:
+            rate_mps = math.copysign(manoeuvre.climb_rate_mps, manoeuvre.climb_m)
+            rise_s = (alt_m + manoeuvre.climb_m - alt_m) / rate_mps
             plan = plan._replace(
                 climbs=((rise_s, rate_mps, 0.0),) if rise_s > 0.0 else (), climb_mps=0.0
             )
-        if told.speed_mps != 0.0:
+        if manoeuvre.speed_mps != 0.0:
             speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
-            change = max(told.speed_mps, -speed_mps)
+            change = max(manoeuvre.speed_mps, -speed_mps)
             plan = plan._replace(
-                speeds=_ramp(speed_mps, change, told.acceleration_mps2),
+                speeds=_ramp(speed_mps, change, manoeuvre.acceleration_mps2),
                 speed_mps=speed_mps + change,
             )
         return plan
@@ -205,7 +207,7 @@ def flown_from(
     name: str,
     around: TrajectoryState,
     time_s: FloatArray,
-    told: Sequence[Manoeuvre],
+    manoeuvres: Sequence[Manoeuvre],
     before: Sequence[SteeredPart | None],
 ) -> list[SteeredPart]:
     """Return what aircraft fly from a manoeuvre on.
@@ -218,7 +220,7 @@ def flown_from(
     ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     north, east, _ = line_of_sight_ned(*middle, *ends)
     found = []
-    rows = zip(time_s.tolist(), told, before, strict=True)
+    rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
         place = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
@@ -232,14 +234,16 @@ def flown_from(
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             plan = earlier.plan.after(at_s - earlier.start_time_s)
-        found.append(_flown_from(name, place, heading_deg, at_s, plan.told(manoeuvre, here)))
+        found.append(
+            _flown_from(name, place, heading_deg, at_s, plan.with_manoeuvre(manoeuvre, here))
+        )
     return found
 
 
-def _own_climb(climb_mps: float, told: Manoeuvre) -> float:
+def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     """Return the climb that is left of a flight's own: a turn or a climb ends it."""
-    ends = told.turn_rad != 0.0 or told.climb_m != 0.0
-    return 0.0 if ends and told.vertical_speed_mps == 0.0 else climb_mps
+    ends = manoeuvre.turn_rad != 0.0 or manoeuvre.climb_m != 0.0
+    return 0.0 if ends and manoeuvre.vertical_speed_mps == 0.0 else climb_mps
 
 
 # A study's metrics fly again what its runs flew.

@@ -75,7 +75,7 @@ class EncounterSet:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def place(self, number: int) -> int:
+    def index_of(self, number: int) -> int:
         """Return where an encounter stands."""
         at = int(np.searchsorted(self.numbers, number))
         if at < len(self) and self.numbers[at] == number:

@@ -77,12 +77,12 @@ def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int,
     encounters: list[list[tuple[str, Track]]] = []
     damaged: dict[int, str] = {}
     for k in range(count):
-        told = f"encounter {k}"
-        starts = [take("<3d", told) for _ in range(aircraft)]
+        where = f"encounter {k}"
+        starts = [take("<3d", where) for _ in range(aircraft)]
         encounter = []
         for n, start in enumerate(starts):
-            (updates,) = (int(v) for v in take("<H", told))
-            values = take(f"<{4 * updates}d", told)
+            (updates,) = (int(v) for v in take("<H", where))
+            values = take(f"<{4 * updates}d", where)
             rows = np.array([(0.0, *start), *np.reshape(values, (-1, 4)).tolist()])
             if updates and rows[1, 0] == 0.0:  # the start is there twice
                 rows = rows[1:]

@@ -61,7 +61,7 @@ _LARGEST = {
 }  # fmt: skip
 
 
-def is_place(value: object) -> bool:
+def is_origin(value: object) -> bool:
     """Return whether a value is [latitude, longitude] of a usable origin, in degrees."""
     return (
         isinstance(value, list | tuple)
@@ -265,7 +265,7 @@ class _SetReader:
         if not isinstance(meta, dict):
             raise self.fail("its metadata must be a table (a JSON object)")
         reference = meta.get("reference_deg", [0.0, 0.0])
-        if not is_place(reference):
+        if not is_origin(reference):
             raise self.fail(
                 f"its metadata: reference_deg = {shown_value(reference)}: must be [latitude, "
                 "longitude] in degrees, within ±89 and ±360"

@@ -105,7 +105,7 @@ def _in_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
     return time_s, north, east, alt_ft * FOOT_M
 
 
-def _whole(file: bytes) -> None:
+def _refuse_cut_off(file: bytes) -> None:
     """Refuse a file of level 5 whose elements are cut off: SciPy reads on beyond their ends."""
     order = {b"IM": "<", b"MI": ">"}.get(file[126:128])
     start = 128
@@ -130,7 +130,7 @@ def read_track_matrices(path: Path) -> Tracks:
 
     try:
         file = read_input_bytes(path)
-        _whole(file)
+        _refuse_cut_off(file)
         content = loadmat(io.BytesIO(file))
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None

@@ -16,10 +16,9 @@ from components.navigation.errors import navigation_errs
 from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Message, offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.

@@ -15,9 +15,8 @@ from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from components.messages.alerts import BAND_KINDS, BAND_REGIONS, AlertLevels, GuidanceBands
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component, Parameters, ScenePath
+from dsa_des.block.component import Component, Input, Output, Parameters, ScenePath
 from dsa_des.block.message import offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 

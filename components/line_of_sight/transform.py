@@ -21,10 +21,9 @@ from components.sensor.ladder_values import (
     wrapped_apart_mrad,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 _MRAD_PER_DEG = 1e3 * np.pi / 180.0

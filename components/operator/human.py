@@ -13,9 +13,8 @@ from pydantic import Field
 from components.messages.alerts import AlertLevels, contact_name
 from components.messages.decisions import CLIMB, TURN, Decisions, OperatorDecision
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from dsa_des.block.component import ClockedParameters, Component, PositiveRational
+from dsa_des.block.component import ClockedParameters, Component, Input, Output, PositiveRational
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 #: Largest commands, and those below which there is nothing to fly.

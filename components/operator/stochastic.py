@@ -16,8 +16,7 @@ from components.guidance.daidalus import ConfParameters, changes_out
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import Component
-from dsa_des.block.ports import Input, Output
+from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
 from dsa_des.time.timeline import first_scan
 

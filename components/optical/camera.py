@@ -29,7 +29,7 @@ from components.optical.detector import (
 )
 from components.optical.signature import DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import Visibility
-from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
+from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import GlintParameters, SensorParameters
 from components.sensor.sensor import Sensor
@@ -342,7 +342,7 @@ class Camera(Sensor):
 
     def warnings(self) -> list[str]:
         """Say which cues change nothing, and whose areas were made for another silhouette."""
-        said = [*super().warnings(), *said_of_cues(self)]
+        said = [*super().warnings(), *cue_warnings(self)]
         for roster in known_targets(self.context) if self.areas else ():
             said += fitted_otherwise(roster, self.areas, self.p.silhouette)
         return said

@@ -201,7 +201,7 @@ class ClutterAlarms(Effect):
         return GroundReports(block)
 
 
-class _CellsOf:
+class _CellsWithoutTarget:
     """Cells without a target as effects on the SNR ask for them."""
 
     def __init__(
@@ -343,7 +343,7 @@ class GroundReports:
             alt_m = own_alt_m + range_m * np.sin(elevation_rad)
             if not echo.diffuse:
                 alt_m = np.full(len(range_m), self._terrain.height_m)
-            cells: Any = _CellsOf(range_m, own_alt_m, elevation_rad, alt_m)
+            cells: Any = _CellsWithoutTarget(range_m, own_alt_m, elevation_rad, alt_m)
             cnr = self._block.echo_snr(cells, echo(cells))
             if echo.diffuse:
                 diffuse = diffuse + cnr

@@ -147,7 +147,7 @@ def _limited(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
     return variance
 
 
-def heard(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
+def signal_over_clutter(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
     """Return what a look's errors follow from: a pulse's signal over noise and clutter.
 
     It is the SNR that the decision rested on and that is recorded: the mean one of a fluctuating
@@ -261,7 +261,7 @@ class Strength:
         mean = look.signal["snr"][found]
         with np.errstate(divide="ignore", invalid="ignore"):
             floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][found]) / mean, 1.0)
-        heard = floor if block.p.clutter_threshold == "noise" else np.ones(len(found))
+        floor = floor if block.p.clutter_threshold == "noise" else np.ones(len(found))
         snr = np.empty(len(found))
         for crossing, part in block.crossings_of(cells, found):
             for model, chosen in block.models_in_use(cells):
@@ -269,11 +269,11 @@ class Strength:
                 output = 1.0 + measured_snr(
                     tail[some],
                     mean[some],
-                    threshold=crossing.threshold / heard[some],
+                    threshold=crossing.threshold / floor[some],
                     pulses=crossing.pulses,
                     model=f"swerling{model}",
                 )
-                snr[some] = np.maximum(output * heard[some] - 1.0, 0.0)
+                snr[some] = np.maximum(output * floor[some] - 1.0, 0.0)
         snr_db, confidence = extras["snr_db"].copy(), look.confidence.copy()
         snr_db[found] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
         confidence[found] = snr_db[found] - block.false_alarm_zero_db()

@@ -33,8 +33,8 @@ from components.radar.weather import (
     WEATHER_EFFECTS,
     BlindRange,
     CellFactor,
-    deaf_to_weather,
-    said_of_rain,
+    rain_warnings,
+    weather_without_carrier,
 )
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, Look
@@ -367,8 +367,8 @@ class RangeBoundary(Radar):
         return [
             *super().warnings(),
             *clutter_as_signal(self.p, terrain_of(self)),
-            *deaf_to_weather(self),
-            *said_of_rain(self),
+            *weather_without_carrier(self),
+            *rain_warnings(self),
         ]
 
     def look(self, cells: Cells) -> Look:
@@ -380,12 +380,12 @@ class RangeBoundary(Radar):
         through = np.ones(len(cells))
         for factor in self.snr_factors:
             through = through * factor(cells)
-        heard = through > 0.0
-        lossy = bool((through[heard] != 1.0).any())
+        audible = through > 0.0
+        lossy = bool((through[audible] != 1.0).any())
         if lossy or self._echoes or not (self._cfar is self.doppler is None):
-            margin_db = self._margin_db(cells, margin_db, np.where(heard, through, 1.0))
+            margin_db = self._margin_db(cells, margin_db, np.where(audible, through, 1.0))
             detected = margin_db >= 0.0
-        detected &= heard
+        detected &= audible
         # Of equal targets the nearer one has the stronger echo.
         detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
         return Look(detected, margin_db)

@@ -231,7 +231,7 @@ class RainEcho(Echo):
 
 
 class SidelobeClutter(Effect):
-    """Ground and rain at the target's range all around, heard through the sidelobes.
+    """Ground and rain at the target's range all around, received through the sidelobes.
 
     All sidelobes have one mean level (``sidelobe_level_db``), towards the ground below as well:
     the altitude line is in it. Flown over, they have range rates of every direction, so that a

@@ -146,14 +146,14 @@ class ResolutionParameters(SensorParameters):
     )
 
     @property
-    def tells_cells_apart(self) -> bool:
+    def reports_by_cell(self) -> bool:
         """Whether targets of one resolution cell are one report."""
         if self.resolution_cells is None:
-            return self.errors != "grid" and not self.without_size
+            return self.errors != "grid" and not self.sizeless_steps
         return self.resolution_cells
 
     @property
-    def without_size(self) -> list[str]:
+    def sizeless_steps(self) -> list[str]:
         """Grid steps of 0 that no beamwidth stands for: such a cell has no size."""
         return [
             step
@@ -174,7 +174,7 @@ class ResolutionParameters(SensorParameters):
     def _cells_have_a_size(self) -> Self:
         Disagreements.refuse(
             f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
-            for step in (self.without_size if self.resolution_cells else ())
+            for step in (self.sizeless_steps if self.resolution_cells else ())
         )
         return self
 
@@ -243,12 +243,10 @@ class OneReportByCell(Effect):
         """Ask for ``resolution_cells``."""
         p = block.p
         if p.resolution_cells is None and p.errors != "grid":
-            if p.without_size:
-                return Verdict(False, f"{p.without_size[0]} is 0: a cell has no size")
+            if p.sizeless_steps:
+                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
             return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
-        return Verdict(
-            p.tells_cells_apart, f"resolution_cells is {str(p.tells_cells_apart).lower()}"
-        )
+        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
 
     def build(self, block: Any) -> Merging:
         """Return what adds up the echoes of each cell."""

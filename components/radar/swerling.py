@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.ladder import ExactDetection, picked_method
+from components.radar.detection.ladder import ExactDetection, method_reasons
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
-from components.radar.measurement import heard, noise_at_targets
+from components.radar.measurement import noise_at_targets, signal_over_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
     Fading,
@@ -183,7 +183,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def left_out(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
         said = [*super().left_out(), *noise_at_targets(self.p)]
-        return said if self.p.model is None else [*said, *picked_method(self, self._method)]
+        return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def range_slack(self) -> float:
         """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.
@@ -221,7 +221,9 @@ class SwerlingRadar(LinkBudgetRadar):
         noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
         tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
-        return Look(echo & (draw < pd), confidence, extras, heard(snr, cnr), noise, tail)
+        return Look(
+            echo & (draw < pd), confidence, extras, signal_over_clutter(snr, cnr), noise, tail
+        )
 
     def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.

@@ -33,7 +33,7 @@ from components.radar.ground_clutter import (
     terrain_of,
 )
 from components.radar.link_budget import implausible
-from components.radar.measurement import MeasuredStrength, heard, signal_variances
+from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
     budget_report,
@@ -45,8 +45,8 @@ from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.rcs import AspectRcs, constant_rcs_m2, mean_rcs_m2
 from components.radar.resolution import OneReportByCell, cells_of_radar
 from components.radar.timing import TimeBudget, time_report
-from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, said_of_rain
-from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
+from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
+from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect
@@ -291,12 +291,12 @@ class LinkBudgetRadar(Radar):
             *super().warnings(),
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
-            *said_of_cues(self),
+            *cue_warnings(self),
             *self._said_of_calibration(),
             *self._said_of_false_alarms(),
             *clutter_as_signal(self.p, terrain_of(self)),
             *beam_against_gain(self.p),
-            *said_of_rain(self),
+            *rain_warnings(self),
             *gas_left_out(self),
         ]
 
@@ -394,7 +394,9 @@ class ThresholdRadar(LinkBudgetRadar):
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
-        return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db}, heard(snr, cnr))
+        return Look(
+            echo & (margin >= 0.0), margin, {"snr_db": snr_db}, signal_over_clutter(snr, cnr)
+        )
 
     def _threshold_of(self, cells: Cells) -> Any:
         """Return the threshold in dB: one for all, or each cell's own where some are cued."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -55,6 +55,17 @@ class Attenuation(Effect):
     """Loss along the slant path, evaluated once per run into a table over altitude."""
 
     acts_on = "SNR"
+    #: Of the scene's ``[weather]``, that says whether there is any.
+    key: ClassVar[str]
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask the scene's ``[weather]``, and whether the radar's carrier is known."""
+        value = getattr(block.context.sections["weather"], self.key)
+        if value and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
+        text = str(value).lower() if isinstance(value, bool) else f"{value:g}"
+        bound = self.bound(block) if value > 0 else {}
+        return Verdict(value > 0, f"[weather] {self.key} is {text}", bound)
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return the arguments of the table for this effect and no other."""
@@ -109,7 +120,7 @@ def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
     return 1.1 * float(max(level.max(), slanted.max()))
 
 
-def deaf_to_weather(block: Any) -> list[str]:
+def weather_without_carrier(block: Any) -> list[str]:
     """Say that weather does nothing to a radar whose carrier is not known."""
     weather = block.context.sections.get("weather")
     if weather is None or block.wavelength_m is not None or not block.p.enabled:
@@ -127,22 +138,15 @@ class Gas(Attenuation):
     """Oxygen and water vapour (ITU-R P.676-12, reference atmosphere P.835-6)."""
 
     name = "gas attenuation"
+    key = "gas"
     lockstep = True
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] gas``."""
-        if block.context.sections["weather"].gas:
-            if block.wavelength_m is None:
-                return Verdict(False, _NO_CARRIER)
-            return Verdict(True, "[weather] gas is true", self.bound(block))
-        return Verdict(False, "[weather] gas is false")
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return gas only; with no gas called for, a table without it."""
         return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
 
 
-def said_of_rain(block: Any) -> list[str]:
+def rain_warnings(block: Any) -> list[str]:
     """Say where rain has no echo, or where its echo is taken for more than it is."""
     weather = block.context.sections.get("weather")
     if weather is None or not weather.rain_rate_mm_h or not block.p.enabled:
@@ -197,15 +201,8 @@ class Rain(Attenuation):
     """Rain below its upper edge (ITU-R P.838-3)."""
 
     name = "rain"
+    key = "rain_rate_mm_h"
     lockstep = True
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] rain_rate_mm_h``."""
-        rate = block.context.sections["weather"].rain_rate_mm_h
-        if rate and block.wavelength_m is None:
-            return Verdict(False, _NO_CARRIER)
-        because = f"[weather] rain_rate_mm_h is {rate:g}"
-        return Verdict(rate > 0, because, self.bound(block) if rate > 0 else {})
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return rain only."""
@@ -221,15 +218,8 @@ class Fog(Attenuation):
     """Fog and cloud between two altitudes (ITU-R P.840-8)."""
 
     name = "fog"
+    key = "fog_water_g_m3"
     lockstep = True
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] fog_water_g_m3``."""
-        water = block.context.sections["weather"].fog_water_g_m3
-        if water and block.wavelength_m is None:
-            return Verdict(False, _NO_CARRIER)
-        because = f"[weather] fog_water_g_m3 is {water:g}"
-        return Verdict(water > 0, because, self.bound(block) if water > 0 else {})
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return fog only."""

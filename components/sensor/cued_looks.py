@@ -12,8 +12,8 @@ from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
 from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Input
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.block.ports import Input
 from dsa_des.block.wake import Wake
 
 #: The input over which they come.
@@ -146,7 +146,7 @@ def refuse_cues(block: Any) -> None:
         )
 
 
-def said_of_cues(block: Any) -> list[str]:
+def cue_warnings(block: Any) -> list[str]:
     """Warn of a wire of cues that changes nothing, and of parameters that no cue ever uses."""
     given = [
         name

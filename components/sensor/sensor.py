@@ -33,9 +33,9 @@ from components.sensor.measuring import Measuring
 from components.sensor.mounting import Mounting
 from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect
 from dsa_des.block.message import Message, offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 # Up to so many targets, counting row by row is mostly the overhead of rows.

@@ -19,11 +19,10 @@ from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.message import offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.source_file import absolute
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of

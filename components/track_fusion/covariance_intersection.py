@@ -29,9 +29,8 @@ from components.track_fusion.local_tracks import (
 )
 from components.track_fusion.track_association import MatchRules, matched, without_strays
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 # Fused tracks by number: as many as are compared.

@@ -13,9 +13,8 @@ from components.messages.cues import CueCones
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component, NonNegativeRational, Parameters
+from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")

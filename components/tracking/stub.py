@@ -12,9 +12,8 @@ from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
-from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 _HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "measured_tick")

@@ -37,8 +37,7 @@ from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
 from components.tracking.track_store import ReplicaRecords, TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component
-from dsa_des.block.ports import Input, Output
+from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
 
 #: Bits of a mask of sensors.

@@ -31,9 +31,9 @@ from components.messages.known_flights import flat
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
+from components.traffic.steered_ownship import arrived_manoeuvres
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.replica_runs import ReplicaRuns
-from dsa_des.block.wake import Wake
+from dsa_des.block.wake import ReplicaRuns, Wake
 
 
 class RowFlights:
@@ -139,9 +139,6 @@ class AskedFlights(RowFlights):
         return found
 
 
-_TOLD = Manoeuvre._fields
-
-
 @dataclass(frozen=True)
 class AllFlown:
     """The flights of all replicas: an ownship each, and the targets of all one after the other."""
@@ -180,7 +177,7 @@ class FlownTogether:
         self._intervals: NearIntervals | None = None
         self._epochs: _Epochs | None = None
         #: Manoeuvres that have come and are not flown by any row yet, with their ticks.
-        self._told: list[tuple[int, Manoeuvre]] = []
+        self._pending: list[tuple[int, Manoeuvre]] = []
         look = farthest_look(consumer.request for consumer in face.context.consumers)
         culls = not face.context.simulate_everything and face.clock_of(face.p) is None
         self._lasts_s = look.lasts_s
@@ -266,12 +263,10 @@ class FlownTogether:
 
     def _steer(self, wake: Wake, replica: IntArray) -> IntArray:
         """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
-        for new in wake.arrivals("manoeuvres"):
-            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
-            self._told += zip(new.tick.tolist(), manoeuvres, strict=True)
+        self._pending += arrived_manoeuvres(wake)
         known: IntArray = self._own.count[replica]
-        if self._told:
-            now, self._told = self._due(wake)
+        if self._pending:
+            now, self._pending = self._due(wake)
             while now:  # the first of every ownship, then the second ones
                 first: dict[int, tuple[int, Manoeuvre]] = {}
                 later = []
@@ -281,7 +276,7 @@ class FlownTogether:
                 ownship = np.array(list(first), dtype=np.int64)
                 ticks = np.array([tick for tick, _ in first.values()], dtype=np.int64)
                 at_s = (ticks % wake.span_ticks) / self._ticks_per_s
-                self._own.steer(ownship, at_s, [told for _, told in first.values()])
+                self._own.steer(ownship, at_s, [manoeuvre for _, manoeuvre in first.values()])
                 if self._epochs is not None:
                     self._epochs.forget(ownship)
                 known = known + _later(replica, wake.ticks, ownship, ticks)
@@ -290,13 +285,13 @@ class FlownTogether:
 
     def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
         """Part what has come into what rows of this wake fly, and what is for later ones."""
-        ticks = np.array([tick for tick, _ in self._told], dtype=np.int64)
+        ticks = np.array([tick for tick, _ in self._pending], dtype=np.int64)
         end = (ticks // wake.span_ticks + 1) * wake.span_ticks
         last = wake.ticks[np.maximum(np.searchsorted(wake.ticks, end) - 1, 0)]
         # The last row of the same ownship; that of another one is earlier than anything of it.
         due = (last >= ticks) & (last < end)
-        now = [one for one, is_due in zip(self._told, due.tolist(), strict=True) if is_due]
-        later = [one for one, is_due in zip(self._told, due.tolist(), strict=True) if not is_due]
+        now = [one for one, is_due in zip(self._pending, due.tolist(), strict=True) if is_due]
+        later = [one for one, is_due in zip(self._pending, due.tolist(), strict=True) if not is_due]
         return sorted(now, key=lambda one: one[0]), later
 
 

@@ -196,7 +196,11 @@ class ScriptedTraffic(TrafficSource):
         places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         ownships = flights_of(_starts(own, places, None))
-        targets = flights_of(_starts(crafts, _known(crafts, references), None)) if crafts else []
+        targets = (
+            flights_of(_starts(crafts, _start_positions(crafts, references), None))
+            if crafts
+            else []
+        )
         fleets = ScriptedFleet(ownships), ScriptedFleet(targets)
         return AllFlown.of(fleets, (ownships, targets), roster)
 
@@ -245,13 +249,15 @@ def _intruders(
     crafts: Sequence[Intruder], reference: tuple[float, float, float], wind: Wind | None
 ) -> Sequence[ScriptedTrajectory]:
     """Return the flights of all intruders; starts given as offsets are converted together."""
-    known = _known(crafts, np.tile(np.array(reference), (len(crafts), 1)))
+    known = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
     if crafts and not any(craft.legs for craft in crafts):
         return flights_of(_starts(crafts, known, wind))
     return [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
 
 
-def _known(crafts: Sequence[Intruder], references: FloatArray) -> list[tuple[float, float, float]]:
+def _start_positions(
+    crafts: Sequence[Intruder], references: FloatArray
+) -> list[tuple[float, float, float]]:
     """Return where intruders start, each with its offset from a reference (n, 3) of its own."""
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []

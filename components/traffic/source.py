@@ -37,11 +37,9 @@ from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_together import FlownTogether, flown_by
 from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import Parameters, PositiveRational
+from dsa_des.block.component import Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Output
-from dsa_des.block.replica_runs import ReplicaRuns
-from dsa_des.block.wake import Wake
+from dsa_des.block.wake import ReplicaRuns, Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 

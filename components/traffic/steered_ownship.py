@@ -14,8 +14,7 @@ from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.steering import Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Context
-from dsa_des.block.ports import Input
+from dsa_des.block.component import Component, Context, Input
 from dsa_des.block.wake import Wake
 
 #: The truth is recorded without being asked for where aircraft times seconds, of all runs that are
@@ -62,7 +61,17 @@ class TrueFlights:
         return own, others
 
 
-_TOLD = Manoeuvre._fields
+def arrived_manoeuvres(wake: Wake) -> list[tuple[int, Manoeuvre]]:
+    """Return the manoeuvres that have come since the last wake, with their ticks."""
+    return [
+        one
+        for new in wake.arrivals("manoeuvres")
+        for one in zip(
+            new.tick.tolist(),
+            map(Manoeuvre, *(getattr(new.message, name).tolist() for name in Manoeuvre._fields)),
+            strict=True,
+        )
+    ]
 
 
 class SteeredOwnship(Component):
@@ -99,7 +108,7 @@ class SteeredOwnship(Component):
         self._flights_now: Flights = partial(self.flights, self.own)
         self._truth_now = self._true_flights()
         #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
-        self._told: list[tuple[int, Manoeuvre]] = []
+        self._pending: list[tuple[int, Manoeuvre]] = []
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
@@ -143,16 +152,14 @@ class SteeredOwnship(Component):
         A row knows the manoeuvres that have come by its own instant, whatever came later in this
         wake; None stands for what no block asks for.
         """
-        for new in wake.arrivals("manoeuvres"):
-            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
-            self._told = [*self._told, *zip(new.tick.tolist(), manoeuvres, strict=True)]
+        pending = [*self._pending, *arrived_manoeuvres(wake)]
         last = int(wake.ticks[-1])
         # What comes after the last row is for the next wake: what is flown at the end of a run
         # must not depend on how far a window reached beyond it.
-        told = [one for one in self._told if one[0] <= last]
-        self._told = self._told[len(told) :]
+        due = [one for one in pending if one[0] <= last]
+        self._pending = pending[len(due) :]
         known, true = [self._flights_now], [self._truth_now]
-        for tick, manoeuvre in told:
+        for tick, manoeuvre in due:
             assert isinstance(self.own, SteeredFlight)
             self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
             known.append(partial(self.flights, self.own))
@@ -161,7 +168,7 @@ class SteeredOwnship(Component):
         if not self.flights_asked_for and self._truth_now is None:
             return None, None
         # A manoeuvre has come before anything runs at its instant.
-        came = np.array([tick for tick, _ in told], dtype=np.int64)
+        came = np.array([tick for tick, _ in due], dtype=np.int64)
         of_row = np.searchsorted(came, wake.ticks, side="right")
         return (
             KnownFlights(known, of_row) if self.flights_asked_for else None,

@@ -1,9 +1,4 @@
-"""The base class of blocks: declared ports and parameters, and the work done at a wake.
-
-A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
-scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a
-`dsa_des.block.wake.Wake`; rows of its messages are scans, so the same array code serves both.
-"""
+"""Typed inputs and outputs of a block."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,14 +17,62 @@ from dsa_des.block.parameters import Rational as Rational
 from dsa_des.block.parameters import ScenePath as ScenePath
 from dsa_des.block.parameters import SourcedText as SourcedText
 from dsa_des.block.parameters import as_written as as_written
-from dsa_des.block.ports import Input, Output
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Stream, Streams
 
 if TYPE_CHECKING:
-    from dsa_des.block.replica_runs import ReplicaRuns, Runner
-    from dsa_des.block.wake import Wake
+    from dsa_des.block.wake import ReplicaRuns, Runner, Wake
+
+
+Mode = Literal["sampled", "queued", "trigger"]
+
+
+@dataclass(frozen=True)
+class Input:
+    """One input of a block.
+
+    Parameters
+    ----------
+    message : type of Message
+        What may arrive; a subclass is accepted too.
+    mode : {"sampled", "queued", "trigger"}
+        ``sampled`` holds the last message, ``queued`` keeps all that came since the block's last
+        run, ``trigger`` also makes the block run when a message arrives.
+    doc : str
+        One sentence for ``dsa-des components``.
+    required : bool
+        Whether a scene must connect it. A block does not run before every required sampled or
+        trigger input with a single writer holds a first message.
+    many : bool
+        Whether several writers may be connected; they are seen in the order of their names.
+    """
+
+    message: type[Message]
+    mode: Mode = "sampled"
+    doc: str = ""
+    required: bool = True
+    many: bool = False
+
+    @property
+    def held(self) -> bool:
+        """Whether the block sees the last message, rather than all that came since its last run."""
+        return self.mode != "queued" and not self.many
+
+
+@dataclass(frozen=True)
+class Output:
+    """One output of a block.
+
+    Parameters
+    ----------
+    message : type of Message
+    doc : str
+        One sentence for ``dsa-des components``.
+    """
+
+    message: type[Message]
+    doc: str = ""
 
 
 @dataclass(frozen=True)

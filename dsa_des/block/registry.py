@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import ClassText
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import (
     NotAllowed,
@@ -18,7 +18,6 @@ from dsa_des.block.foreign import (
 )
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input, Output
 from dsa_des.errors import did_you_mean
 
 SECTIONS = "dsa_des.sections"

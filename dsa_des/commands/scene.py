@@ -13,9 +13,8 @@ from dsa_des.files.output_folder import OutputFolder
 from dsa_des.running.effects import Planned
 from dsa_des.running.pacing import Pacer, parse_factor
 from dsa_des.running.recorded_run import record_run
-from dsa_des.running.reports import load_reports
+from dsa_des.running.reports import load_reports, say_if_long, say_warnings, warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import say_if_long, say_warnings, warnings_of
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene, load_scene

@@ -14,7 +14,7 @@ from typing import Any
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
-from dsa_des.block.replica_runs import ReplicaRuns, Runner
+from dsa_des.block.wake import ReplicaRuns, Runner
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock

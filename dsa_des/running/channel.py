@@ -15,8 +15,8 @@ import numpy as np
 
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Input
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream

@@ -20,9 +20,8 @@ from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, attempt
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import PacedWindows, Pacer
-from dsa_des.running.reports import draw_all, load_reports
+from dsa_des.running.reports import draw_all, load_reports, say_if_long, say_warnings, warnings_of
 from dsa_des.running.simulation import Outcome, Simulation
-from dsa_des.running.warnings import say_if_long, say_warnings, warnings_of
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say

@@ -1,8 +1,4 @@
-"""Plug-ins that summarise, print and draw a run; the engine itself knows no sensor.
-
-They are found by the entry-point group ``dsa_des.reports``; each is a class with the methods of
-`Report`, called without arguments.
-"""
+"""Warnings before a run: of blocks about their own values, and of a run that will take long."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,9 +8,51 @@ from typing import TYPE_CHECKING, Any, Protocol
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.record.sinks import Observer, attempt
+from dsa_des.running.simulation import Simulation
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import shortened
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
+
+
+MOST_WARNINGS = 20
+_LONGEST = 500
+
+
+def warnings_of(simulation: Simulation) -> list[str]:
+    """Return what the blocks of a scene that is set up warn of, each with its block's name.
+
+    Keys that change nothing come before what a block itself has to say.
+    """
+    found: list[str] = []
+    for name, section in simulation.scene.sections.items():
+        found += [f"{name}: {text}" for text in section.without_effect()]
+    for name, component in simulation.components.items():
+        found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
+        for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
+            found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+    return found
+
+
+def say_warnings(warnings: list[str], word: str) -> None:
+    """Print warnings on standard error, after a word such as ``note``."""
+    for text in warnings[:MOST_WARNINGS]:
+        say(f"{word}: {text}", err=True)
+    if len(warnings) > MOST_WARNINGS:
+        say(f"{word}: and {len(warnings) - MOST_WARNINGS} more", err=True)
+
+
+# Half a minute of the processor, for most scenes.
+_MANY_SCANS = 1e7
+
+
+def say_if_long(simulation: Simulation) -> None:
+    """Say on standard error that a run will take long, before it does."""
+    if simulation.scans > _MANY_SCANS:
+        message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
+        say(f"{message}{simulation.scans:.2g} scans", err=True)
+
 
 REPORTS = "dsa_des.reports"
 

@@ -14,8 +14,8 @@ from wired import Row, chain, decided, run, sensor
 
 import dsa_des
 from components.formats.set_file import read_set
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 50.0}
 WARM = {"front_m2": 3.0, "back_m2": 9.0, "side_m2": 8.0, "horizontal_m2": 30.0}

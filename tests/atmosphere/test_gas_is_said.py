@@ -7,8 +7,8 @@ from wired import HEARS_ALL, chain
 
 from components.atmosphere.attenuation import gas_specific_attenuation
 from dsa_des.library.scenes import load_scene
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 
 def said(weather, **keys):

@@ -10,8 +10,8 @@ from wired import SENSORS, chain
 
 import dsa_des
 from dsa_des.embed import Simulator
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 AREAS = {"front_m2": 4.0, "side_m2": 0.0, "horizontal_m2": 0.0}
 WARM = {**AREAS, "back_m2": 4.0}

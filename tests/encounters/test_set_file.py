@@ -103,7 +103,7 @@ def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
     assert [flight.name for flight in encounter_flights(found, 1, "euler")] == ["own", "b", "c"]
     assert found.path(0)[0].tolist() == [0.0, 1.0, 2.5]
     with pytest.raises(NoSuchEncounter, match="there is no encounter 4; it holds 2, numbered from"):
-        found.place(4)
+        found.index_of(4)
 
 
 @pytest.mark.parametrize(

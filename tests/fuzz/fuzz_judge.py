@@ -162,9 +162,8 @@ def _simulate(argv: list[str]) -> None:
         from dsa_des.files.toml_files import to_toml
         from dsa_des.record.recording import Recorder
         from dsa_des.record.sinks import MemorySink, ObserverSink
-        from dsa_des.running.reports import load_reports
+        from dsa_des.running.reports import load_reports, say_if_long
         from dsa_des.running.simulation import Simulation
-        from dsa_des.running.warnings import say_if_long
         from dsa_des.text.plain_json import json_text
 
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]

@@ -8,8 +8,7 @@ import pytest
 from components.radar.swerling import SwerlingRadar
 from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
-from dsa_des.block.component import Component
-from dsa_des.block.ports import Input
+from dsa_des.block.component import Component, Input
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.scene.scene import load_scene
 

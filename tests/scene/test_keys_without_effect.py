@@ -6,8 +6,8 @@ from wired import HEARS_ALL, chain, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 STATED = {"errors": "stated", "azimuth_error_deg": 1.0}
 FADING = {"type": "radar.swerling", "power_w": 1e9, "threshold_db": None}

@@ -174,7 +174,7 @@ def closed_form(block: Any) -> bool:
     return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
 
 
-def picked_method(block: Any, method: str) -> list[str]:
+def method_reasons(block: Any, method: str) -> list[str]:
     """Say why a radar with ``model = "auto"`` computes Pd exactly or by a table."""
     allowed = block.context.sections["accuracy"].detection_probability
     if method == "table":

@@ -10,8 +10,8 @@ from scipy.special import chndtr
 from wired import Row, chain, decided, run
 
 import dsa_des
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 PFA = 1e-3
 OWN = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400, "heading_deg": 217, "roll_deg": -27}

@@ -15,8 +15,8 @@ from wired import chain, decided, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 CELL = {
     "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 6.0, "range_resolution_m": 40.0,

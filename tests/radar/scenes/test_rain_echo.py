@@ -14,8 +14,8 @@ from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 RATE_MM_H, FREQUENCY_HZ, PFA = 25.0, 9.4e9, 1e-6
 AZIMUTH_DEG, ELEVATION_DEG, DEPTH_M = 6.0, 4.0, 90.0

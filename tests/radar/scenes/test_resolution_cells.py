@@ -16,8 +16,8 @@ import dsa_des
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 CELL = {
     "azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 3.0, "range_resolution_m": 120.0,

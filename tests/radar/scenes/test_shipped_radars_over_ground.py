@@ -9,8 +9,8 @@ import pytest
 from wired import chain, rows, run
 
 import dsa_des
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 #: Where a block says that it is a radar; scenes that extend these have the same.

@@ -9,8 +9,8 @@ from components.messages.detections import LastingError, SensorOffer
 from components.optical.sensors import OpticalRangeBoundary
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 FIRST_COMMAND = ["blocks.fusion.type='fusion.pass_through'", "blocks.tracker.type='tracking.ekf'"]
 

@@ -7,8 +7,8 @@ from wired import chain, rows, run
 
 import dsa_des
 from components.display.terminal import outcome_lines
+from dsa_des.running.reports import warnings_of
 from dsa_des.running.simulation import Simulation
-from dsa_des.running.warnings import warnings_of
 
 STATED = {"errors": "stated", "quantised": False, "azimuth_error_deg": 0.3,
           "elevation_error_deg": 0.4}  # fmt: skip

@@ -1,7 +1,5 @@
 """Scenes of small test blocks, written to a temporary folder and run."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,14 +12,6 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 _NAME = "engine_blocks"
-if _NAME not in sys.modules:
-    # Scenes name these blocks as a stranger's: module:Class, with the module importable.
-    _spec = importlib.util.spec_from_file_location(_NAME, Path(__file__).with_name(f"{_NAME}.py"))
-    assert _spec is not None and _spec.loader is not None
-    _module = importlib.util.module_from_spec(_spec)
-    sys.modules[_NAME] = _module
-    _spec.loader.exec_module(_module)
-
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 

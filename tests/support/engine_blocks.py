@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from dsa_des.block.component import ClockedParameters, Component, Parameters
+from dsa_des.block.component import ClockedParameters, Component, Input, Output, Parameters
 from dsa_des.block.message import PER_ROW, Message, column, per_entry, static
-from dsa_des.block.ports import Input, Output
 
 
 @dataclass(eq=False)

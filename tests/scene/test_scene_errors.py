@@ -7,7 +7,7 @@ import pytest
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 
-MODULE = Path(__file__).parent / "engine_blocks.py"
+MODULE = Path(__file__).parents[1] / "support" / "engine_blocks.py"
 PULSE = "Pulse; scan_rate_hz = 5"
 CHAIN = {"a": PULSE, "b": "Relay", "c": "Relay"}
 WIRES = ['"a -> b -> c"']

@@ -10,8 +10,8 @@ from engine_blocks import Beat, Pulse
 from components.messages.detections import EXTRAS, Detections
 from components.radar.threshold_radar import ThresholdRadar
 from components.sensor.look import Look
+from dsa_des.block.component import Output
 from dsa_des.block.message import Column, columns
-from dsa_des.block.ports import Output
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink

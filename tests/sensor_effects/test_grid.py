@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.grid import round_to_grid
+from components.sensor.grid import Grid, round_to_grid
 
 sizes = st.floats(-1e9, 1e9)
 steps = st.floats(1e-6, 1e6)
@@ -124,3 +124,23 @@ def test_broadcasts_value_step_and_limits():
 def test_bad_input_is_named(call, says):
     with pytest.raises(ValueError, match=says):
         round_to_grid(**call)
+
+
+GRID_STEPS = st.sampled_from([0.0, math.radians(1.0), 6.25e-4, 76.2, 0.1, 1e-9])
+GRID_VALUES = st.lists(
+    st.floats(-1e300, 1e300) | st.integers(-9, 9).map(float) | st.floats(-4, 4), max_size=9
+)
+
+
+@settings(derandomize=True, max_examples=200)
+@given(values=GRID_VALUES, step=GRID_STEPS, half=st.booleans())
+def test_a_prepared_grid_rounds_like_the_function(values, step, half):
+    array = np.array(values, dtype=np.float64)
+    if half and step:
+        array = np.concatenate([array, (np.arange(-6, 6) + 0.5) * step])
+    assert np.array_equal(Grid(step).round(array), round_to_grid(array, step))
+    limits = {"limit_low": -1.9198621771937625, "limit_high": 1.9198621771937625}
+    if step < 1.0:
+        got = Grid(step, **limits).round(array)
+        assert np.array_equal(got, round_to_grid(array, step, **limits))
+        assert not np.signbit(got[got == 0.0]).any()
