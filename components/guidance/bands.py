@@ -6,11 +6,12 @@ the end is written state by state.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from components.alert_configuration.configuration import REGIONS, Configuration
+from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
 from components.guidance.intervals import (
     FULL_TURN,
     Band,
@@ -23,6 +24,7 @@ from components.guidance.kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
+from components.well_clear.detection import Bounds, some_bounds
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
@@ -121,6 +123,51 @@ class Guidance(NamedTuple):
         return self.recovery is not None and self.recovery.time_s >= 0.0
 
 
+@dataclass(frozen=True)
+class GuidedIntruder:
+    """One intruder as guidance sees it.
+
+    Parameters
+    ----------
+    state : State
+        In the ownship's plane.
+    alerter : Alerter
+    early_level : int
+        The level whose early alerting time counts; 0 for none.
+    bounds : Bounds of (), optional
+        How far the relative state may be wrong.
+    """
+
+    state: State
+    alerter: Alerter
+    early_level: int = 0
+    bounds: Bounds | None = None
+
+
+def guidance(
+    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruder]
+) -> Guidance:
+    """Return the bands of one kind at one instant, without memory.
+
+    Parameters
+    ----------
+    kind_name : {"hdir", "hs", "vs", "alt"}
+    configuration : Configuration
+    own : State
+    intruders : list of GuidedIntruder
+    """
+    alone = [
+        GuidedIntruders(
+            _one(i.state),
+            i.alerter,
+            np.array([i.early_level]),
+            bounds=None if i.bounds is None else some_bounds(i.bounds, np.newaxis),
+        )
+        for i in intruders
+    ]
+    return guidance_of_many(kind_name, configuration, _one(own), alone)[0]
+
+
 def guidance_of_many(
     kind_name: str,
     configuration: Configuration,
@@ -146,6 +193,10 @@ def guidance_of_many(
         part = [intruder.rows(rows) for intruder in intruders]
         made += _guidance_of(kind_name, configuration, own.rows(rows), part)
     return made
+
+
+def _one(state: State) -> State:
+    return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
 def _guidance_of(

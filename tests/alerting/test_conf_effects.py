@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from one_state import GuidedIntruder, guidance
 
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.alert_tables import alert_table, bands_table
 from components.alerting.command import alert
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
+from components.guidance.bands import GuidedIntruder, guidance
 from components.guidance.situation import State
 from components.well_clear.tcas import recovery_sizes_m
 from tests.alerting.reference_data import reference_text, rows

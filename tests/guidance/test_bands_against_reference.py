@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from one_state import GuidedIntruder, guidance
 
 from components.alert_configuration.conf_file import read_conf
 from components.formats.daa_file import read_daa_samples
 from components.geometry import east_north_m, east_north_mps
-from components.guidance.bands import guidance_of_many, resolution
+from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many, resolution
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from tests.alerting.reference_data import reference_file

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from one_state import GuidedIntruder, guidance
 
 from components.alert_configuration.conf_file import read_conf
-from components.guidance.bands import guidance_of_many
+from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from tests.alerting.conf_text import CONF
