@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
-PRINTERS = {"dsa_des/terminal/terminal.py"}
+PRINTERS = {"dsa_des/terminal/terminal.py", "dsa_des/terminal/safe_console.py"}
 FIGURES = {"dsa_des/record/drawing.py"}
 FILES = sorted(
     path.relative_to(ROOT).as_posix()
