@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from tests.encounters.test_risk_of_a_set import SCENE, table
 
 from components.encounters.splitting import nearness
 from components.formats.set_file import read_set
 from dsa_des.cli import main
+from tests.encounters.scenes.test_risk_of_a_set import SCENE, table
 from tests.encounters.test_set_file import call
 
 

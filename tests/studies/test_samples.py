@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studies.encounter_folder import rows_of, write_encounter, write_scene, write_study
 
 from dsa_des.studies.draws import identity, member_seed
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.study_file import read_study
+from tests.support.encounter_folder import rows_of, write_encounter, write_scene, write_study
 
 
 @pytest.fixture

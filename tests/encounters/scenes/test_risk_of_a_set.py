@@ -8,11 +8,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
-from tests.encounters.test_closed_loop_risk import SCENE
 
 import dsa_des
 from dsa_des.cli import main
 from dsa_des.results.ratio import paired_ratio
+from tests.encounters.scenes.test_closed_loop_risk import SCENE
 
 STUDY = """\
 scene = "scene.toml"
