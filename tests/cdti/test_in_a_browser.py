@@ -87,11 +87,16 @@ def closest_m(run):
     )  # fmt: skip
 
 
-def above_own_m(run, track, time_s):
-    """How far a track was above the ownship, by its last row before an instant."""
+def above_own_ft(run, track, time_s):
+    """How far a track was above the ownship, by its rows of the two seconds before an instant.
+
+    At eight times real time a page that is drawn a quarter of a second late is two behind.
+    """
     rows = pq.read_table(run / "state_tracks.parquet").to_pylist()
     known = [row for row in rows if row["track"] == track - TRACKS and row["time_s"] <= time_s]
-    return known[-1]["own_down_m"] - known[-1]["down_m"]
+    last_s = known[-1]["time_s"]
+    recent = [row for row in known if row["time_s"] >= last_s - 2.0]
+    return [(row["own_down_m"] - row["down_m"]) / 0.3048 for row in recent]
 
 
 @pytest.mark.parametrize(
@@ -133,14 +138,15 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     screen.close(session.authority)
     session.ended()
     rows = pq.read_table(session.out / "decisions.parquet").to_pylist()
-    assert [row["decision"] for row in rows[:3]] == ["shown", judged, "turn"]
-    assert {row["decision"] for row in rows[3:]} <= {"shown"}  # an alert that came again
-    assert math.degrees(rows[2]["turn_rad"]) == pytest.approx(by_deg) == turn["value"]
-    assert rows[0]["response_s"] < rows[1]["response_s"] <= rows[2]["response_s"]
+    answers = [row for row in rows if row["decision"] != "shown"]  # an alert may come again
+    assert rows[0]["decision"] == "shown"
+    assert [row["decision"] for row in answers] == [judged, "turn"]
+    assert math.degrees(answers[1]["turn_rad"]) == pytest.approx(by_deg) == turn["value"]
+    assert rows[0]["time_s"] < answers[0]["time_s"] <= answers[1]["time_s"]
     assert (closest_m(session.out) > KEPT_M) == kept
     # When the page saw the alert is chance: what it wrote there is the track's height of then.
-    above_ft = above_own_m(session.out, track, seen_s) / 0.3048
-    assert 100 * int(symbol["tag"]) == pytest.approx(above_ft, abs=50 + 10)
+    shown_ft, above_ft = 100 * int(symbol["tag"]), above_own_ft(session.out, track, seen_s)
+    assert any(shown_ft == pytest.approx(one, abs=50 + 10) for one in above_ft)
     dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=tmp_path / "again")
     for table in session.out.glob("*.parquet"):
         assert (tmp_path / "again" / table.name).read_bytes() == table.read_bytes(), table.name
