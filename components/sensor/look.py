@@ -170,8 +170,9 @@ class Cells:
         Returns
         -------
         dict of (n,) arrays
-            Fields of `RelativeTargets` by name, and the ownship's pose as ``own_lat_deg`` and so
-            on. ``present`` says whether both aircraft are there then.
+            Fields of `RelativeTargets` by name, the ownship's pose as ``own_lat_deg`` and so on,
+            and the target's place as ``target_lat_deg`` and so on. ``present`` says whether both
+            aircraft are there then.
 
         Raises
         ------
@@ -199,6 +200,13 @@ class Cells:
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""
         return getattr(self._targets, name).take(self._flat // self._width)
+
+    def own_belief(self, name: str) -> FloatArray:
+        """Return what the ownship believes of itself, for each cell; see `RelativeTargets`."""
+        believed = self._targets.believed
+        if believed is None:
+            raise ValueError("a block on the way does not say what the ownship believes of itself")
+        return np.asarray(believed[name].take(self._flat // self._width))
 
     @cached_property
     def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
