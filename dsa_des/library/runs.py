@@ -17,7 +17,7 @@ from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
 from dsa_des.running.recorded_run import info_of, record_run, summary_of
-from dsa_des.running.reports import Report, draw_all, load_reports
+from dsa_des.running.reports import Report, draw_all, load_reports, notes_of_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
@@ -77,6 +77,7 @@ def _in_memory(
     tables = MemorySink()
     recorder = Recorder([tables])
     simulation = Simulation(scene, recorder=recorder, simulate_everything=simulate_everything)
+    noted = notes_of_scene(simulation)
     reports = load_reports()
     notes: list[str] = []
     observers = ObserverSink(
@@ -88,8 +89,8 @@ def _in_memory(
     summary = summary_of(observers, outcome, None, notes)
     text = to_toml(scene.resolved())
     info = info_of(simulation, recorder, outcome, summary, text, time.perf_counter() - started)
-    if notes:
-        info["notes"] = notes
+    if noted or notes:
+        info["notes"] = [*noted, *notes]
     said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
     arrow = said.on(tables.tables())
     return Run(None, info, arrow, text, lambda: _drawn(reports, simulation, arrow, summary))

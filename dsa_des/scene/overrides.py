@@ -5,6 +5,7 @@ name, its wires and the parameters the new type knows, and lists those it droppe
 """
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -43,17 +44,33 @@ def parse_value(text: str) -> Any:
     return _sourced(value["value"] if set(value) == {"value"} else text)
 
 
-def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
-    """Apply one ``--set`` to the scene's tables and return what is wrong with it."""
-    parsed = parse_assignment(assignment, "--set")
-    if isinstance(parsed, Problem):
-        return [parsed]
-    text, written = parsed
-    try:
-        value = parse_value(written)
-    except TomlError as error:
-        return [Problem(COMMAND_LINE, text, str(error))]
-    return set_value(scene, text, value, COMMAND_LINE)
+def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
+    """Return the keys and values of all ``--set``, and what is wrong with how they are written."""
+    found: dict[str, Any] = {}
+    problems: list[Problem] = []
+    for assignment in assignments:
+        parsed = parse_assignment(assignment, "--set")
+        if isinstance(parsed, Problem):
+            problems.append(parsed)
+            continue
+        text, written = parsed
+        try:
+            value = parse_value(written)
+        except TomlError as error:
+            problems.append(Problem(COMMAND_LINE, text, str(error)))
+            continue
+        if text in found:
+            problems.append(Problem(COMMAND_LINE, text, "--set gives it twice", written))
+        found[text] = value
+    return list(found.items()), problems
+
+
+def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
+    """Apply all ``--set`` to the scene's tables and return what is wrong with them."""
+    found, problems = read_sets(assignments)
+    for text, value in found:
+        problems += set_value(scene, text, value, COMMAND_LINE)
+    return problems
 
 
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:

@@ -26,7 +26,7 @@ from dsa_des.files.input_files import (
 from dsa_des.files.toml_files import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
 from dsa_des.scene.keys import Key, dotted
-from dsa_des.scene.shipped_files import files_named
+from dsa_des.scene.shipped_files import files_named, shipped_files
 from dsa_des.text.safe_text import shortened
 
 COMMAND_LINE = "command line"
@@ -151,7 +151,7 @@ class _Reader:
             message += f"at most {_LONGEST_CHAIN} are read"
         elif isinstance(tables, NoSuchFile):
             what = f"there is no file {name}" if chain else "there is no such file"
-            message = what + _similar_file(path)
+            message = what + _similar_file(path, shipped=bool(chain))
         elif is_folder(path):
             message = f"{name} is a folder; a TOML file is needed"
         else:
@@ -242,15 +242,21 @@ def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     return Inheritance({}, []).merge(base, over, ())
 
 
-def _similar_file(path: Path) -> str:
+def _similar_file(path: Path, shipped: bool) -> str:
+    """Return which file was meant: one beside, or else a shipped one where that would do."""
     from dsa_des.errors import nearest
 
+    missing, names = "", []
     try:
         names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
     except OSError:
-        return f" (there is no folder {shortened(str(path.parent), 300)})"
-    close = nearest(path.name, names)
-    return f"; did you mean {path.parent / close}?" if close else ""
+        missing = f" (there is no folder {shortened(str(path.parent), 300)})"
+    if close := nearest(path.name, names):
+        return f"; did you mean {path.parent / close}?"
+    known = [name for place, _ in shipped_files() for name in (place.name, str(place))]
+    if shipped and (close := nearest(path.name.removesuffix(".toml"), known)):
+        return f"; did you mean the shipped {close!r}?"
+    return missing
 
 
 __all__ = [
