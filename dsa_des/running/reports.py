@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
+from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, attempt
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -67,9 +68,6 @@ def say_if_long(simulation: Simulation) -> None:
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
         say(f"{message}{simulation.scans:.2g} scans", err=True)
-
-
-REPORTS = "dsa_des.reports"
 
 
 @dataclass(frozen=True)
