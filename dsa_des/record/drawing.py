@@ -67,12 +67,12 @@ def _save(
 
 
 @cache
-def _picture_class() -> Any:
+def _figure_class() -> Any:
     """Return the class of figures: matplotlib's own, with its name and its PNG once it is drawn."""
     import matplotlib
     from matplotlib.figure import Figure
 
-    class Picture(Figure):
+    class DrawnFigure(Figure):
         """A matplotlib figure that a notebook shows and `save` writes as .png, .svg or .pdf."""
 
         name, png = "", b""
@@ -91,7 +91,7 @@ def _picture_class() -> Any:
                 self.savefig(content, format=kind, metadata=date)
             return content.getvalue()
 
-    return Picture
+    return DrawnFigure
 
 
 _kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=None)
@@ -149,7 +149,7 @@ def drawing(
                 "text.parse_math": False,  # a dollar sign in a name is a dollar sign
             }
         )
-        figure = _picture_class()(figsize=(width_in, height_in), dpi=dpi)
+        figure = _figure_class()(figsize=(width_in, height_in), dpi=dpi)
         canvas = FigureCanvasAgg(figure)
         yield figure
         _make_plain(figure)

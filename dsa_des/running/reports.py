@@ -33,12 +33,10 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     for name, section in scene.sections.items():
         found += [f"{name}: {text}" for text in section.without_effect()]
     for name, component in simulation.components.items():
-        said = component.p.without_effect()
+        found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
-            said.append(shortened(str(text), _LONGEST))
-        known = tuple(scene.blocks[name].options.acknowledged)
-        found += [f"blocks.{name}: {text}" for text in said if not text.startswith(known)]
-    return found
+            found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+    return _unacknowledged(scene, found)
 
 
 def notes_of_loading(scene: Scene) -> list[str]:
@@ -48,7 +46,17 @@ def notes_of_loading(scene: Scene) -> list[str]:
         block, _, parameter = key.rpartition(".")
         dropped.setdefault(block, []).append(parameter)
     swapped = [f"{block}: the swap dropped {', '.join(keys)}" for block, keys in dropped.items()]
-    return [*swapped, *scene.notes]
+    return _unacknowledged(scene, [*swapped, *scene.notes])
+
+
+def _unacknowledged(scene: Scene, notes: list[str]) -> list[str]:
+    """Return notes without those that the blocks they are about acknowledge."""
+    known = tuple(
+        f"blocks.{name}: {text}"
+        for name, block in scene.blocks.items()
+        for text in block.options.acknowledged
+    )
+    return [text for text in notes if not text.startswith(known)]
 
 
 def say_notes(notes: Sequence[str]) -> None:

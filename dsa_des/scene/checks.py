@@ -290,6 +290,13 @@ def read_blocks(
             continue
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
+        for place, lost in scene_file.replaced.items():
+            if place[:2] == key:
+                notes.append(
+                    f"blocks.{name}: {dotted(place[2:])} of {scene_file.source_of(place)} takes the "
+                    f"place of the whole list, {', '.join(lost)} too; a table [{dotted(place)}.NAME] "
+                    "changes one item or adds one"
+                )
         extra, given = split_options(table, cls.Parameters)
         given = _as_written(scene_file, key, given, cls.Parameters)
         try:
