@@ -54,7 +54,7 @@ def test_a_result_prints_in_a_few_lines(simulator):
     lines = repr(result).splitlines()
     assert len(lines) == 10
     assert lines[0].startswith("EncounterResult at 0.2 s, scans: ") and "radar" in lines[0]
-    azimuth, elevation, range_m = result["near"].polar
+    azimuth, _, range_m = result["near"].polar
     assert lines[1].startswith(f"  near: azimuth {math.degrees(azimuth):.2f}°, elevation ")
     assert f"range {range_m:,.1f} m, by " in lines[1] and lines[2] == "  far0: not detected"
     assert lines[-1] == f"  ... {21 + len(result.false_alarms) - 8} more"

@@ -55,7 +55,7 @@ def test_scenes_runs_and_studies_show_as_html(scene: dsa_des.Scene, run: dsa_des
 def test_a_scene_is_set_by_texts_as_the_command_line_has_them(scene: dsa_des.Scene):
     changed = scene.set("blocks.radar.scan_rate_hz=2", "seed=9")
     assert changed.seed == 9 and changed.blocks["radar"].parameters.scan_rate_hz == 2
-    with pytest.raises(dsa_des.SceneError, match="scene.set: seed = '3': --set gives it twice"):
+    with pytest.raises(dsa_des.SceneError, match=r"scene.set: seed = '3': --set gives it twice"):
         scene.set("seed=2", "seed=3")
     with pytest.raises(dsa_des.SceneError, match="must have the form KEY=VALUE"):
         scene.set("seed")
@@ -65,5 +65,5 @@ def test_a_scene_is_set_to_a_table_that_extends_a_file(scene: dsa_des.Scene):
     table = {"extends": "sensors/oasys_specification.toml", "scan_rate_hz": 3}
     changed = scene.set({"blocks.radar": table}).blocks["radar"].parameters
     assert (changed.calibrate.range_km, changed.scan_rate_hz) == (5.6, 3)
-    with pytest.raises(dsa_des.SceneError, match="sensors/oasis.toml"):
+    with pytest.raises(dsa_des.SceneError, match=r"sensors/oasis\.toml"):
         scene.set({"blocks.radar": {"extends": "sensors/oasis.toml"}})
