@@ -158,6 +158,13 @@ class Cells:
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
 
+    @cached_property
+    def state_ns(self) -> IntArray:
+        """When the aircraft were where each cell has them, in ns of its run; see `instant_ns`."""
+        if self._targets.state_tick is None:
+            return self.instant_ns
+        return nanosecond_of(self._own(self.of_row("state_tick")), self._ticks_per_s)
+
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
         """Return what is seen of some cells a little before or after they are looked at.
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,8 +15,6 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
-from components.sensor.parameters import SensorParameters
-from components.sensor.sensor import Sensor
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import (
     OwnBelief,
@@ -27,52 +24,26 @@ from components.surveillance.believed_line import (
     variances_in_body,
 )
 from components.surveillance.broadcast import Broadcasts, Sent, Who
+from components.surveillance.cooperative import (
+    PLACE,
+    STEP_S,
+    CooperativeParameters,
+    CooperativeSensor,
+    velocity_of,
+)
 from components.surveillance.extended_squitter import FOOT_M, KNOT_M_S
 from components.surveillance.reception import LAWS
-from components.surveillance.reports import CooperativeReports, unreported
+from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component, Output
+from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.mark import Mark
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.timeline import first_scan
 
-#: Half of the time between positions that a velocity is of; a power of two.
-_STEP_S = 1.0 / 64.0
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
-_PLACE = ("lat_deg", "lon_deg", "alt_m")
-COOPERATIVE = Mark("#56B4E9", "P", 5.5)
-
-#: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
-_MEASURED_KEYS = (
-    "errors", "azimuth_error_deg", "azimuth_bias_deg", "azimuth_correlation_time_s",
-    "elevation_error_deg", "elevation_bias_deg", "elevation_correlation_time_s",
-    "azimuth_resolution_deg", "elevation_resolution_deg", "mount_azimuth_deg",
-    "mount_elevation_deg", "mount_roll_deg", "misalignment_deg",
-)  # fmt: skip
-
-
-class CooperativeParameters(SensorParameters):
-    """Parameters of what cooperative sensors share."""
-
-    @model_validator(mode="after")
-    def _measures_no_angles(self) -> Self:
-        fields = SensorParameters.model_fields
-        for key in _MEASURED_KEYS:
-            if getattr(self, key) != fields[key].default:
-                raise ValueError(
-                    f"{key} is {getattr(self, key)}: a cooperative sensor has no axes and no grid "
-                    "of its own; leave it out"
-                )
-        return self
-
-    def without_effect(self) -> list[str]:
-        """Say nothing of the keys that may not be given."""
-        quiet = (*_MEASURED_KEYS, "quantised", "biases")
-        return [said for said in super().without_effect() if not said.startswith(quiet)]
 
 
 class AdsBParameters(CooperativeParameters):
@@ -136,10 +107,8 @@ def measure_position(block: Component, wake: Wake, reference: Component) -> dict
     def values(cells: Cells) -> dict[str, FloatArray]:
         look = receiver.look(cells)
         here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
-        said = [look.extras[f"reported_{name}"] for name in _PLACE]
-        away = line_of_sight_ned(
-            *(here[f"target_{name}"] for name in _PLACE), *said, validate=False
-        )
+        said = [look.extras[f"reported_{name}"] for name in PLACE]
+        away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
         return {"north": away[0], "east": away[1]}
 
     return dict(over_cells(receiver, wake, values))
@@ -175,7 +144,7 @@ ERRORS = Ladder(
 )  # fmt: skip
 
 
-class AdsB(Sensor):
+class AdsB(CooperativeSensor):
     """Reports equipped aircraft by the last position and velocity messages received of each.
 
     Aircraft send positions and velocities at random intervals of 0.4 to 0.6 s, each by a clock of
@@ -190,9 +159,6 @@ class AdsB(Sensor):
     where both aircraft then are, by what is known of their flights at the scan.
     """
 
-    mark = COOPERATIVE
-    measures_range = True
-    outputs: ClassVar[Any] = {"detections": Output(CooperativeReports, "What was received.")}
     Parameters = AdsBParameters
     lockstep = True
     ladders = (RECEPTION, ERRORS)
@@ -214,11 +180,6 @@ class AdsB(Sensor):
             "velocity": parameters.velocity_age_s,
         }
 
-    def request(self, port: str) -> Any:
-        """Ask for the flights too: messages are sent at instants of their own."""
-        reach = super().request(port)
-        return replace(reach, lasts_s=4.0 * _STEP_S) if self.p.enabled else reach
-
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
@@ -237,7 +198,7 @@ class AdsB(Sensor):
         """Receive what was sent up to each scan, and decode the last of it."""
         equipage = cells.roster.equipage
         who = Who(cells.roster.keys_of(cells.target), cells.replica, cells.craft)
-        here_ns = self._state_ns(cells)
+        here_ns = cells.state_ns
         extras = unreported(len(cells))
         own_velocity = np.full((3, len(cells)), np.nan)
         sends = np.flatnonzero(equipage.ads_b[who.craft])
@@ -252,17 +213,6 @@ class AdsB(Sensor):
         self._rows = cells.row, own_velocity
         confidence = np.where(detected, equipage.nacp[who.craft], 0.0)
         return Look(detected, confidence, extras, signal=moves)
-
-    def _state_ns(self, cells: Cells) -> IntArray:
-        """Return when the picture of each cell was, of its own run."""
-        state = cells._targets.state_tick
-        if state is None:
-            return cells.instant_ns
-        return np.asarray(cells.instant_ns + self._late_ns(cells))
-
-    def _late_ns(self, cells: Cells) -> IntArray:
-        late = cells.of_row("state_tick") - cells.scan_ticks[cells.row]
-        return np.asarray(late * NANOSECONDS // self.context.ticks_per_s, dtype=np.int64)
 
     def _latest(
         self,
@@ -331,7 +281,7 @@ class AdsB(Sensor):
             equipage, those, sent,
             lambda: self._broadcasts.velocity(equipage, those, sent),
         )  # fmt: skip
-        for name, values in zip(_PLACE, said, strict=True):
+        for name, values in zip(PLACE, said, strict=True):
             extras[f"reported_{name}"][found] = values
         extras["reported_s"][found] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
@@ -362,31 +312,14 @@ class AdsB(Sensor):
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
         ahead_s = (instant_ns - here_ns[which]) / NANOSECONDS
         then = cells.seen_at(which, ahead_s)
-        velocity = self._velocity(cells, which, ahead_s, then, "target")
+        velocity = velocity_of(cells, which, ahead_s, then, "target")
         velocity[2] = -velocity[2]
-        lat, lon, alt = (then[f"target_{name}"] for name in _PLACE)
+        lat, lon, alt = (then[f"target_{name}"] for name in PLACE)
         return Sent(lat, lon, alt, velocity, number, instant_ns)
-
-    @staticmethod
-    def _velocity(
-        cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
-    ) -> FloatArray:
-        """Return velocities north, east and down (3, n), from positions 1/64 s before and after."""
-        places = [here[f"{whose}_{name}"] for name in _PLACE]
-        moved, span_s = [], np.zeros(len(which))
-        for step_s in (-_STEP_S, _STEP_S):
-            then = cells.seen_at(which, ahead_s + step_s)
-            there = then["present"]
-            way = line_of_sight_ned(
-                *places, *(then[f"{whose}_{name}"] for name in _PLACE), validate=False
-            )
-            moved.append(np.where(there, np.stack(way), 0.0))
-            span_s = span_s + np.where(there, _STEP_S, 0.0)
-        return np.asarray((moved[1] - moved[0]) / np.maximum(span_s, _STEP_S))
 
     def _own_velocity(self, cells: Cells, found: IntArray) -> FloatArray:
         now = np.zeros(len(found))
-        return self._velocity(cells, found, now, cells.seen_at(found, now), "own")
+        return velocity_of(cells, found, now, cells.seen_at(found, now), "own")
 
     def _measured(
         self,
@@ -403,12 +336,12 @@ class AdsB(Sensor):
         velocity = np.stack([
             said["reported_north_m_s"], said["reported_east_m_s"], -said["reported_climb_m_s"]
         ])  # fmt: skip
-        age_s = self._state_ns(cells)[found] / NANOSECONDS - said["reported_s"]
-        place = [said[f"reported_{name}"] for name in _PLACE]
+        age_s = cells.state_ns[found] / NANOSECONDS - said["reported_s"]
+        place = [said[f"reported_{name}"] for name in PLACE]
         ned = towards(own, *carried_on(place, np.nan_to_num(velocity) * age_s))
         # Its velocity is in its own axes, which are turned against ours.
-        ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + _STEP_S)))
-        moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / _STEP_S)
+        ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + STEP_S)))
+        moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = in_body(own, ned)
         variances, rate_variance = self._variances(own, ned, said, age_s, cells, found)
         moves = np.stack([look.signal[f"own_{axis}"][found] for axis in ("north", "east", "down")])
@@ -459,10 +392,6 @@ class AdsB(Sensor):
             some = np.flatnonzero(np.isfinite(velocity[0]))
             moves[:, row[some]] = velocity[:, some]
         return replace(report, own_velocity=dict(zip(OWN_VELOCITY, moves, strict=True)))
-
-    @cached_property
-    def _reach_from_body(self) -> Reach:
-        return self.reach
 
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.

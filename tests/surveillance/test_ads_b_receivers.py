@@ -127,7 +127,7 @@ def test_spoofed_aircraft_are_where_they_say(scene):
 def test_stated_variances_are_those_of_the_errors(scene):
     quality = "ads_b = {{ nacp = {}, nacv = 2 }}"
     off = {"azimuth": [], "elevation": [], "range": []}
-    for seed in range(40):
+    for seed in range(30):
         loaded = scene(kea=quality.format(7), moa=quality.format(9), seed=seed, duration_s="6")
         for name in ("kea", "moa"):
             seen = reports(recorded(loaded), name)[-1:]
@@ -144,14 +144,14 @@ def test_stated_variances_are_those_of_the_errors(scene):
 def test_shares_received_are_those_of_the_law(scene):
     """Every position message comes through or not, by itself."""
     east = 300_000
-    loaded = scene(kea="ads_b = {}", east=east, duration_s="1000", sets=[
+    loaded = scene(kea="ads_b = {}", east=east, duration_s="600", sets=[
         "blocks.ether.scan_rate_hz=10", "blocks.traffic.intruders[0].speed_mps=0",
         "blocks.traffic.ownship.speed_mps=0",
     ])  # fmt: skip
     seen = reports(recorded(loaded), "kea")
-    share = len(np.unique(column(seen, "reported_s"))) / 2000.0
+    share = len(np.unique(column(seen, "reported_s"))) / 1200.0
     p = float(fitted(column(seen, "true_range_m")[:1])[0])
-    assert abs(share - p) < NormalDist().inv_cdf(0.9995) * sqrt(p * (1.0 - p) / 2000.0)
+    assert abs(share - p) < NormalDist().inv_cdf(0.9995) * sqrt(p * (1.0 - p) / 1200.0)
 
 
 def test_the_tracker_follows_and_two_runs_are_the_same(scene):
