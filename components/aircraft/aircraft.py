@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_validator
 
-from components.aircraft.equipage import AdsB, Equipage
+from components.aircraft.equipage import AdsBEquipage, Equipage
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import InputFileError, status_of
@@ -176,7 +176,9 @@ class Aircraft(Parameters):
         default=False,
         description="Whether a Mode C one, which gives no identity; Mode S counts first.",
     )
-    ads_b: AdsB | None = Field(default=None, description="What it broadcasts; nothing if left out.")
+    ads_b: AdsBEquipage | None = Field(
+        default=None, description="What it broadcasts; nothing if left out."
+    )
     icao_address: str | None = Field(
         default=None,
         pattern="^[0-9A-Fa-f]{6}$",

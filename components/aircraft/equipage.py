@@ -30,7 +30,7 @@ CONTAINMENT_M = np.array(
 RADIUS_IN_DEVIATIONS = math.sqrt(-2.0 * math.log(0.05))
 
 
-class AdsB(Parameters):
+class AdsBEquipage(Parameters):
     """What an aircraft broadcasts of itself, and how good it is."""
 
     nacp: int = Field(

@@ -25,7 +25,7 @@ def fitted(range_m: FloatArray) -> FloatArray:
 
     ``p = exp(-3 x²) (1 + a₁ x + a₂ x² + a₃ x³ + a₄ x⁴)`` with x the range over that of the farthest
     message received, 290 nmi, cut at 0 and 1, and 0 beyond: the form of Nakagami fading in which
-    F. Nurrachman published regressions of 23 receivers (adsb_reception_model_opensky, 2024). The
+    F. Rahman published regressions of 23 receivers (adsb_reception_model_opensky, 2025). The
     four numbers are ours, fitted to the median of those 23 curves at 50 aircraft and 50 airports
     around: 18 receivers lie within 2.5 % of it (rms over range), the other five within 18 to 41 %,
     all together 13 %. The regressions themselves err by 6.9 to 22.4 % of receivers not fitted.

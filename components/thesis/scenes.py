@@ -28,6 +28,7 @@ from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.running.simulation import Simulation
+from dsa_des.scene.block_table import split_options
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.time.randomness import Streams
@@ -45,7 +46,8 @@ def table(name: str) -> dict[str, Any]:
 
 def radar_parameters(name: str = "oasys", **changes: Any) -> SwerlingParameters:
     """Return the parameters of a radar of ``configs/sensors``."""
-    return SwerlingParameters.model_validate({**_without_type(f"sensors/{name}"), **changes})
+    own = _own_keys(f"sensors/{name}", SwerlingParameters)
+    return SwerlingParameters.model_validate({**own, **changes})
 
 
 def eo_camera(name: str = "afrl_eo") -> Camera:
@@ -78,12 +80,13 @@ def read_csv(name: str) -> list[dict[str, str]]:
 
 
 def _camera(kind: type[Camera], name: str) -> Camera:
-    parameters = kind.Parameters.model_validate(_without_type(f"sensors/{name}"))
+    parameters = kind.Parameters.model_validate(_own_keys(f"sensors/{name}", kind.Parameters))
     return kind(name, parameters, Context(Streams(0)))
 
 
-def _without_type(name: str) -> dict[str, Any]:
-    return {key: value for key, value in table(name).items() if key != "type"}
+def _own_keys(name: str, parameters: Any) -> dict[str, Any]:
+    """Return what a file of ``configs`` says to the block itself, not to the engine."""
+    return split_options(table(name), parameters)[1]
 
 
 @dataclass
