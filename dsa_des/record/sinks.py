@@ -89,7 +89,7 @@ class _Keeping:
         if not values.strides[0]:
             return values
         for parts in self._parts.values():
-            other = parts[-1].get(name) if parts else None
+            other: Any = parts[-1].get(name) if parts else None
             if other is not None and same_bits(other, values):
                 return other
         return values

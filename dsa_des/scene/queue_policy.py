@@ -66,8 +66,8 @@ def find_policy(name: Any) -> type[QueuePolicy]:
     if name in POLICIES:
         return POLICIES[name]
     if not isinstance(name, str) or ":" not in name:
-        hint = did_you_mean(str(name), POLICIES)
-        raise ValueError(f"must be one of {', '.join(POLICIES)}, or module:Class{hint}")
+        hint, allowed = did_you_mean(str(name), POLICIES), ", ".join(map(repr, POLICIES))
+        raise ValueError(f"must be one of {allowed}, or module:Class{hint}")
     try:
         found = load_named(name, "processors")
     except NotAllowed:
