@@ -11,7 +11,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import pictures_in
+from dsa_des.record.drawing import kept_figures
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
@@ -98,7 +98,7 @@ def _in_memory(
 
 def _drawn(
     reports: list[Report], simulation: Simulation, tables: dict[str, Any], summary: dict[str, Any]
-) -> dict[str, bytes]:
+) -> dict[str, Any]:
     """Return what reports draw of a run in memory: they read its tables from a folder."""
     import pyarrow.parquet as pq
 
@@ -106,8 +106,8 @@ def _drawn(
         folder = Path(place)
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
-        notes = draw_all(reports, simulation, folder, summary)
-        found = pictures_in(folder)
+        with kept_figures() as found:
+            notes = draw_all(reports, simulation, folder, summary)
     if notes and not found:
         raise UsageError("; ".join(notes))
-    return found
+    return dict(sorted(found.items()))

@@ -12,9 +12,10 @@ from weakref import finalize
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import PictureFile, pictures_in
+from dsa_des.record.drawing import kept_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
+from dsa_des.results.printing import show
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
 from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import chosen_file
@@ -26,6 +27,7 @@ from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
 from dsa_des.studies.study import Study, changed_scene
 from dsa_des.studies.study_file import read_study, study_of_tables
+from dsa_des.terminal.terminal import html_of
 from dsa_des.text.safe_text import shortened
 
 if TYPE_CHECKING:
@@ -76,15 +78,14 @@ class StudyResult:
         return self._folder.results()
 
     @cached_property
-    def figures(self) -> dict[str, PictureFile]:
+    def figures(self) -> dict[str, Any]:
         """All figures by name."""
-        draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
-        return {
-            name: PictureFile(name, png) for name, png in pictures_in(self._folder.path).items()
-        }
+        with kept_figures() as drawn:
+            draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
+        return {**pictures_in(self._folder.path), **drawn}
 
-    def figure(self, name: str) -> PictureFile:
-        """Return one of the study's figures.
+    def figure(self, name: str) -> Any:
+        """Return one of the study's figures: a matplotlib figure with a method ``save(path)``.
 
         Raises
         ------
@@ -100,6 +101,9 @@ class StudyResult:
         if table is None:
             raise UsageError(f"{self._folder.path / name}: is not there or not of this study")
         return table.replace_schema_metadata(None)
+
+    def _repr_html_(self) -> str:
+        return html_of(lambda console: show(console, self._tables))
 
     def __repr__(self) -> str:
         rows = self._tables.rows

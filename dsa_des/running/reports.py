@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
+from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, attempt
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -32,12 +33,10 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     for name, section in scene.sections.items():
         found += [f"{name}: {text}" for text in section.without_effect()]
     for name, component in simulation.components.items():
-        said = component.p.without_effect()
+        found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
-            said.append(shortened(str(text), _LONGEST))
-        known = tuple(scene.blocks[name].options.acknowledged)
-        found += [f"blocks.{name}: {text}" for text in said if not text.startswith(known)]
-    return found
+            found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+    return _unacknowledged(scene, found)
 
 
 def notes_of_loading(scene: Scene) -> list[str]:
@@ -47,7 +46,17 @@ def notes_of_loading(scene: Scene) -> list[str]:
         block, _, parameter = key.rpartition(".")
         dropped.setdefault(block, []).append(parameter)
     swapped = [f"{block}: the swap dropped {', '.join(keys)}" for block, keys in dropped.items()]
-    return [*swapped, *scene.notes]
+    return _unacknowledged(scene, [*swapped, *scene.notes])
+
+
+def _unacknowledged(scene: Scene, notes: list[str]) -> list[str]:
+    """Return notes without those that the blocks they are about acknowledge."""
+    known = tuple(
+        f"blocks.{name}: {text}"
+        for name, block in scene.blocks.items()
+        for text in block.options.acknowledged
+    )
+    return [text for text in notes if not text.startswith(known)]
 
 
 def say_notes(notes: Sequence[str]) -> None:
@@ -67,9 +76,6 @@ def say_if_long(simulation: Simulation) -> None:
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
         say(f"{message}{simulation.scans:.2g} scans", err=True)
-
-
-REPORTS = "dsa_des.reports"
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from html import escape
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -87,6 +88,16 @@ class Scene(Changeable):
 
     def __repr__(self) -> str:
         return described(self)
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(printable(name))}<td>{escape(printable(block.type_name))}"
+            for name, block in self.blocks.items()
+        )
+        wires = "<br>".join(escape(printable(wire)) for wire in self.wires)
+        heading = escape(printable(self.title))
+        table = f"<table><tr><th>block</th><th>type</th></tr>{rows}</table>"
+        return f"<p><b>{heading}</b>, seed {self.seed}</p>{table}<p>{wires}</p>"
 
     @classmethod
     def _checked(cls, scene_file: SceneFile, problems: list[Problem]) -> "Scene":
