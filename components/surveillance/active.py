@@ -22,7 +22,6 @@ from components.surveillance.cooperative import (
     CooperativeParameters,
     CooperativeSensor,
 )
-from components.surveillance.extended_squitter import FOOT_M
 from components.surveillance.interrogation import (
     CUT,
     IN_1_S,
@@ -40,6 +39,7 @@ from components.surveillance.interrogation import (
     sine_of_elevation,
 )
 from components.surveillance.reports import unreported
+from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung

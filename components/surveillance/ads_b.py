@@ -31,10 +31,11 @@ from components.surveillance.cooperative import (
     CooperativeSensor,
     velocity_of,
 )
-from components.surveillance.extended_squitter import FOOT_M, KNOT_M_S
+from components.surveillance.extended_squitter import KNOT_M_S
 from components.surveillance.reception import LAWS
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
+from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -202,7 +203,7 @@ class AdsB(CooperativeSensor):
         extras = unreported(len(cells))
         own_velocity = np.full((3, len(cells)), np.nan)
         sends = np.flatnonzero(equipage.ads_b[who.craft])
-        told = self._latest("position", cells, sends, who, here_ns, equipage)
+        told = self._last_received("position", cells, sends, who, here_ns, equipage)
         found, position, sent_ns = told
         detected = np.zeros(len(cells), dtype=bool)
         detected[found] = True
@@ -214,7 +215,7 @@ class AdsB(CooperativeSensor):
         confidence = np.where(detected, equipage.nacp[who.craft], 0.0)
         return Look(detected, confidence, extras, signal=moves)
 
-    def _latest(
+    def _last_received(
         self,
         kind: str,
         cells: Cells,
@@ -286,7 +287,9 @@ class AdsB(CooperativeSensor):
         extras["reported_s"][found] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
             extras[name][found] = getattr(equipage, name)[those.craft]
-        moving, number, sent_ns = self._latest("velocity", cells, found, who, here_ns, equipage)
+        moving, number, sent_ns = self._last_received(
+            "velocity", cells, found, who, here_ns, equipage
+        )
         if not len(moving):
             return
         those = who.take(moving)

@@ -16,7 +16,6 @@ from components.navigation.errors import position_with_error
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
-    FOOT_M,
     FOOT_PER_MINUTE_M_S,
     HIGHEST_FT,
     KNOT_M_S,
@@ -25,6 +24,7 @@ from components.surveillance.extended_squitter import (
     quantised_climb_ft_min,
     quantised_speed_kt,
 )
+from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Streams

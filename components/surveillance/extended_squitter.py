@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from components.surveillance.compact_position import encode
+from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-FOOT_M = 0.3048
 KNOT_M_S = 1852.0 / 3600.0
 FOOT_PER_MINUTE_M_S = FOOT_M / 60.0
 #: Steps of altitude, of each part of a velocity, and of a vertical rate.
