@@ -13,7 +13,7 @@ from components.formats.asterix_records import (
     PLOTS,
     SERVICE,
     SYSTEM_TRACKS,
-    Record,
+    AsterixRecord,
     callsign,
     write_records,
 )
@@ -66,7 +66,7 @@ def _sight(
     return bearing, far_m, offset_positions(np.stack([north, east, down]), pose[:3])
 
 
-def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
+def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give a north marker with the radar's place for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
@@ -89,7 +89,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
     bearing, far_m, ends = _sight([part[there] for part in lines], pose)
     for k, row in enumerate(there.tolist()):
-        yield Record(
+        yield AsterixRecord(
             PLOTS,
             float(time_s[k]),
             {
@@ -103,7 +103,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
         )
 
 
-def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[Record]:
+def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
     places = zip(*(run.numbers("scans", name).tolist() for name in _POSITION), strict=True)
@@ -112,7 +112,9 @@ def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterat
         if (name or "") in radars:
             known = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
             values = {"sac": _SAC, "sic": sic[name or ""], "message": NORTH_MARKER}
-            yield Record(SERVICE, time_s, values | (known if np.isfinite(place).all() else {}))
+            yield AsterixRecord(
+                SERVICE, time_s, values | (known if np.isfinite(place).all() else {})
+            )
 
 
 def _track(
@@ -125,7 +127,7 @@ def _track(
     }  # fmt: skip
 
 
-def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
+def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give estimated tracks, at the instants that their states speak of."""
     if "state_tracks" not in run.tables:
         return
@@ -158,10 +160,10 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
             "velocity_north_m_s": float(along[1][k]),
             "velocity_up_m_s": float(along[2][k]),
         }
-        yield Record(SYSTEM_TRACKS, time_s, values)
+        yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
 
 
-def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
+def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give what trackers hold of each target, once for each measurement, at its instant."""
     if "tracks" not in run.tables:
         return
@@ -185,7 +187,7 @@ def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[Record]:
     for k, row in enumerate(rows):
         key = blocks[row] or "", names[row] or ""
         what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), places[:, k]
-        yield Record(SYSTEM_TRACKS, *_track(*what))
+        yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
 
 
 def _own_pose(run: RecordedTables, time_s: FloatArray, rows: list[int]) -> list[FloatArray]:
@@ -203,7 +205,7 @@ def _own_pose(run: RecordedTables, time_s: FloatArray, rows: list[int]) -> list[
     return [own[name.removeprefix("own_")][at] for name in (*_POSITION, *_TURNED)]
 
 
-def _own(run: RecordedTables) -> Iterator[Record]:
+def _own(run: RecordedTables) -> Iterator[AsterixRecord]:
     """Give the ownship's flight as it would broadcast it."""
     if "truth" not in run.tables:
         return
@@ -219,4 +221,4 @@ def _own(run: RecordedTables) -> Iterator[Record]:
     }  # fmt: skip
     fixed = {"sac": _SAC, "sic": 0, "number": 1, "simulated": 1, "name": OWNSHIP.upper()}
     for k, time_s in enumerate(own["time_s"].tolist()):
-        yield Record(ADS_B, time_s, fixed | {n: float(v[k]) for n, v in columns.items()})
+        yield AsterixRecord(ADS_B, time_s, fixed | {n: float(v[k]) for n, v in columns.items()})

@@ -13,7 +13,7 @@ from components.formats.asterix_records import (
     PLOTS,
     SERVICE,
     SYSTEM_TRACKS,
-    Record,
+    AsterixRecord,
     read_records,
 )
 from components.formats.sample_table import SampleColumn, SampleTable, enu_velocity
@@ -200,7 +200,7 @@ def _elevations(
     return np.arcsin(np.clip(sine, -1.0, 1.0))
 
 
-def _records(path: str | PathLike[str]) -> tuple[list[Record], list[str]]:
+def _records(path: str | PathLike[str]) -> tuple[list[AsterixRecord], list[str]]:
     try:
         data = read_input_bytes(Path(path))
     except InputFileError as error:
@@ -208,18 +208,18 @@ def _records(path: str | PathLike[str]) -> tuple[list[Record], list[str]]:
     return read_records(Path(path), data)
 
 
-def _source(record: Record) -> str:
+def _source(record: AsterixRecord) -> str:
     return f"{record.values.get('sac', 0)}/{record.values.get('sic', 0)}"
 
 
-def _key(record: Record) -> tuple[object, ...]:
+def _key(record: AsterixRecord) -> tuple[object, ...]:
     """Return what tells one aircraft of a file from another."""
     if record.category == ADS_B and "number" in record.values:
         return ADS_B, record.values["number"]  # an address is one aircraft's, whoever received it
     return record.category, _source(record), record.values.get("number", 0)
 
 
-def _names(records: list[Record]) -> dict[tuple[object, ...], str]:
+def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
     """Return a name for each aircraft: its identification where no other has the same."""
     said: dict[tuple[object, ...], str] = {}
     for record in records:
@@ -238,7 +238,7 @@ def _names(records: list[Record]) -> dict[tuple[object, ...], str]:
     return found
 
 
-def _sample(record: Record) -> tuple[float, ...] | None:
+def _sample(record: AsterixRecord) -> tuple[float, ...] | None:
     """Return time, position and velocity of a record, NaN for no velocity."""
     values = record.values
     place = [

@@ -103,7 +103,7 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
 ORDER = {SERVICE: 0, PLOTS: 1, SYSTEM_TRACKS: 2, ADS_B: 3}
 
 
-class Record(NamedTuple):
+class AsterixRecord(NamedTuple):
     """One record: its category, its time since the file's first midnight, and its quantities."""
 
     category: int
@@ -117,7 +117,7 @@ def callsign(name: str) -> str | None:
     return plain[:8] or None
 
 
-def write_records(records: Sequence[Record]) -> bytes:
+def write_records(records: Sequence[AsterixRecord]) -> bytes:
     """Return records as data blocks, in order of time; those of one instant share blocks.
 
     Raises
@@ -147,7 +147,7 @@ def _categories() -> dict[int, Any]:
     return {number: generated.manifest["CATS"][number][-1] for number in FIELDS}
 
 
-def _items(record: Record) -> dict[str, Any]:
+def _items(record: AsterixRecord) -> dict[str, Any]:
     """Return a record's items as the library makes them; those without a quantity are left out."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
@@ -214,7 +214,7 @@ def _items(record: Record) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _raw(record: Record, name: str, field: _Field, value: Any) -> Any:
+def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
     """Return a quantity as the whole number that its bits hold, or a text as it is."""
     if name == "name":
         return value
@@ -232,7 +232,7 @@ def _raw(record: Record, name: str, field: _Field, value: Any) -> Any:
     return steps % 2**field.bits
 
 
-def read_records(path: Path, data: bytes) -> tuple[list[Record], list[str]]:
+def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
     """Return the records of the categories that we know, in the order of the file, and notes.
 
     Raises
@@ -243,7 +243,7 @@ def read_records(path: Path, data: bytes) -> tuple[list[Record], list[str]]:
         The extra ``asterix`` is not installed.
     """
     cats = _categories()
-    records: list[Record] = []
+    records: list[AsterixRecord] = []
     left_out: dict[int, int] = {}
     now_s = math.nan
     timeless = 0
@@ -266,7 +266,7 @@ def read_records(path: Path, data: bytes) -> tuple[list[Record], list[str]]:
             if now_s == now_s:  # the day on which it is nearest to the record before
                 time_s += DAY_S * round((now_s - time_s) / DAY_S)
             now_s = time_s
-            records.append(Record(category, time_s, values))
+            records.append(AsterixRecord(category, time_s, values))
     notes = [
         f"{count} data blocks of category {category:03d} were left out"
         for category, count in sorted(left_out.items())

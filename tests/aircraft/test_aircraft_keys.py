@@ -13,7 +13,7 @@ from covering import covers
 from wired import Row, chain, decided, run, sensor
 
 import dsa_des
-from components.formats.asterix_records import ADS_B, Record, write_records
+from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
 from components.formats.csv_file import read_csv
 from components.formats.set_file import read_set
 from dsa_des.running.reports import notes_of_scene
@@ -79,7 +79,7 @@ def asterix_any(craft: dict, folder) -> dict:
     pytest.importorskip("asterix", reason="needs the extra asterix")
     flights = read_csv(samples(folder / "f.csv", False)).aircraft
     records = [
-        Record(ADS_B, time_s, {
+        AsterixRecord(ADS_B, time_s, {
             "number": number, "name": flight.name.upper(), "simulated": 1, "sac": 0, "sic": 0,
             "lat_deg": flight.lat_deg[0], "lon_deg": flight.lon_deg[0], "alt_m": flight.alt_m[0],
         })
