@@ -16,12 +16,11 @@ from scipy.spatial.transform import Rotation
 import dsa_des
 from components.foreign import mavlink
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
+from components.foreign.stand_in_autopilot import StandIn, serve
 from components.messages.state_tracks import StateTracks
 from dsa_des.errors import BlockFailure, SceneError
 
 common = pytest.importorskip("pymavlink.dialects.v20.common", reason="needs the extra mavlink")
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "examples"))
-from stand_in_autopilot import StandIn, serve  # noqa: E402
 
 #: Made by this file, run as a program: what was sent at each instant, and what came back.
 EXCHANGE = Path(__file__).parent / "exchange.json"
@@ -193,7 +192,7 @@ def test_over_the_loopback_it_is_the_same_flight(monkeypatch):
     for one in ends:
         one.close()
     senders = set()
-    autopilot = threading.Thread(target=serve, args=(port, 60.0, senders))
+    autopilot = threading.Thread(target=lambda: senders.update(serve(port)))
     autopilot.start()
     try:
         address = f"127.0.0.1:{port}"
