@@ -1,8 +1,8 @@
 """A small autopilot in place of a real one: it keeps its course until an aircraft comes near.
 
 What passes within 600 m, and 150 m in height, in the next minute makes it turn right by 45 degrees,
-once in two minutes. ``python -m components.foreign.stand_in_autopilot 14550`` listens at that port of
-this machine, where a scene's `foreign.mavlink` reaches it.
+once in two minutes. ``python -m components.foreign.stand_in_autopilot 14550`` listens at that port
+of this machine, where a scene's `foreign.mavlink` reaches it.
 """
 
 import math
@@ -18,7 +18,7 @@ _SILENT_S = 60.0
 
 
 class StandIn:
-    """Answers datagrams: each state of the ownship by an attitude and a position."""
+    """Replies to datagrams: each state of the ownship by an attitude and a position."""
 
     def __init__(self) -> None:
         dialect = library("pymavlink.dialects.v20.common", "mavlink", "the stand-in autopilot")
@@ -28,7 +28,7 @@ class StandIn:
         self._course_rad: float | None = None
         self._free_from_s = 0.0
 
-    def answers(self, datagram: bytes) -> list[bytes]:
+    def reply(self, datagram: bytes) -> list[bytes]:
         """Return the datagrams that answer one."""
         found = []
         for message in self._link.parse_buffer(datagram) or []:
@@ -90,7 +90,7 @@ def serve(port: int) -> set[Any]:
             if not datagram:
                 return senders
             senders.add(sender)
-            for answer in autopilot.answers(datagram):
+            for answer in autopilot.reply(datagram):
                 end.sendto(answer, sender)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from components.formats.text_rows import TrafficFileError
-from components.well_clear.volume import FOOT_M
+from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from dsa_des.errors import UsageError
 from dsa_des.errors.extras import library
 
@@ -20,7 +20,6 @@ DAY_S = 86400.0
 SERVICE, PLOTS, SYSTEM_TRACKS, ADS_B = 34, 48, 62, 21
 NORTH_MARKER = 1
 
-_NAUTICAL_MILE_M = 1852.0
 _TIME_S = 1.0 / 128.0
 _LEVEL_M = 25.0 * FOOT_M
 _HEIGHT_M = 6.25 * FOOT_M
@@ -56,7 +55,7 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
         "sic": _Field("010", "SIC", 1, 8),
         "time_of_day_s": _Field("140", None, _TIME_S, 24, turn=DAY_S),
         "simulated": _Field("020", "SIM", 1, 1),
-        "range_m": _Field("040", "RHO", _NAUTICAL_MILE_M / 256.0, 16),
+        "range_m": _Field("040", "RHO", NAUTICAL_MILE_M / 256.0, 16),
         "azimuth_deg": _Field("040", "THETA", _TURN_DEG, 16, turn=360.0),
         "alt_m": _Field("110", "3DH", _LEVEL_M, 14, True),
         "flight_level_m": _Field("090", "FL", _LEVEL_M, 14, True),
@@ -93,7 +92,7 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
         "coarse_lon_deg": _Field("130", "LON", 180.0 / 2**23, 24, True, 360.0),
         "alt_m": _Field("140", None, _HEIGHT_M, 16, True),
         "flight_level_m": _Field("145", None, _LEVEL_M, 16, True),
-        "speed_m_s": _Field("160", "GS", _NAUTICAL_MILE_M / 2**14, 15),
+        "speed_m_s": _Field("160", "GS", NAUTICAL_MILE_M / 2**14, 15),
         "track_deg": _Field("160", "TA", _TURN_DEG, 16, turn=360.0),
         "velocity_up_m_s": _Field("157", "GVR", _CLIMB_MPS, 15, True),
         "barometric_climb_m_s": _Field("155", "BVR", _CLIMB_MPS, 15, True),

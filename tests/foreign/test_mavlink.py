@@ -115,7 +115,7 @@ def test_a_banked_attitude_goes_out_as_it_is():
 
 @covers("least_turn_deg", "rate_deg_s", of=("foreign.mavlink",))
 def test_the_ownship_turns_as_the_autopilot_does(monkeypatch):
-    run, _ = flown(monkeypatch, StandIn().answers)
+    run, _ = flown(monkeypatch, StandIn().reply)
     (turn,) = run.manoeuvres.to_pylist()
     assert math.degrees(turn["turn_rad"]) == pytest.approx(45.0, abs=0.1)
     course = courses(run)
@@ -127,9 +127,9 @@ def test_the_ownship_turns_as_the_autopilot_does(monkeypatch):
     row = run.autopilot.to_pylist()[-1]
     assert row["time_s"] == row["position_s"] == row["attitude_s"] == 29.0
     assert math.degrees(row["heading_rad"]) % 360 == pytest.approx(262.0, abs=0.1)
-    slow, _ = flown(monkeypatch, StandIn().answers, rate_deg_s=1)
+    slow, _ = flown(monkeypatch, StandIn().reply, rate_deg_s=1)
     assert slow.manoeuvres["rate_rad_s"][0].as_py() == pytest.approx(math.radians(1))
-    none, _ = flown(monkeypatch, StandIn().answers, least_turn_deg=50)
+    none, _ = flown(monkeypatch, StandIn().reply, least_turn_deg=50)
     assert none.manoeuvres.num_rows == 0
 
 
@@ -183,7 +183,7 @@ def test_the_recorded_exchange_gives_the_recorded_flight(monkeypatch):
 
 @covers("address", "local_port", "answer_s", of=("foreign.mavlink",))
 def test_over_the_loopback_it_is_the_same_flight(monkeypatch):
-    near, _ = flown(monkeypatch, StandIn().answers)
+    near, _ = flown(monkeypatch, StandIn().reply)
     monkeypatch.undo()
     ends = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
     for one in ends:
@@ -280,6 +280,6 @@ if __name__ == "__main__":  # record the exchange again
             recorded.append({"sent": [d.hex() for d in datagrams],
                              "received": [d.hex() for d in self.waiting]})  # fmt: skip
 
-    mavlink.UdpLink = Recorder(StandIn().answers)  # type: ignore[misc,assignment]
+    mavlink.UdpLink = Recorder(StandIn().reply)  # type: ignore[misc,assignment]
     dsa_des.run(scene())
     EXCHANGE.write_text(json.dumps(recorded, indent=0) + "\n")
