@@ -73,12 +73,11 @@ def _near(own: Any, one: Any) -> bool:
 
 
 def serve(port: int) -> set[Any]:
-    """Answer whoever sends to a port of this machine, and return who did.
+    """Answer whoever sends to a port of this machine, each by an autopilot of its own; return who.
 
     It ends by an empty datagram, or when nothing has come for a minute.
     """
-    senders: set[Any] = set()
-    autopilot = StandIn()
+    autopilots: dict[Any, StandIn] = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
         end.bind(("127.0.0.1", port))
         end.settimeout(_SILENT_S)
@@ -86,10 +85,10 @@ def serve(port: int) -> set[Any]:
             try:
                 datagram, sender = end.recvfrom(65_535)
             except TimeoutError:
-                return senders
+                return set(autopilots)
             if not datagram:
-                return senders
-            senders.add(sender)
+                return set(autopilots)
+            autopilot = autopilots.setdefault(sender, StandIn())
             for answer in autopilot.reply(datagram):
                 end.sendto(answer, sender)
 
