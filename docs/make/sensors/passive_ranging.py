@@ -120,8 +120,9 @@ def ranges(*sets: str, seeds: int = 200, scene: str = SCENE) -> Ranges:
         for here in (truth["target"] == None, truth["target"] != None)  # noqa: E711
     )
     times = truth["time_s"][first & (truth["target"] != None)]  # noqa: E711
-    p = known.blocks["tracker"].parameters
-    angle_rad = math.radians(known.blocks["eo"].parameters.azimuth_error_deg)
+    blocks: Any = known.blocks
+    p = blocks["tracker"].parameters
+    angle_rad = math.radians(blocks["eo"].parameters.azimuth_error_deg)
     pose = ("lat_deg", "lon_deg", "pitch_rad", "roll_rad", "heading_rad")
     down = belly(*(truth[key][first & (truth["target"] == None)] for key in pose))  # noqa: E711
     bound = bounds_m(times, own, down, target, angle_rad, (0.5, p.start_speed_m_s))
