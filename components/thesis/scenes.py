@@ -28,7 +28,6 @@ from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.block_table import split_options
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.time.randomness import Streams
@@ -46,8 +45,7 @@ def table(name: str) -> dict[str, Any]:
 
 def radar_parameters(name: str = "oasys", **changes: Any) -> SwerlingParameters:
     """Return the parameters of a radar of ``configs/sensors``."""
-    own = _own_keys(f"sensors/{name}", SwerlingParameters)
-    return SwerlingParameters.model_validate({**own, **changes})
+    return SwerlingParameters.model_validate({**_without_type(f"sensors/{name}"), **changes})
 
 
 def eo_camera(name: str = "afrl_eo") -> Camera:
@@ -80,13 +78,14 @@ def read_csv(name: str) -> list[dict[str, str]]:
 
 
 def _camera(kind: type[Camera], name: str) -> Camera:
-    parameters = kind.Parameters.model_validate(_own_keys(f"sensors/{name}", kind.Parameters))
+    parameters = kind.Parameters.model_validate(_without_type(f"sensors/{name}"))
     return kind(name, parameters, Context(Streams(0)))
 
 
-def _own_keys(name: str, parameters: Any) -> dict[str, Any]:
-    """Return what a file of ``configs`` says to the block itself, not to the engine."""
-    return split_options(table(name), parameters)[1]
+def _without_type(name: str) -> dict[str, Any]:
+    """Return a block's parameters: without its type, and what it says to the engine of notes."""
+    beside = "type", "acknowledged"
+    return {key: value for key, value in table(name).items() if key not in beside}
 
 
 @dataclass
