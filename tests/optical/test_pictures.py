@@ -112,8 +112,8 @@ def test_rendered_areas_are_those_of_the_silhouette():
 @pytest.fixture(scope="module")
 def seen(request):
     configs = request.getfixturevalue("configs")
-    sets = ["blocks.eo.scan_rate_hz=25", "blocks.eo.texture_contrast=0.005", "duration_s=6", TURNING, NEAR,
-            "blocks.eo.mount_azimuth_deg=7", "blocks.eo.mount_roll_deg=-12"]  # fmt: skip
+    sets = ["blocks.eo.scan_rate_hz=25", "blocks.eo.texture_contrast=0.005", "duration_s=6",
+            TURNING, NEAR, "blocks.eo.mount_azimuth_deg=7", "blocks.eo.mount_roll_deg=-12"]  # fmt: skip
     table = detections(configs, *sets)[1]
     texts = {"target": np.array(table["target"].to_pylist())}
     numbers = [n for n in table.column_names if n.endswith(("_px", "_rad")) or n in NUMBERS]
