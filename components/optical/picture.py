@@ -142,12 +142,6 @@ def target_outlines(
     return found[0], found[1]
 
 
-def polygon_area(corners: FloatArray) -> float:
-    """Return the area of a polygon, positive for either sense of its corners."""
-    x, y = (corners - corners.mean(axis=0)).T if len(corners) else np.zeros((2, 1))
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
-
-
 def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the polygon that two convex ones have in common (Sutherland and Hodgman)."""
     sense = np.sign(_cross(other[1] - other[0], other[2] - other[0])) if len(other) > 2 else 0.0

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from covering import covers
 
 from components.optical.picture import Pinhole, coverage, target_outlines, union_coverage
 from components.optical.silhouette import union_area
@@ -112,9 +113,14 @@ def test_rendered_areas_are_those_of_the_silhouette():
 @pytest.fixture(scope="module")
 def seen(request):
     configs = request.getfixturevalue("configs")
-    sets = ["blocks.eo.scan_rate_hz=25", "blocks.eo.texture_contrast=0.005", "duration_s=6",
-            TURNING, NEAR, "blocks.eo.mount_azimuth_deg=7", "blocks.eo.mount_roll_deg=-12"]  # fmt: skip
-    table = detections(configs, *sets)[1]
+    sets = [
+        "blocks.eo.scan_rate_hz=25",
+        "blocks.eo.texture_contrast=0.005",
+        "blocks.eo.mount_azimuth_deg=7",
+        "blocks.eo.mount_roll_deg=-12",
+        "duration_s=6",
+    ]
+    table = detections(configs, *sets, TURNING, NEAR)[1]
     texts = {"target": np.array(table["target"].to_pylist())}
     numbers = [n for n in table.column_names if n.endswith(("_px", "_rad")) or n in NUMBERS]
     return texts | {n: np.array(table[n].to_pylist(), dtype=float) for n in numbers}
@@ -151,6 +157,27 @@ def test_pixels_are_those_of_an_independent_projection(seen):
     assert seen["true_column_px"] == pytest.approx(column, abs=1e-6)
     assert seen["true_row_px"] == pytest.approx(row, abs=1e-6)
     assert np.std(seen["column_px"] - column) < 0.5
+
+
+@covers(
+    "exposure_s", "frame_interval_s", "texture_contrast", "texture_pixels", of=("optical.image",)
+)  # fmt: skip
+def test_smear_and_fine_clutter_hide_a_target_and_flow_grows_with_time(configs):
+    def median(name, texture=0.0, **keys):
+        sets = [f"blocks.eo.{key}={value}" for key, value in keys.items()]
+        sets.append(f"blocks.eo.texture_contrast={texture}")
+        table = detections(configs, *sets, "duration_s=6", TURNING, NEAR)[1]
+        values = np.array(table[name].to_pylist(), dtype=float)
+        turning = np.array(table["time_s"].to_pylist()) > 3.1
+        return np.nanmedian(np.abs(values[turning]))
+
+    clear, cluttered = median("snr"), median("snr", texture=0.05)
+    assert median("snr", exposure_s=0.04) < 0.95 * clear
+    assert cluttered < 0.6 * clear
+    assert median("snr", texture=0.05, texture_pixels=60) > 1.2 * cluttered
+    flow = median("flow_column_px")
+    assert flow > 1.0
+    assert median("flow_column_px", frame_interval_s=0.08) == pytest.approx(2.0 * flow, rel=0.1)
 
 
 def test_it_is_the_same_in_any_window_and_beside_other_replicas(configs):

@@ -163,17 +163,17 @@ where a target is in a frame of any field of view, size and mounting. A file of 
 the traffic gives its path in pixels:
 
 ```
-dsa-des run optical/pictures --swap traffic=traffic.daa_file --set blocks.traffic.file=RUN.daa
+dsa-des run optical/pictures --swap traffic=traffic.daa_file --set blocks.traffic.file=ENCOUNTER.daa
 ```
 
 Where targets were not detected, `components.optical.picture.Pinhole` gives the same of azimuth and
 elevation in the camera's axes.
 
 **How exact.** The rendered area is that of the union of the bodies within 0.3 %. At a noise of 0.02
-of the target's contrast the flow of targets from 3 pixels agrees with the turning line of sight
+of the target's contrast the flow of targets from 4 pixels agrees with the turning line of sight
 within 0.1 pixel, also where the platform's turn moves all of the picture by 99 pixels. Noise and
 clutter take from that: at a noise of 0.05, 95 % of the flows are within 0.15 pixel for a target of
-9 pixels and within 0.3 for one of 4. A spot of fewer than 3 pixels has a place and no flow.
+9 pixels and within 0.35 for one of 4. A spot of fewer than 3 pixels has a place and no flow.
 
 **What is left out.** Only targets are rendered: false alarms are drawn as those of `optical.eo`,
 and clutter makes none. The background has no depth, so that it shows no parallax.
