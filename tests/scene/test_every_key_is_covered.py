@@ -42,7 +42,7 @@ def page(claims: dict[str, set[str]]) -> str:
     for key, tests in claims.items():
         owner = key.rpartition(".")[0] or "scene"
         rows.setdefault(owner, set()).update(files[test.partition("::")[0]] for test in tests)
-    table = [f"| {owner} | {', '.join(sorted(rows[owner]))} |" for owner in sorted(rows)]
+    table = [f"| {owner} | {', '.join(sorted(of))} |" for owner, of in sorted(rows.items())]
     return "\n".join((_HEAD, *table, ""))
 
 
