@@ -48,8 +48,8 @@ def page(claims: dict[str, set[str]]) -> str:
 
 _HEAD = """# Which tests see which keys
 
-A test that fails if a key of a scene had no effect, or a wrong one, is marked `@covers("KEY")`: search
-the files below for a key. Rows are block types and tables of a scene. Made by
+A test that fails if a key of a scene had no effect, or a wrong one, is marked `@covers("KEY")`:
+search the files below for a key. Rows are block types and tables of a scene. Made by
 `DSA_DES_PAGES=1 python -m pytest tests/scene/test_every_key_is_covered.py`.
 
 | type or table | files |
