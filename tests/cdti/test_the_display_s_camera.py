@@ -142,6 +142,7 @@ def test_a_camera_that_renders_shows_the_patch_that_it_searched():
     picture = scope.picture(1.0)
     shown = scope.camera(picture, 1.0, picture["contacts"][0][0])
     patch = np.array(shown["patch"])
+    assert shown["contrast"] is None
     middle = len(patch) // 2
     assert patch.shape == (2 * middle, 2 * middle) and 16 <= middle <= 24
     # Dark in the middle, where the target is, and bright round it.
