@@ -181,7 +181,7 @@ class Active(CooperativeSensor):
         }
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
-            range_variance_m2=None, lasting=lasting if self._errs else {}, untold_across_m2=0.0,
+            range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
         )  # fmt: skip
 
     def answer_probability(self, cells: Cells) -> FloatArray:

@@ -187,7 +187,7 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=None, untold_across_m2=0.0,
+            lasting=None, unstated_across_m2=0.0,
         )  # fmt: skip
 
     @property
