@@ -123,7 +123,7 @@ def check_scene_file(
 ) -> None:
     """Load a scene, prepare its blocks (files are read), and say what was found.
 
-    Every foreign module is named, with its file, before it is imported: one that ends the process
+    Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its file, before it is imported: one that ends the process
     (``os._exit``) has the last line. With `no_import` none is, and what depends on it stays
     unchecked.
     """
@@ -194,10 +194,7 @@ def _check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
     differ = [name for name in one if one[name] != many[name]]
     if differ:
         message = "gives other results where scans are worked on one by one and together (table "
-        message += (
-            f"{differ[0]}, {float(whole.duration_s or 0):g} s): what `run` or `look` returns "
-        )
-        message += "must not depend on how often it is called"
+        message += f"{differ[0]}): what it returns must not depend on how often it is called"
         raise SceneError([loaded.problem(f"blocks.{name}.type", message) for name in strangers])
 
 
