@@ -123,9 +123,9 @@ def check_scene_file(
 ) -> None:
     """Load a scene, prepare its blocks (files are read), and say what was found.
 
-    Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its file, before it is imported: one that ends the process
-    (``os._exit``) has the last line. With `no_import` none is, and what depends on it stays
-    unchecked.
+    Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its
+    file, before it is imported: one that ends the process (``os._exit``) has the last line. With
+    `no_import` none is, and what depends on it stays unchecked.
     """
 
     def announce(foreign: Foreign) -> None:
