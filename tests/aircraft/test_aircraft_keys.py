@@ -14,7 +14,7 @@ from wired import Row, chain, decided, run, sensor
 
 import dsa_des
 from components.formats.set_file import read_set
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 50.0}
@@ -280,7 +280,7 @@ def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of(carrier, tm
         scene = chain({"eye": sensor("optical.eo", silhouette=silhouette),
                        "warm": sensor("optical.ir", silhouette=silhouette)})  # fmt: skip
         scene["blocks"]["traffic"] = CARRIERS[carrier](target, tmp_path)
-        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+        said = [line for line in notes_of_scene(Simulation(dsa_des.load_scene(scene)))
                 if "were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
         assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 

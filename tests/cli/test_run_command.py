@@ -213,7 +213,10 @@ def test_stranger_component_of_the_readme_runs(
     assert result.exit_code == 0, result.output
     radar = json.loads(result.stdout)["sensors"]["radar"]
     assert radar["detections"] > 0
-    assert "the swap dropped blocks.radar.power_w" in result.stderr
+    swap = "--set blocks.radar.reach_km=8 --swap radar=mymodule:MyRadar"
+    assert result.stderr == f"1 note: dsa-des check {configs / 'first_light.toml'} {swap}\n"
+    said = call("check", configs / "first_light.toml", *swap.split()).stderr
+    assert said.startswith("note: blocks.radar: the swap dropped ") and "power_w" in said
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from wired import SENSORS, chain
 
 import dsa_des
 from dsa_des.embed import Simulator
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 AREAS = {"front_m2": 4.0, "side_m2": 0.0, "horizontal_m2": 0.0}
@@ -115,7 +115,7 @@ def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of():
         }
         scene = chain(sensors, fusion={"type": "fusion.pick_best"})
         scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [{**BASE, **keys}]}
-        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+        said = [line for line in notes_of_scene(Simulation(dsa_des.load_scene(scene)))
                 if "'one' were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
         assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 
