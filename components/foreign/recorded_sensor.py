@@ -13,10 +13,10 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
+from components.foreign.reported_look import reported_look
 from components.formats.measurement_file import Measurements, read_measurements
-from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
+from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.detections import EXTRAS, Detections, SensorOffer
-from components.messages.reach import CULLED, SKIP_REASONS
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import (
@@ -32,7 +32,6 @@ from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import ClockSpec
 
 _FLAGS = ("declared", "cued")
-_TRUE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
 _VARIANCES = (
     "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
     "range_rate_variance_m2_s2",
@@ -185,35 +184,22 @@ class RecordedSensor(Component):
     def _look(self, number: int) -> Detections:
         measured = self._measured
         rows = slice(int(measured.offsets[number]), int(measured.offsets[number + 1]))
-        count = rows.stop - rows.start
         entries = {name: values[rows] for name, values in measured.entries.items()}
         look = {name: values[number : number + 1] for name, values in measured.looks.items()}
-        nothing = np.full(count, np.nan)
         tick = self._tick[number : number + 1]
-        more: dict[str, Any] = {name: look[name] for name in POSE if name in look}
+        more: dict[str, Any] = {}
         if self._rates:
             more["own_velocity"] = {name: look[name] for name in OWN_VELOCITY}
         if self._sweeps:
             more["ticks_after"] = self._ticks(entries["illuminated_s"]) - tick[0]
             if set(POSE) <= set(entries):
                 more["own_of_entries"] = {name: entries[name] for name in POSE}
-        zero = np.zeros(1, dtype=np.int64)
-        return Detections(
-            tick=tick,
-            scan=measured.scan[number : number + 1],
-            evaluated=zero,
-            skipped=dict.fromkeys((*SKIP_REASONS, CULLED), zero),
-            offsets=np.array([0, count]),
-            target=self._target[rows],
-            azimuth_rad=entries["azimuth_rad"],
-            elevation_rad=entries["elevation_rad"],
-            range_m=entries.get("range_m", nothing),
-            confidence=entries.get("confidence", nothing),
-            **{name: entries.get(name, nothing) for name in (*_TRUE, *MEASURED)},
-            extras={name: entries[name] for name in self._extras},
-            roster=self._roster,
-            **more,
-        )
+        unsaid = set(EXTRAS) - set(self._extras)
+        return reported_look(
+            tick, measured.scan[number : number + 1],
+            {name: values for name, values in entries.items() if name not in unsaid},
+            look, self._target[rows], self._roster, **more,
+        )  # fmt: skip
 
     def warnings(self) -> list[str]:
         """Say how many looks come after the end."""

@@ -59,25 +59,28 @@ def late_rows(folder, file, late_s):
         pq.write_table(table, file)
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    dsa_des.run(scene(), out=folder / "was")
+    return folder / "was"
+
+
 @covers("file", "block", "model", of=("sensor.recorded",))
 @pytest.mark.parametrize("fusion", ["fusion.pass_through", "fusion.gated"])
 @pytest.mark.parametrize("kind", ["folder", ".parquet", ".csv"])
-def test_tracks_are_those_of_the_run_to_the_byte(tmp_path, kind, fusion):
-    was = scene(fusion)
-    dsa_des.run(was, out=tmp_path / "was")
+def test_tracks_are_those_of_the_run_to_the_byte(recorded, tmp_path, kind, fusion):
     if kind == "folder":
-        keys = {"file": str(tmp_path / "was"), "latency_s": "0.37"}
+        keys = {"file": str(recorded), "latency_s": "0.37"}
     else:
         file = tmp_path / f"measured{kind}"
-        late_rows(tmp_path / "was", file, 0.37)
-        keys = {"file": str(file), "model": str(tmp_path / "was" / "scene.toml")}
-    dsa_des.run(replayed(was, **keys), out=tmp_path / "again")
+        late_rows(recorded, file, 0.37)
+        keys = {"file": str(file), "model": str(recorded / "scene.toml")}
+    was = dsa_des.run(scene(fusion))
+    again = dsa_des.run(replayed(scene(fusion), **keys))
     for name in ("state_tracks", "fused", "detections"):
-        before, after = (
-            pq.read_table(tmp_path / run / f"{name}.parquet") for run in ("was", "again")
-        )
+        before, after = (getattr(run, name) for run in (was, again))
         assert before.num_rows > 20
-        # Their metadata name two scenes.
         assert before.to_pylist() == after.to_pylist(), name
 
 
