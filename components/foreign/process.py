@@ -167,6 +167,11 @@ class Process(Component):
         rosters = known_targets(self.context)
         self._roster = rosters[0] if rosters else None
 
+    def start(self) -> None:
+        """Start the program ahead of the first call."""
+        if not self._link.runs:
+            self._greet()
+
     # -- calls ---------------------------------------------------------------------------------
 
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
@@ -199,8 +204,7 @@ class Process(Component):
                 self._is_in.restarts += 1
 
     def _asked(self, frames: list[Any]) -> Any:
-        if not self._link.runs:
-            self._greet()
+        self.start()
         before = self._first_state if self._state is None else self._state
         wanted = []
         if before is not None and before is not self._is_in.state:
