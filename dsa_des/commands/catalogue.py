@@ -13,13 +13,13 @@ from dsa_des.block.component import Component
 from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
+from dsa_des.block.shipped_files import folders
 from dsa_des.commands.parameters import Row, parameter_rows, scene_tables
 from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest
 from dsa_des.files.output_file import unfinished
 from dsa_des.files.output_names import check_place, location_of, named, reason_of
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
-from dsa_des.scene.shipped_files import folders
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import printable

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import sourced
+from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
@@ -26,7 +27,6 @@ from dsa_des.files.input_files import (
 from dsa_des.files.toml_files import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
 from dsa_des.scene.keys import Key, dotted
-from dsa_des.scene.shipped_files import files_named, shipped_files
 from dsa_des.text.safe_text import shortened
 
 COMMAND_LINE = "command line"

@@ -196,12 +196,12 @@ def test_failing_block_leaves_no_folder_and_exits_1(
     assert not (tmp_path / "out").exists()
 
 
-def test_stranger_component_of_the_readme_runs(
+def test_stranger_component_of_the_docs_runs(
     tmp_path: Path, configs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    readme = (configs.parent / "README.md").read_text(encoding="utf-8")
+    page = (configs.parent / "docs" / "extending.md").read_text(encoding="utf-8")
     code = next(
-        part.split("```")[0] for part in readme.split("```python\n") if "class MyRadar(" in part
+        part.split("```")[0] for part in page.split("```python\n") if "class MyRadar(" in part
     )
     (tmp_path / "mymodule.py").write_text(code)
     monkeypatch.chdir(tmp_path)
