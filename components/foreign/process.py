@@ -75,11 +75,6 @@ class ProcessParameters(Parameters):
         "again and asked again.",
     )
     most_restarts: int = Field(3, ge=1, description="How often at most in a run.")
-    rewind: bool = Field(
-        False,
-        description="Whether the program hands out its state and takes it back (`snapshots`): then "
-        "it looks ahead with its scene.",
-    )
 
     @model_validator(mode="before")
     @classmethod
@@ -137,11 +132,6 @@ class Process(Component):
     }
     Parameters = ProcessParameters
     stands_alone = True
-
-    @classmethod
-    def class_for(cls, parameters: Any) -> type[Component]:
-        """Return the class that looks ahead, where the program can be taken back."""
-        return RewindableProcess if parameters.rewind else cls
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -233,7 +223,9 @@ class Process(Component):
         elif said.get("version") != VERSION:
             wrong = f"speaks version {said.get('version')!r} of the exchange, and we {VERSION!r}"
         elif type(self).rewindable and said.get("snapshots") != "true":
-            wrong = 'cannot hand out its state (snapshots is not "true"): leave rewind out'
+            wrong = (
+                'cannot hand out its state (snapshots is not "true"): its type is foreign.process'
+            )
         first = [table for about, table in answer[1:] if about.get("table") == _STATE]
         if not wrong and type(self).rewindable and not first:
             wrong = "has not sent the state in which it starts"
@@ -312,7 +304,10 @@ class Process(Component):
 
 
 class RewindableProcess(Process):
-    """The same where the program hands out its state and takes it back."""
+    """Runs a program that hands out its state and takes it back, so that its scene looks ahead.
+
+    All else is as with ``foreign.process``; docs/foreign.md says what the program has to do.
+    """
 
     windowed = True
     rewindable = True

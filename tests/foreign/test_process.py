@@ -16,6 +16,7 @@ from wired import chain
 import dsa_des
 from components.foreign.process_link import ProcessError, ProcessLink, frame
 from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.running.simulation import Simulation
 
 CANNED = str(Path(__file__).with_name("canned.py"))
 EYE = {"type": "optical.range_boundary", "range_km": 20.0, "scan_rate_hz": 5}
@@ -247,3 +248,33 @@ def test_ten_thousand_calls_and_hundreds_of_megabytes(folder):
     assert gone(folder)
     with pytest.raises(ProcessError, match="cannot be started"):
         ProcessLink(["/no/such"], folder).start()
+
+
+@covers(
+    "command", "folder", "deadline_s", "on_failure", "most_restarts", "scan_rate_hz", "offset_s",
+    of=("foreign.process_with_state",),
+)  # fmt: skip
+def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
+    found = scene([sys.executable, str(Path(__file__).with_name("counts.py"))], duration_s=8)
+    found["wires"].remove("eye -> part -> fusion")
+    found["wires"] += [
+        "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
+    ]  # fmt: skip
+    found["blocks"]["part"] |= {"deadline_s": 20.0}
+    by_scan = dsa_des.run(found)
+    found["blocks"]["part"]["type"] = "foreign.process_with_state"
+    ahead = dsa_des.run(found)
+    assert by_scan.manoeuvres.num_rows == 5
+    for name in ("manoeuvres", "detections", "scans", "truth"):
+        assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
+    said = [
+        sorted(name for name, node in simulation.nodes.items() if node.windowed)
+        for simulation in (
+            Simulation(dsa_des.load_scene({**found, "blocks": {**found["blocks"], "part": part}}))
+            for part in (
+                found["blocks"]["part"],
+                {**found["blocks"]["part"], "type": "foreign.process"},
+            )
+        )
+    ]
+    assert "part" in said[0] and said[1] == []

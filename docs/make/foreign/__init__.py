@@ -1,0 +1,1 @@
+"""Makers of docs/foreign.md."""
