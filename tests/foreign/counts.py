@@ -1,5 +1,6 @@
-"""A program whose state is how often it was asked: it turns at every seventh call."""
+"""A program whose state is how often it was asked: it turns at every so many calls."""
 
+import json
 import struct
 import sys
 
@@ -15,7 +16,7 @@ def frame(table, batch, **about):
     return struct.pack("<Q", len(content)) + content
 
 
-asked, snapshots = 0, False
+asked, every, snapshots = 0, 0, False
 while True:
     answer = b""
     while length := struct.unpack("<Q", sys.stdin.buffer.read(8) or sys.exit())[0]:
@@ -23,13 +24,14 @@ while True:
         name = table.schema.metadata[b"table"]
         if name == b"hello":
             snapshots = table.schema.metadata[b"snapshots"] == b"true"
+            every = json.loads(table.schema.metadata[b"arguments"])["every"]
             empty = pa.RecordBatch.from_pydict({})
             answer += frame("hello", empty, version="1", snapshots="true")
         if name == b"state":
             asked = int(table.column("state")[0].as_py())
         if name == b"call":
             asked += 1
-            if asked % 7 == 0:
+            if asked % every == 0:
                 told = {"turn_rad": [0.01 * asked], "rate_rad_s": [0.05]}
                 answer += frame("manoeuvres", pa.RecordBatch.from_pydict(told))
     if snapshots:

@@ -254,17 +254,18 @@ def test_ten_thousand_calls_and_hundreds_of_megabytes(folder):
     "command", "folder", "deadline_s", "on_failure", "most_restarts", "scan_rate_hz", "offset_s",
     of=("foreign.process_with_state",),
 )  # fmt: skip
+@covers("arguments", of=("foreign.process", "foreign.process_with_state"))
 def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
     found = scene([sys.executable, str(Path(__file__).with_name("counts.py"))], duration_s=8)
     found["wires"].remove("eye -> part -> fusion")
     found["wires"] += [
         "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
     ]  # fmt: skip
-    found["blocks"]["part"] |= {"deadline_s": 20.0}
+    found["blocks"]["part"] |= {"deadline_s": 20.0, "arguments": {"every": 5}}
     by_scan = dsa_des.run(found)
     found["blocks"]["part"]["type"] = "foreign.process_with_state"
     ahead = dsa_des.run(found)
-    assert by_scan.manoeuvres.num_rows == 5
+    assert by_scan.manoeuvres.num_rows == 8
     for name in ("manoeuvres", "detections", "scans", "truth"):
         assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
     said = [
