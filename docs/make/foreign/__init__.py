@@ -1,1 +1,1 @@
-"""Makers of docs/foreign.md."""
+"""Makers of pages about other people's parts."""
