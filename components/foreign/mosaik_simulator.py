@@ -144,10 +144,10 @@ def _place(entity: str, inputs: Mapping[str, Any]) -> list[float]:
         values[name] = float(next(iter(by_source.values())))
     there = [values.get(name, math.nan) for name in _PLACE[:3]]
     turned = [values.get(name, 0.0) for name in _PLACE[3:]]
-    return [*(_radians(value) for value in there[:2]), there[2], *turned]
+    return [*(_angle_of(value) for value in there[:2]), there[2], *turned]
 
 
-def _radians(value_deg: float) -> float:
+def _angle_of(value_deg: float) -> float:
     """Return the angle that turns back into these very degrees, where there is one."""
     near = math.radians(value_deg)
     for angle in (near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)):

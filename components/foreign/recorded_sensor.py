@@ -32,6 +32,7 @@ from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import ClockSpec
 
 _FLAGS = ("declared", "cued")
+_DEG = math.radians(1.0)
 _VARIANCES = (
     "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
     "range_rate_variance_m2_s2",
@@ -44,7 +45,8 @@ class RecordedSensorParameters(Parameters):
     file: ScenePath = Field(
         description="Parquet or CSV file with time_s, azimuth_rad and elevation_rad of every "
         "detection (body axes), and what else of a run's detections.parquet there is; arrival_s "
-        "says when it came. A row without angles is a look that saw nothing. Or a run's folder."
+        "says when it came. A row without angles is a look that saw nothing. Or a run's folder, "
+        "or plots in ASTERIX (.ast), whose angles are from north and level."
     )
     block: str | None = Field(
         None, description="Whose rows are read, where the file has a column block."
@@ -54,6 +56,11 @@ class RecordedSensorParameters(Parameters):
         description="Scene whose block of the name `block` says the sensor's reach and which of "
         "its errors last; by default a run folder's scene.toml, and nothing is said for a file.",
     )
+    azimuth_error_deg: float | None = Field(
+        None, gt=0, description="Standard deviation, where the file says no variance."
+    )
+    elevation_error_deg: float | None = Field(None, gt=0, description="The same of elevations.")
+    range_error_m: float | None = Field(None, gt=0, description="The same of ranges.")
     scan_rate_hz: PositiveRational | None = Field(
         None,
         description="Nominal rate at which blocks upstream are asked for rows, where the traffic "
@@ -83,7 +90,14 @@ class RecordedSensor(Component):
 
     @cached_property
     def _measured(self) -> Measurements:
-        return read_measurements(self.p.file, self.p.block)
+        measured = read_measurements(self.p.file, self.p.block)
+        p, entries = self.p, measured.entries
+        stated = (p.azimuth_error_deg, p.elevation_error_deg, p.range_error_m)
+        for name, error, unit in zip(_VARIANCES[:3], stated, (_DEG, _DEG, 1.0), strict=True):
+            if error is not None:
+                values = entries.get(name, np.full(len(measured.target), np.nan))
+                entries[name] = np.where(np.isnan(values), (error * unit) ** 2, values)
+        return measured
 
     def natural_duration_s(self) -> Fraction:
         """Return whole seconds in which the last look has come."""

@@ -103,16 +103,19 @@ def read_measurements(path: Path, block: str | None = None) -> Measurements:
     Parameters
     ----------
     path : Path
-        A ``.parquet`` or CSV file of detections, or the folder of a run: then empty looks and the
-        ownship's pose are those of its ``scans.parquet``.
+        A ``.parquet`` or CSV file of detections; the folder of a run: then empty looks and the
+        ownship's pose are those of its ``scans.parquet``; or an ASTERIX file (``.ast``) of plots,
+        whose angles are from north and level.
     block : str, optional
-        Whose rows are read, where the file has a column ``block``.
+        Whose rows are read, where the file has a column ``block`` or more than one radar.
 
     Raises
     ------
     ValueError
         With the file, and the line or row of everything that is wrong.
     """
+    if path.suffix == ".ast":
+        return _of_asterix(path, block)
     if not is_folder(path):
         table = _read(path, _NEEDED, block)
         _check(table)
@@ -122,6 +125,43 @@ def read_measurements(path: Path, block: str | None = None) -> Measurements:
     _check(scans)
     _check(table)
     return _looks(table, scans)
+
+
+def _of_asterix(path: Path, radar: str | None) -> Measurements:
+    """Return the plots of one radar, which stands level and looks north."""
+    from components.formats.asterix_file import read_asterix_plots
+
+    problems, plots = Problems(str(path)), read_asterix_plots(path)
+    if radar is None and len(plots.radars) > 1:
+        problems.fail(f"holds plots of {', '.join(plots.radars)}: the key block must name one")
+    if radar is not None and radar not in plots.radars:
+        problems.fail(f"there is no radar {radar!r}{did_you_mean(radar, plots.radars)}")
+    mine = plots.scan_radar == (0 if radar is None else plots.radars.index(radar))
+    number = np.cumsum(mine) - 1
+    of = np.flatnonzero(mine[plots.scan])
+    of = of[np.argsort(plots.scan[of], kind="stable")]
+    scan = number[plots.scan[of]]
+    without = int(np.isnan(plots.elevation_rad[of]).sum())
+    if without:
+        problems.fail(f"{without} of {len(of)} plots have no height, or the radar has no place")
+    entries = {
+        "azimuth_rad": plots.azimuth_rad[of], "elevation_rad": plots.elevation_rad[of],
+        "range_m": plots.range_m[of],
+    }  # fmt: skip
+    time_s = plots.scan_s[mine]
+    if (plots.time_s[of] != time_s[scan]).any():
+        entries["illuminated_s"] = plots.time_s[of]
+    place = (plots.own_lat_deg, plots.own_lon_deg, plots.own_alt_m)
+    pose = [*(values[mine] for values in place), *np.zeros((3, len(time_s)))]
+    # A plot may come before its scan is over: the look is told when its last one is there.
+    arrival_s = time_s.copy()
+    np.maximum.at(arrival_s, scan, plots.time_s[of])
+    return Measurements(
+        time_s, arrival_s, np.arange(len(time_s)),
+        np.searchsorted(scan, np.arange(len(time_s) + 1)).astype(np.int64), entries,
+        dict(zip(_OWN, pose, strict=True)), (None,) * len(of),
+        tuple(f"plot {k + 1}" for k in of.tolist()),
+    )  # fmt: skip
 
 
 def _read(path: Path, needed: tuple[str, ...], block: str | None) -> _Table:

@@ -154,3 +154,39 @@ def test_traffic_beside_the_recording_flies_by_its_nominal_rate(tmp_path, rate_h
     else:
         times = dsa_des.run({**alone, "duration_s": 2}).truth.column("time_s").to_pylist()
         assert sorted(set(times)) == [0.0, 0.5, 1.0, 1.5]
+
+
+@covers(
+    "azimuth_error_deg", "elevation_error_deg", "range_error_m", of=("sensor.recorded",)
+)  # fmt: skip
+def test_plots_in_asterix_are_those_of_the_run_within_its_bits(recorded, tmp_path):
+    pytest.importorskip("asterix", reason="needs the extra asterix")
+    from click.testing import CliRunner
+
+    from components.export.command import export
+
+    file = tmp_path / "was.ast"
+    done = CliRunner().invoke(export, [str(recorded), "--to", "asterix", "--out", str(file)])
+    assert done.exit_code == 0, done.output
+    run = dsa_des.run(
+        {
+            "seed": 1, "wires": ["radar -> fusion -> tracker"],
+            "blocks": {
+                "radar": {"type": "sensor.recorded", "file": str(file), "range_error_m": 15,
+                          "azimuth_error_deg": 0.3, "elevation_error_deg": 0.4},
+                "fusion": {"type": "fusion.pass_through"},
+                "tracker": {"type": "tracking.ekf"},
+            },
+        }
+    )  # fmt: skip
+    was = pq.read_table(recorded / "detections.parquet").to_pylist()
+    was = [row for row in was if row["block"] == "pulse"]
+    now = run.detections.to_pylist()
+    assert len(now) == len(was) > 20
+    for before, after in zip(was, now, strict=True):
+        assert abs(after["range_m"] - before["range_m"]) <= 1852 / 512 + 1e-6
+        assert abs(after["time_s"] + was[0]["time_s"] - before["time_s"]) <= 1 / 128
+    assert run.state_tracks.num_rows > 20
+    stated = [np.radians(0.3) ** 2, np.radians(0.4) ** 2, 225.0]
+    names = ("azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2")
+    assert [now[0][name] for name in names] == pytest.approx(stated)
