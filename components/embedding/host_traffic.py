@@ -1,14 +1,15 @@
 """The traffic source of a scene that a host program drives (``traffic.host``)."""
 
 from fractions import Fraction
-from typing import Any
+from typing import Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.messages.reach import farthest_look
 from components.messages.targets import TrafficStates
 from dsa_des.block.component import Component, Output, Parameters
+from dsa_des.errors import Disagreements
 
 # A host says itself when it ends; effects that ask for the length of the run are told a year.
 _NO_END_S = Fraction(365 * 86400)
@@ -18,6 +19,18 @@ class Plane(Aircraft):
     """An aircraft that the host moves."""
 
     name: str = Field(min_length=1, description="Name; keys its random draws.")
+
+    @model_validator(mode="after")
+    def _nobody_receives_it(self) -> Self:
+        Disagreements.refuse(
+            [
+                f"{key} is given: cooperative sensors need to know where aircraft are between the "
+                "host's calls, so none can run in such a scene; leave it out"
+                for key in ("mode_s", "mode_c", "ads_b", "icao_address")
+                if getattr(self, key)
+            ]
+        )
+        return self
 
 
 class HostTrafficParameters(Parameters):

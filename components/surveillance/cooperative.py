@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -18,6 +18,7 @@ from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.block.mark import Mark
+from dsa_des.errors import Disagreements
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
@@ -29,28 +30,31 @@ _MEASURED_KEYS = (
     "errors", "azimuth_error_deg", "azimuth_bias_deg", "azimuth_correlation_time_s",
     "elevation_error_deg", "elevation_bias_deg", "elevation_correlation_time_s",
     "azimuth_resolution_deg", "elevation_resolution_deg", "mount_azimuth_deg",
-    "mount_elevation_deg", "mount_roll_deg", "misalignment_deg",
+    "mount_elevation_deg", "mount_roll_deg", "misalignment_deg", "quantised", "biases",
 )  # fmt: skip
 
 
 class CooperativeParameters(SensorParameters):
     """Parameters of what cooperative sensors share."""
 
-    @model_validator(mode="after")
-    def _measures_no_angles(self) -> Self:
+    @model_validator(mode="before")
+    @classmethod
+    def _measures_no_angles(cls, given: Any) -> Any:
+        # Before the checks of sensors that measure, which would ask for more such keys.
         fields = SensorParameters.model_fields
-        for key in _MEASURED_KEYS:
-            if getattr(self, key) != fields[key].default:
-                raise ValueError(
-                    f"{key} is {getattr(self, key)}: a cooperative sensor has no axes and no grid "
-                    "of its own; leave it out"
-                )
-        return self
+        Disagreements.refuse(
+            [
+                f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
+                "leave it out"
+                for key in _MEASURED_KEYS
+                if key in given and given[key] != fields[key].default
+            ]
+        )
+        return given
 
     def without_effect(self) -> list[str]:
         """Say nothing of the keys that may not be given."""
-        quiet = (*_MEASURED_KEYS, "quantised", "biases")
-        return [said for said in super().without_effect() if not said.startswith(quiet)]
+        return [said for said in super().without_effect() if not said.startswith(_MEASURED_KEYS)]
 
 
 class CooperativeSensor(Sensor):

@@ -374,6 +374,91 @@ def test_silhouette_tables(carrier, tmp_path):
     assert area_m2(seen["warm"]) == pytest.approx(22.0)
 
 
+def heard(carrier: str, folder, craft: dict, shares: dict | None = None, **ether) -> dict[str, Row]:
+    """The last report of a receiver of ADS-B and of active surveillance, if there is any."""
+    exact = {"scan_rate_hz": 1, "position_errors": "none", "compact": False, "reception": "certain"}
+    scene = chain({
+        "ether": {"type": "surveillance.ads_b", **exact, **ether},
+        "asker": {"type": "surveillance.active", "scan_rate_hz": 1, "replies": "certain",
+                  "far_every": 1, "elevation_deg": [-90, 90]},
+    }, duration_s=2)  # fmt: skip
+    scene["blocks"]["traffic"] = CARRIERS[carrier]({**BASE, **craft}, folder)
+    if shares is not None:
+        scene["blocks"]["traffic"]["equipage_shares"] = shares
+    return {row["block"]: row for row in rows(run(scene))}
+
+
+@covers("mode_s", "mode_c", "icao_address", of=tuple(CARRIERS))
+@pytest.mark.parametrize("carrier", list(CARRIERS))
+def test_transponders(carrier, tmp_path):
+    assert heard(carrier, tmp_path, {}) == {}
+    for craft, address in (
+        ({"mode_s": True, "icao_address": "4840D6"}, 0x4840D6),
+        ({"mode_c": True, "icao_address": "4840D6"}, -1),
+    ):
+        seen = heard(carrier, tmp_path, craft)
+        assert seen.keys() == {"asker"} and seen["asker"]["address"] == address
+
+
+@covers("ads_b.nic", "ads_b.silent_after_s", of=tuple(CARRIERS))
+@covers("ads_b.spoofed_north_m", "ads_b.spoofed_east_m", "ads_b.spoofed_up_m", of=tuple(CARRIERS))
+@pytest.mark.parametrize("carrier", list(CARRIERS))
+def test_broadcasts(carrier, tmp_path):
+    places = ("reported_lat_deg", "reported_lon_deg", "reported_alt_m")
+
+    def said(**ads_b):
+        return heard(carrier, tmp_path, {"ads_b": ads_b}).get("ether")
+
+    plain, other = said(), said(nic=5)
+    assert (plain["nic"], other["nic"]) == (8, 5)
+    assert said(silent_after_s=0.0) is None
+    spoofed = said(spoofed_north_m=700.0, spoofed_east_m=-300.0, spoofed_up_m=120.0)
+    moved = pymap3d.geodetic2ned(*(row[key] for row in (spoofed, plain) for key in places))
+    assert moved == pytest.approx((700.0, -300.0, -120.0), abs=0.5)
+
+
+@covers("ads_b.nacp", "ads_b.nacv", "ads_b.latency_s", "ads_b.compensated_s", of=tuple(CARRIERS))
+@pytest.mark.parametrize("carrier", list(CARRIERS))
+def test_quality_of_broadcasts(carrier, tmp_path):
+    """Errors are of one draw, in proportion to the radii of the categories."""
+
+    def said(**ads_b):
+        craft = {"ads_b": {"nacp": 11, "nacv": 4, **ads_b}}
+        return heard(carrier, tmp_path, craft, position_errors="gauss_markov")["ether"]
+
+    finest = said()
+    north_m = {
+        nacp: 111_111.0 * (said(nacp=nacp)["reported_lat_deg"] - finest["reported_lat_deg"])
+        for nacp in (8, 9)
+    }
+    assert north_m[8] / north_m[9] == pytest.approx((92.6 - 3.0) / (30.0 - 3.0), rel=1e-3)
+    # All are at rest: what they say of their velocity is its error.
+    coarse = said(nacv=1)
+    share = coarse["reported_north_m_s"] / finest["reported_north_m_s"]
+    assert share == pytest.approx(10.0 / 0.3, rel=1e-2)
+    late, ahead = (said(nacv=1, latency_s=0.3, compensated_s=s) for s in (0.0, 0.3))
+    assert late["reported_lat_deg"] != coarse["reported_lat_deg"]
+    moved_m = 111_111.0 * (ahead["reported_lat_deg"] - late["reported_lat_deg"])
+    assert moved_m == pytest.approx(0.3 * coarse["reported_north_m_s"], rel=0.3)
+
+
+SHARED = [name for name in CARRIERS if name.endswith(("intruder", "random.aircraft"))]
+
+
+@covers(*(f"equipage_shares.{key}" for key in ("mode_s", "mode_c", "ads_b")),
+        of=tuple(name.rpartition(".")[0] for name in SHARED))  # fmt: skip
+@pytest.mark.parametrize("carrier", SHARED)
+def test_shares_of_equipage(carrier, tmp_path):
+    full = {"mode_s": True, "mode_c": True, "ads_b": {}}
+    for shares, blocks in (
+        ({}, {"asker", "ether"}), ({"ads_b": 0.0}, {"asker"}),
+        ({"mode_s": 0.0, "mode_c": 0.0}, {"ether"}),
+    ):  # fmt: skip
+        assert heard(carrier, tmp_path, full, shares).keys() == blocks
+    assert heard(carrier, tmp_path, full, {"mode_c": 0.0})["asker"]["address"] >= 0
+    assert heard(carrier, tmp_path, full, {"mode_s": 0.0})["asker"]["address"] == -1
+
+
 @covers("rcs_dbsm", of=("traffic.csv.aircraft", "traffic.daa_file.aircraft"))
 @pytest.mark.parametrize("carrier", ["traffic.csv.aircraft", "traffic.daa_file.aircraft"])
 def test_a_named_aircraft_goes_before_what_all_are(carrier, tmp_path):
