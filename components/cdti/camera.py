@@ -98,6 +98,8 @@ class CameraSights:
         # A camera that renders what it sees shows just that.
         patches = getattr(camera, "patches", {})
         patch = patches.get((target, round(seen_s * self._ticks_per_s)))
+        if patch is not None:  # how far a spot stands out is no measure of its contrast
+            contrast = math.nan
         return {
             **({} if patch is None else {"patch": patch.tolist()}),
             "target": contact,
@@ -105,7 +107,7 @@ class CameraSights:
             "infrared": camera.areas == "ir",
             "age": round(max(time_s - seen_s, 0.0), 2),
             "pixels": round(pixels, 1),
-            "contrast": round(contrast, 3),
+            "contrast": None if math.isnan(contrast) else round(contrast, 3),
             "background": "sky" if line.height <= 0.0 else "ground",
             "horizon": round(line.height, 1),
             "tilt": round(math.degrees(line.tilt_rad), 2),

@@ -57,8 +57,11 @@ const Camera = (() => {
     c.imageSmoothingEnabled = false;
     c.drawImage(small, 0, 0, width, height);
     say(`${scene.name(picture.target)} by ${picture.sensor}, ${picture.age.toFixed(1)} s ago: ` +
-      `${picture.pixels} pixels, contrast ${picture.contrast}, against the ${picture.background}`);
+      `${picture.pixels} pixels, ${contrast(picture)}against the ${picture.background}`);
     return { target: picture.target, pixels: picture.pixels, wide, high };
+  }
+  function contrast(picture) {
+    return picture.contrast === null ? "" : `contrast ${picture.contrast}, `;
   }
   function outline(s, picture, wide, high) {
     const below = picture.background === "ground";
