@@ -270,7 +270,7 @@ def test_a_track_of_directions_alone_is_confirmed_at_no_range():
     assert found["targets"] == {}
 
 
-def test_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
+def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
     folder, summary = crossing
     alerts = pq.read_table(folder / "alerts.parquet").to_pylist()
     for block, levels in summary["alerts"].items():
