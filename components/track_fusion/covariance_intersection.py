@@ -28,7 +28,7 @@ from components.track_fusion.local_tracks import (
     with_newest,
 )
 from components.track_fusion.track_association import MatchRules, matched, without_strays
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
@@ -193,17 +193,15 @@ class CovarianceIntersection(Component):
         self, records: FusionRecords, local: LocalTracks, reported: FusedColumns, wake: Wake
     ) -> None:
         """Keep what is held of the replicas that may come again."""
-        if wake.side_by_side:
-            others = ~np.isin(self._local.replica, records.replica)
-            self._local = LocalTracks.joined([self._local.take(others), local])
-            others = ~np.isin(self._reported["replica"], records.replica)
-            self._reported = joined([taken(self._reported, others), reported])
-            self._records = self._records.kept_with(records)
-            return
-        last = records.replica[-1]
-        self._records = records.take(records.replica == last)
-        self._local = local.take(local.replica == last)
-        self._reported = taken(reported, reported["replica"] == last)
+
+        def others(replica: IntArray) -> BoolArray:
+            return (replica >= wake.first_run) & ~np.isin(replica, records.replica)
+
+        kept = self._local.take(others(self._local.replica))
+        self._local = LocalTracks.joined([kept, local])
+        before = taken(self._reported, others(self._reported["replica"]))
+        self._reported = joined([before, reported])
+        self._records = self._records.kept_with(records, wake.first_run)
 
     def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""

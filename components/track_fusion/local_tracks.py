@@ -193,9 +193,9 @@ class FusionRecords:
             self.time_s[which], self.own_m[:, which],
         )  # fmt: skip
 
-    def kept_with(self, newer: "FusionRecords") -> "FusionRecords":
-        """Return those of all replicas, as they are in `newer` where they are among them."""
-        old = self.take(~np.isin(self.replica, newer.replica))
+    def kept_with(self, newer: "FusionRecords", first_run: int) -> "FusionRecords":
+        """Return those of all replicas that run, as in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica) & (self.replica >= first_run))
         names = [field.name for field in fields(self)]
         both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
         whole = FusionRecords(*both)

@@ -73,7 +73,7 @@ class TrackerStub(Component):
         if len(updated) == 0:
             return None
         replica = wake.replica[updated]
-        passed = self._set_aside(replica, wake)
+        aside = self._set_aside(replica, wake.first_run)
         targets = _present(self._targets, fused.target, len(fused.roster))
         pool, held, new = self._pool(fused, np.repeat(replica, counts[updated]))
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
@@ -93,20 +93,21 @@ class TrackerStub(Component):
             np.minimum.at(own_from, np.searchsorted(replica, self._replicas), held)
             own_from = np.maximum.accumulate(np.where(begins, own_from, 0))
             last[last < own_from[:, np.newaxis]] = -1
-        self._remember(last, replica, targets, pool, passed, wake)
+        self._remember(last, replica, targets, pool, aside)
         return self._tracks(fused, wake.ticks[updated], targets, last, pool, first)
 
-    def _set_aside(self, replica: IntArray, wake: Wake) -> Any:
-        """Keep what is held by replicas that are updated now; return what others hold."""
-        here = np.isin(self._replicas, replica if wake.side_by_side else replica[:1])
+    def _set_aside(self, replica: IntArray, first_run: int) -> Any:
+        """Keep what is held by replicas that are updated now; return what others that run hold."""
+        here = np.isin(self._replicas, replica)
         if here.all():
             return None
-        aside = self._targets[~here], self._replicas[~here], {
-            name: values[~here] for name, values in self._held.items()
+        others = ~here & (self._replicas >= first_run)
+        aside = self._targets[others], self._replicas[others], {
+            name: values[others] for name, values in self._held.items()
         }  # fmt: skip
         self._targets, self._replicas = self._targets[here], self._replicas[here]
         self._held = {name: values[here] for name, values in self._held.items()}
-        return aside if wake.side_by_side else None
+        return aside
 
     def _remember(
         self,
@@ -115,12 +116,9 @@ class TrackerStub(Component):
         targets: IntArray,
         pool: dict[str, Any],
         aside: Any,
-        wake: Wake,
     ) -> None:
-        """Hold what each replica, or the last one if the others never come again, holds now."""
+        """Hold what each replica holds now."""
         ends = np.append(replica[1:] != replica[:-1], True).nonzero()[0]
-        if not wake.side_by_side:
-            ends = ends[-1:]
         row, column = (last[ends] >= 0).nonzero()
         entry = last[ends][row, column]
         self._targets, self._replicas = targets[column], replica[ends][row]

@@ -163,9 +163,9 @@ class ReplicaRecords:
             np.ascontiguousarray(self.origin[:, which]),
         )
 
-    def kept_with(self, newer: "ReplicaRecords") -> "ReplicaRecords":
-        """Return those of all replicas, as they are in `newer` where they are among them."""
-        old = self.take(~np.isin(self.replica, newer.replica))
+    def kept_with(self, newer: "ReplicaRecords", first_run: int) -> "ReplicaRecords":
+        """Return those of all replicas that run, as in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica) & (self.replica >= first_run))
         names = ("replica", "next_number", "tick", "origin")
         both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
         whole = ReplicaRecords(*both)

@@ -168,9 +168,7 @@ class Tracker(Component):
             return None
         replica = wake.replica[scans.row]
         records = self._records.continued_by(replica, scans.pose[:3])
-        store = self._store
-        if not wake.side_by_side:
-            store = store.take(np.isin(store.replica, records.replica))
+        store = self._store.take(self._store.replica >= wake.first_run)
         past = self._past
         begin = 0
         before: dict[int, Before] = {}
@@ -224,11 +222,7 @@ class Tracker(Component):
                         plan.row[works[reports]],
                     )
                 )
-        if wake.side_by_side:
-            self._records, self._store = self._records.kept_with(records), store
-        else:
-            self._records = records.take(records.replica == records.replica[-1])
-            self._store = store.take(store.replica == records.replica[-1])
+        self._records, self._store = self._records.kept_with(records, wake.first_run), store
         self._past = Past.of(
             scans, memory.get(len(records.replica) - 1), before, records.replica[-1]
         )

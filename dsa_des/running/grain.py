@@ -239,9 +239,7 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
     per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
-    if time.side_by_side and window is None:  # each of them makes these scans
-        per_tick *= time.replicas
-    return max(1, int(scans / per_tick)) if per_tick else time.end_tick
+    return max(1, int(scans / per_tick)) if per_tick else time.run_ticks
 
 
 def _clocks(nodes: Iterable[Node]) -> list[ScanClock]:

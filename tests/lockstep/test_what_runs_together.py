@@ -123,5 +123,5 @@ def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
     phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
     scenes = lock.replicas_of(scene, *phases)
     simulation = lock.same_as_alone(scenes, window=None if closed else 2)
-    assert simulation.side_by_side == closed
+    assert (simulation.time.runs == range(3)) == closed
     assert not simulation.timeline.split
