@@ -184,10 +184,9 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others;
-    #: where a wake is a stretch of time of all of them (`Wake.side_by_side`) the next one comes
-    #: back to each. A class says so of its own code only: a subclass that does not say it again
-    #: gets an instance for each replica.
+    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others:
+    #: the next wake comes back to each but those before its `Wake.first_run`. A class says so of
+    #: its own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
