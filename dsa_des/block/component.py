@@ -184,10 +184,9 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others;
-    #: where a wake is a stretch of time of all of them (`Wake.side_by_side`) the next one comes
-    #: back to each. A class says so of its own code only: a subclass that does not say it again
-    #: gets an instance for each replica.
+    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others:
+    #: the next wake comes back to each but those before its `Wake.first_run`. A class says so of
+    #: its own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -344,6 +343,22 @@ class Component:
     def path(cls) -> str:
         """Return ``module:Class``."""
         return f"{cls.__module__}:{cls.__qualname__}"
+
+
+@dataclass(eq=False)
+class RunEnd(Message):
+    """A run is over: the instant of a row is the first that is no longer part of it.
+
+    Whoever sends one need not be wired to anybody. Nothing of this instant or a later one is
+    recorded, and no block runs then; of replicas that run together the others go on. The first row
+    counts. As every row it is of an instant at which the block ran, so that the end of a run
+    follows from what came before it.
+    """
+
+
+def ends_its_run(block: type[Component]) -> bool:
+    """Return whether blocks of a class may end their run."""
+    return any(issubclass(output.message, RunEnd) for output in block.outputs.values())
 
 
 __all__ = [

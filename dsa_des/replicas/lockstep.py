@@ -269,7 +269,7 @@ class Replicas(Timeline):
         return EqualWindows(self.time, min(of_all, lookahead_ticks), self.runs)
 
     def grain(self, window: int | None) -> Grain:
-        """Return the grain: all blocks run in windows, in loops in those that nothing comes back in."""
+        """Return the grain: all run in windows, in loops in those that nothing comes back in."""
         return Grain(set(self.scene.blocks), False, self._opened, {})
 
     def channel(self, wire: Wire, delay_ticks: int) -> Channel:
