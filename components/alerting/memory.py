@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.keyed_table import turns
 
 _NONE = -1
 # The time of what has not been yet.

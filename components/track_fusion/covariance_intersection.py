@@ -25,9 +25,9 @@ from components.track_fusion.local_tracks import (
     with_newest,
 )
 from components.track_fusion.track_association import MatchRules, matched, without_strays
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.keyed_table import KeyedTable, turns
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
 

@@ -19,8 +19,8 @@ from components.messages.state_tracks import (
 )
 from components.track_fusion.local_tracks import LocalTracks
 from components.track_fusion.track_association import bearing, leaders
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.keyed_table import KeyedTable
 from dsa_des.block.message import offsets_of
 
 

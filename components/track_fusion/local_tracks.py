@@ -9,8 +9,8 @@ from components.estimation.batched import times
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.keyed_table import KeyedTable
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _OWN = ("own_north_m", "own_east_m", "own_down_m")

@@ -11,9 +11,9 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.keyed_table import KeyedTable
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from components.estimation.batched import is_everything
 from components.estimation.estimator import Estimates
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.keyed_table import KeyedTable
 
 #: Looks in vain of a sensor that never hit a track.
 NEVER = 1 << 40

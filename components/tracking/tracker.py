@@ -36,9 +36,9 @@ from components.tracking.rules import TrackerParameters, TrackerRules, why_no_ra
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
 from components.tracking.track_store import TrackStore, records_of
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
-from dsa_des.block.keyed_table import KeyedTable, turns
 from dsa_des.block.wake import Wake
 
 #: Bits of a mask of sensors.

@@ -32,8 +32,8 @@ from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
 from components.traffic.steered_ownship import arrived_manoeuvres
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.keyed_table import turns
 from dsa_des.block.wake import ReplicaRuns, Wake
 
 
