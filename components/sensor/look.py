@@ -115,14 +115,14 @@ class Cells:
         )
         self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
-        #: Which lie in a cone that a cue told of; None where none does.
+        #: Which lie in a cone of a cue; None where none does.
         self.cued: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.target)
 
     def is_cued(self) -> BoolArray:
-        """Return which cells lie in a cone that a cue told of."""
+        """Return which cells lie in a cone of a cue."""
         if self.cued is None:
             return np.zeros(len(self), dtype=bool)
         return self.cued
@@ -158,6 +158,13 @@ class Cells:
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
 
+    @cached_property
+    def state_ns(self) -> IntArray:
+        """When the aircraft were where each cell has them, in ns of its run; see `instant_ns`."""
+        if self._targets.state_tick is None:
+            return self.instant_ns
+        return nanosecond_of(self._own(self.of_row("state_tick")), self._ticks_per_s)
+
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
         """Return what is seen of some cells a little before or after they are looked at.
 
@@ -170,8 +177,9 @@ class Cells:
         Returns
         -------
         dict of (n,) arrays
-            Fields of `RelativeTargets` by name, and the ownship's pose as ``own_lat_deg`` and so
-            on. ``present`` says whether both aircraft are there then.
+            Fields of `RelativeTargets` by name, the ownship's pose as ``own_lat_deg`` and so on,
+            and the target's place as ``target_lat_deg`` and so on. ``present`` says whether both
+            aircraft are there then.
 
         Raises
         ------
@@ -200,15 +208,22 @@ class Cells:
         """Return a field of the message that has one value per row, for each cell."""
         return getattr(self._targets, name).take(self._flat // self._width)
 
+    def own_belief(self, name: str) -> FloatArray:
+        """Return what the ownship believes of itself, for each cell; see `RelativeTargets`."""
+        believed = self._targets.believed
+        if believed is None:
+            raise ValueError("a block on the way does not say what the ownship believes of itself")
+        return np.asarray(believed[name].take(self._flat // self._width))
+
     @cached_property
     def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not told."""
-        told = self._targets.own_attitude
-        if told is None:
+        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not known."""
+        attitude = self._targets.own_attitude
+        if attitude is None:
             nothing = np.zeros(len(self))
             return nothing, nothing, nothing
         row = self._flat // self._width
-        yaw, pitch, roll = (told[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
+        yaw, pitch, roll = (attitude[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
         return yaw, pitch, roll
 
     def of_target(self, column: FloatArray) -> AnyArray:

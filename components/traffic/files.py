@@ -1,4 +1,4 @@
-"""Recorded traffic: flights read from files (``traffic.daa_file``, ``traffic.csv``)."""
+"""Recorded traffic: flights read from files of DAIDALUS, CSV tables and ASTERIX."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft
+from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.fleet import SampledFleet
 from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.flights.sampled_flight import SampledTrajectory
+from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.text_rows import TrafficFile
@@ -152,6 +154,9 @@ class FileParameters(SourceParameters):
     aircraft: dict[str, Aircraft] = Field(
         default={}, description="What single intruders are, by their names in the file."
     )
+    equipage_shares: EquipageShares = Field(
+        default=EquipageShares(), description="Shares of intruders that carry their equipage."
+    )
 
 
 class DaaFileParameters(FileParameters):
@@ -165,7 +170,7 @@ class DaaFileParameters(FileParameters):
 
 
 class CsvParameters(FileParameters):
-    """Parameters of a CSV traffic file."""
+    """Parameters of a file in which the ownship may be named."""
 
     ownship: str | None = Field(
         default=None, description="Name of the ownship; by default the first aircraft named."
@@ -193,6 +198,10 @@ class RecordedTraffic(TrafficSource):
             parameters.aircraft,
             str(parameters.file),
         )
+        if parameters.equipage_shares != EquipageShares():
+            names, stream = self.roster.names, self.stream("equipage")
+            shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
+            self.roster = Roster.of(list(zip(names, shared, strict=True)))
 
     def _in_wind(self, content: TrafficFile) -> TrafficFile:
         """Return the flights with noses turned into the scene's wind, where there is one."""
@@ -271,3 +280,14 @@ class CsvFile(RecordedTraffic):
     def read(self) -> TrafficFile:
         """Return the content of the file."""
         return read_csv(self.p.file, self.p.ownship)
+
+
+class AsterixFile(RecordedTraffic):
+    """Traffic from an ASTERIX file: system tracks (062) and ADS-B reports (021)."""
+
+    Parameters = CsvParameters
+    lockstep = True
+
+    def read(self) -> TrafficFile:
+        """Return the content of the file."""
+        return read_asterix(self.p.file, self.p.ownship)

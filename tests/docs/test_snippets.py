@@ -27,7 +27,7 @@ from tests import warm_process
 
 RUN = [page for page in PAGES if any(not not_run(part) for part in read_snippets(page))]
 #: Pages that show what an extra does, and the package that it installs.
-EXTRAS = {"docs/stone-soup.md": "stonesoup"}
+EXTRAS = {"docs/formats.md": "asterix", "docs/stone-soup.md": "stonesoup"}
 LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
 
 
