@@ -108,10 +108,10 @@ class Fusion(Component):
 
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
-        for name, old in self._recent.items():
-            if ended := int(np.searchsorted(old.tick, wake.first_run * wake.span_ticks)):
+        for name, seen in self._recent.items():
+            if ended := int(np.searchsorted(seen.tick, wake.first_run * wake.span_ticks)):
                 rows = slice(ended, None)
-                self._recent[name] = Arrivals(name, old.tick[rows], old.message.take(rows))
+                self._recent[name] = Arrivals(name, seen.tick[rows], seen.message.take(rows))
         for name, new in arrivals.items():
             old = self._recent.get(name)
             if old is not None:
