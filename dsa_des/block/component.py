@@ -224,6 +224,14 @@ class Component:
         return None
 
     @classmethod
+    def class_for(cls, parameters: Any) -> "type[Component]":
+        """Return the class that fills a block with these parameters; itself by default.
+
+        A subclass with the same parameters and ports, where these decide what it can do.
+        """
+        return cls
+
+    @classmethod
     def all_hooks(cls) -> dict[str, str]:
         """Return the hooks of this class and its bases, with their descriptions."""
         found: dict[str, str] = {}

@@ -1,0 +1,1 @@
+"""Other people's parts as blocks of a scene."""
