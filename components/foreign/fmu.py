@@ -207,7 +207,11 @@ class Wiring:
         names = self.p.outputs
         raised = list(self.model.raised)
         if names is None:
-            names = [v.name for v in self.model.variables.values() if v.causality == "output"]
+            names = [
+                v.name
+                for v in self.model.variables.values()
+                if v.causality == "output" and not v.alias
+            ]
         else:
             raised = [name for name in names if name in raised]
             names = [name for name in names if name not in raised]
@@ -422,6 +426,7 @@ class ForeignFmu(Component):
     }
     Parameters = FmuParameters
     windowed = True
+    stands_alone = True
 
     @classmethod
     def class_for(cls, parameters: Any) -> type[Component]:

@@ -73,6 +73,7 @@ class Variable:
     dimensions: tuple[int | str, ...] = ()
     start: str | None = None
     settable: bool = False
+    alias: bool = False
 
 
 @dataclass(frozen=True)
@@ -238,6 +239,7 @@ def _variable(v: Any, version: int, everything: Any) -> Variable:
     return Variable(
         v.name, v.unit or declared or "", v.valueReference, kind, v.causality or "local",
         v.variability or usual, dimensions, v.start, settable and v.variability != "constant",
+        v.alias is not None,
     )  # fmt: skip
 
 

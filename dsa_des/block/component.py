@@ -204,6 +204,8 @@ class Component:
     also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
+    #: Whether what it records is reason enough for it, wired to somebody or not.
+    stands_alone: ClassVar[bool] = False
     #: How figures mark it; a neutral one by default.
     mark: ClassVar[Mark | None] = None
 
