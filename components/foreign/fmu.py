@@ -34,6 +34,8 @@ from dsa_des.time.clock import ClockSpec
 
 _OWNSHIP = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_yaw_rad", "own_pitch_rad",
             "own_roll_rad")  # fmt: skip
+#: What a manoeuvre changes; its other fields say how fast.
+_CHANGES = ("turn_rad", "climb_m", "speed_mps", "vertical_speed_mps")
 _SOURCE = re.compile(r"(?P<block>[^.\[\]]+)\.(?P<column>[^\[\]]+)(\[(?P<which>[^\]]*)\])?")
 _ELEMENT = re.compile(r"(?P<name>.*)\[(?P<place>\d+)\]")
 _MOST_ELEMENTS = 100_000
@@ -84,12 +86,12 @@ class FmuParameters(Parameters):
     @property
     def model(self) -> FmuModel:
         """What the FMU says of itself."""
-        return self._model  # type: ignore[no-any-return]
+        return self._model
 
     @property
     def wiring(self) -> "Wiring":
         """How its variables are read and set."""
-        return self._wiring  # type: ignore[no-any-return]
+        return self._wiring
 
     @model_validator(mode="after")
     def _fits(self) -> "FmuParameters":
@@ -639,7 +641,8 @@ class ForeignFmu(Component):
         how = [self.p.wiring.outward(*item) for item in self.p.manoeuvre.items()]
         told = np.stack([a * numbers[:, place] + b for place, a, b in how], axis=1)
         before = np.vstack([self._told[np.newaxis], told[:-1]])
-        new = np.flatnonzero((told != before).any(axis=1) & (told != 0.0).any(axis=1))
+        changes = [place for place, name in enumerate(self.p.manoeuvre) if name in _CHANGES]
+        new = np.flatnonzero((told != before).any(axis=1) & (told[:, changes] != 0.0).any(axis=1))
         self._told = told[-1].copy()
         names = list(self.p.manoeuvre)
         return Manoeuvres.at_rows(

@@ -36,6 +36,13 @@ class Chain(Fmi3Slave, CoSimulation):
         self.chain = fmu_export.Chain(self.resources)
         self.description = self.chain.title
         self.register_units([Unit("m", m=1), Unit("rad", rad=1), Unit("s", s=1)])
+        self.time = 0.0
+        self.register_variable(
+            Float64(
+                "time", causality=Fmi3Causality.independent,
+                variability=Fmi3Variability.continuous, unit="s",
+            )
+        )
         kinds = {"float": Float64, "bool": Boolean, "int": Int32}
         ways = {"input": Fmi3Causality.input, "output": Fmi3Causality.output}
         for one in self.chain.variables():
@@ -55,6 +62,7 @@ class Chain(Fmi3Slave, CoSimulation):
 
     def do_step(self, current_time, step_size):
         self.chain.step(current_time)
+        self.time = current_time + step_size
         return Fmi3StepResult(status=Fmi3Status.ok)
 '''
 _POSE = {
@@ -72,7 +80,9 @@ _SEEN = {
 class _Variable:
     """A variable of the FMU, and the place where its value stands."""
 
-    def __init__(self, name: str, kind: str, way: str, meaning: str, place: tuple[Any, Any]) -> None:
+    def __init__(
+        self, name: str, kind: str, way: str, meaning: str, place: tuple[Any, Any]
+    ) -> None:
         self.name, self.kind, self.way, self.meaning = name, kind, way, meaning
         ending = name.rpartition("_")[2]
         self.unit = ending if kind == "float" and ending in ("m", "rad", "s") else None
@@ -203,6 +213,8 @@ def _planes_of(scene: Scene) -> dict[str, Any]:
     traffic: Any = Simulation(scene).components[source_of(scene)]
     roster = traffic.roster
     return {
-        name: aircraft.model_dump(mode="json", include=set(Aircraft.model_fields), exclude_none=True)
+        name: aircraft.model_dump(
+            mode="json", include=set(Aircraft.model_fields), exclude_none=True
+        )
         for name, aircraft in zip(roster.names, roster.aircraft, strict=True)
     }

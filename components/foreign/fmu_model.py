@@ -78,7 +78,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Clock:
-    """An input clock of a scheduled-execution FMU; `interval_s` is None where it is not constant."""
+    """An input clock of a scheduled-execution FMU; `interval_s` is None where it varies."""
 
     name: str
     reference: int
@@ -278,12 +278,10 @@ def _terminals(archive: zipfile.ZipFile, names: list[str]) -> dict[str, dict[str
     name = "terminalsAndIcons/terminalsAndIcons.xml"
     if name not in names:
         return {}
-    found = {}
+    found: dict[str, dict[str, str]] = {}
     for terminal in ElementTree.fromstring(archive.read(name)).iter("Terminal"):
-        found[terminal.get("name", "")] = {
-            member.get("memberName") or member.get("variableName", ""): member.get(
-                "variableName", ""
-            )
-            for member in terminal.findall("TerminalMemberVariable")
-        }
+        members = found.setdefault(terminal.get("name", ""), {})
+        for member in terminal.findall("TerminalMemberVariable"):
+            variable = member.get("variableName", "")
+            members[member.get("memberName", variable)] = variable
     return found

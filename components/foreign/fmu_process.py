@@ -10,6 +10,7 @@ import tempfile
 import threading
 import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary, finalize
@@ -164,10 +165,8 @@ class _Watch:
 def _end(process: Any, folder: Path) -> None:
     process.kill()
     for pipe in (process.stdin, process.stdout):
-        try:
+        with suppress(OSError):
             pipe.close()
-        except OSError:
-            pass
     process.wait()
     shutil.rmtree(folder, ignore_errors=True)
 

@@ -55,14 +55,14 @@ class Group:
         self.call = f"fmi{3 if fmu.three else 2}{verb}{name}"
         references = [reference for reference, _ in variables]
         self.count = sum(size for _, size in variables)
-        self.references = (c.c_uint32 * len(references))(*references)
+        self.references: Any = (c.c_uint32 * len(references))(*references)
         self._function = fmu.function(self.call)
         if kind == "Binary":
             self.sizes = (c.c_size_t * self.count)()
             self.buffer: Any = (c.POINTER(c.c_uint8) * self.count)()
             middle = [self.sizes]
         else:
-            self.buffer, middle = (self.type * self.count)(), []  # type: ignore[operator]
+            self.buffer, middle = (self.type * self.count)(), []
         if not self.text:
             self.values = np.frombuffer(self.buffer, dtype=np.dtype(self.type))
         tail = [c.c_size_t(self.count)] if fmu.three else []
@@ -152,7 +152,7 @@ class Instance:
             function.argtypes = [c.c_void_p, c.c_double, c.c_double, c.c_int]
             self._do_step = function
         elif spec["kind"] == "cs":
-            self._flags = [c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()]
+            self._flags: Any = [c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()]
             function = self.function("fmi3DoStep")
             pointer = c.c_void_p
             function.argtypes = [

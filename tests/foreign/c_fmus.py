@@ -74,6 +74,8 @@ int fmi3GetFloat64(void *c, const uint32_t *vr, size_t n, double *v, size_t nv) 
     case 2: *v++ = m->x; break;
     case 3: for (int j = 0; j < m->n; j++) *v++ = m->x * m->u[j]; break;
     case 4: *v++ = m->t; break;
+    case 12: *v++ = m->u[0] > 0 && m->u[0] < 20000 ? 0.5 : 0; break;
+    case 13: *v++ = 0.05; break;
     default: return 3; }
   return 0;
 }
@@ -163,6 +165,8 @@ _DESCRIPTION3 = """<?xml version="1.0" encoding="UTF-8"?>
   <Int32 name="fault" valueReference="7" causality="parameter" variability="fixed" start="0"/>
   <Int32 name="steps" valueReference="8" causality="output"/>
   <Int32 name="seen" valueReference="10" causality="output"/>
+  <Float64 name="turn" valueReference="12" causality="local" unit="rad"/>
+  <Float64 name="turn_rate" valueReference="13" causality="local" unit="rad/s"/>
   <UInt64 name="largest" valueReference="11" causality="local"/>
  </ModelVariables>
  <ModelStructure><Output valueReference="2"/></ModelStructure>
