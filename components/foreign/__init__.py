@@ -1,1 +1,1 @@
-"""Other people's parts as blocks of a scene."""
+"""Other people's parts as blocks: FMUs, processes, recorded measurements, other simulators."""

@@ -77,7 +77,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Clock:
+class PartitionClock:
     """An input clock of a scheduled-execution FMU; `interval_s` is None where it varies."""
 
     name: str
@@ -119,7 +119,7 @@ class FmuModel:
     step_s: Fraction | None
     variables: Mapping[str, Variable]
     scales: Mapping[str, Scale | None]
-    clocks: Mapping[str, Clock] = field(default_factory=dict)
+    clocks: Mapping[str, PartitionClock] = field(default_factory=dict)
     raised: Mapping[str, int] = field(default_factory=dict)
     terminals: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
@@ -251,7 +251,7 @@ def _scale(unit: Any) -> Scale | None:
     return Scale(tuple(map(int, powers)), float(base.factor), float(base.offset))
 
 
-def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, Clock], dict[str, int]]:
+def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, PartitionClock], dict[str, int]]:
     """Return the input clocks, and the references of the output clocks; FMPy reads neither."""
     clocks, raised = {}, {}
     for item in ElementTree.fromstring(archive.read("modelDescription.xml")).iter("Clock"):
@@ -266,7 +266,7 @@ def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, Clock], dict[str, int]]
             shift = Fraction(int(item.get("shiftCounter", 0)), int(resolution))
         elif decimal := item.get("intervalDecimal"):
             interval, shift = Fraction(decimal), Fraction(item.get("shiftDecimal", "0"))
-        clocks[name] = Clock(
+        clocks[name] = PartitionClock(
             name, reference, int(item.get("priority", 0)), item.get("intervalVariability", ""),
             interval, shift, item.get("supportsFraction") in ("true", "1"),
         )  # fmt: skip

@@ -37,7 +37,7 @@ class FmuFailure(Exception):
     """What an FMU refused, in its own words."""
 
 
-class Group:
+class ValueGroup:
     """The variables of one type that are read, or set, together, and their buffer.
 
     Parameters
@@ -144,9 +144,11 @@ class Instance:
     def _groups(self) -> None:
         spec = self.spec
         kinds = [(kind, [tuple(v) for v in variables]) for kind, variables in spec["outputs"]]
-        self.numbers = [Group(self, k, v, "Get") for k, v in kinds if k not in ("String", "Binary")]
-        self.texts = [Group(self, k, v, "Get") for k, v in kinds if k in ("String", "Binary")]
-        self.setters = [(Group(self, kind, v, "Set"), kind) for kind, v in spec["inputs"]]
+        self.numbers = [
+            ValueGroup(self, k, v, "Get") for k, v in kinds if k not in ("String", "Binary")
+        ]
+        self.texts = [ValueGroup(self, k, v, "Get") for k, v in kinds if k in ("String", "Binary")]
+        self.setters = [(ValueGroup(self, kind, v, "Set"), kind) for kind, v in spec["inputs"]]
         if not self.three:
             function = self.function("fmi2DoStep")
             function.argtypes = [c.c_void_p, c.c_double, c.c_double, c.c_int]
@@ -211,7 +213,7 @@ class Instance:
 
     def _put(self, starts: Any) -> None:
         for kind, reference, values, _ in starts:
-            Group(self, kind, [(reference, len(values))], "Set").put(values)
+            ValueGroup(self, kind, [(reference, len(values))], "Set").put(values)
 
     def _events(self, entered: bool = False) -> None:
         """Let it handle an event, where it has an event mode."""
