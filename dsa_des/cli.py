@@ -5,44 +5,21 @@ Exit codes: 0 done, 1 a block failed while it ran or results could not be writte
 the call is wrong, 130 ctrl-C, 143 SIGTERM.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import click
 
 from dsa_des import __version__
-from dsa_des.commands.group import PluginGroup, plain_errors
-
-
-def _scene_options(
-    command: Callable[..., None], scene_required: bool = True
-) -> Callable[..., None]:
-    for option in (
-        click.option("--duration", metavar="S", help="Length of the run in seconds."),
-        click.option("--seed", type=int, help="Seed of all random draws."),
-        click.option(
-            "--swap",
-            "swaps",
-            multiple=True,
-            metavar="BLOCK=TYPE",
-            help="Put another component into a block; name and wires stay.",
-        ),
-        click.option(
-            "--set",
-            "sets",
-            multiple=True,
-            metavar="KEY=VALUE",
-            help="Change one value, e.g. blocks.radar.scan_rate_hz=2.",
-        ),
-        click.argument("scene", metavar="SCENE", required=scene_required),
-    ):
-        command = option(command)
-    return command
-
-
-def _optional_scene_options(command: Callable[..., None]) -> Callable[..., None]:
-    return _scene_options(command, scene_required=False)
-
+from dsa_des.commands.group import (
+    PluginGroup,
+    WithSubcommands,
+    completing,
+    plain_errors,
+    scene_options,
+    seed_option,
+    set_option,
+    swap_option,
+)
 
 _figures_option = click.option(
     "--no-figures", is_flag=True, help="Draw nothing; results are the same."
@@ -64,7 +41,7 @@ def main() -> None:
 
 
 @main.command()
-@_scene_options
+@scene_options()
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-NNN].")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON only.")
@@ -84,7 +61,7 @@ def run(**options: Any) -> None:
 
 
 @main.command()
-@_scene_options
+@scene_options()
 @click.option(
     "--no-import",
     is_flag=True,
@@ -99,7 +76,7 @@ def check(**options: Any) -> None:
 
 
 @main.command()
-@_scene_options
+@scene_options()
 @click.option("--dot", is_flag=True, help="Print the graph in Graphviz's DOT language.")
 @click.option("--png", is_flag=True, help="Draw the graph as SCENE-graph.png.")
 @click.option("--out", metavar="FILE", help="Another name for the PNG file.")
@@ -112,7 +89,7 @@ def graph(**options: Any) -> None:
 
 
 @main.command()
-@_scene_options
+@scene_options()
 @click.option("--measure", is_flag=True, help="Run the scene and show each effect's share.")
 @_everything_option
 @plain_errors
@@ -124,7 +101,7 @@ def explain(**options: Any) -> None:
 
 
 @main.command()
-@_optional_scene_options
+@scene_options(required=False)
 @click.option("--block", metavar="NAME", help="Climb only this block's ladders.")
 @click.option("--against", metavar="RUNG", help="Another reference than the ladder's own.")
 @click.option(
@@ -164,13 +141,14 @@ def cost(**options: Any) -> None:
 
 
 @main.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completing("types"))
+@click.argument("key", required=False, shell_complete=completing("keys_of_type"))
 @plain_errors
-def components(name: str | None) -> None:
-    """List the block types, or describe one: its ports, parameters, units and bounds."""
+def components(name: str | None, key: str | None) -> None:
+    """List the block types or those of a kind (radar), or describe a type or one KEY of it."""
     from dsa_des.commands.catalogue import show_components
 
-    show_components(name)
+    show_components(name, key)
 
 
 @main.command()
@@ -188,52 +166,99 @@ _workers_option = click.option(
 )
 
 
-@main.command()
-@click.argument("words", nargs=-1, metavar="STUDY.toml | show FOLDER | report FOLDER")
-@click.option(
-    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Change one value of the study file."
+_out_option = click.option(
+    "--out", metavar="DIR", help="Folder for the results [default: studies/STUDY-NNN]."
 )
-@_workers_option
-@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
-@click.option("--executor", type=click.Choice(["local", "dask"]), default="local")
-@click.option("--scheduler", metavar="ADDR", help="Dask scheduler, e.g. tcp://localhost:8786.")
-@click.option("--out", metavar="DIR", help="Folder for the results [default: studies/STUDY-NNN].")
-@click.option("--metrics", is_flag=True, help="List what studies can measure.")
-@_figures_option
-@click.option(
+_replicas_option = click.option(
+    "--replicas",
+    type=int,
+    metavar="N",
+    help="Runs of each cell of a study; of each scene [default: 20].",
+)
+_json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the tables as JSON only."
+)
+_measure_option = click.option(
     "--measure",
     is_flag=True,
     help="Measure how wrong the models of the first run are, for the report; by itself from 100 "
     "runs on.",
 )
-@click.option("--quiet", is_flag=True, help="Print no tables.")
+
+
+@click.command(cls=WithSubcommands)
+@click.argument("study", metavar="STUDY", required=False, shell_complete=completing("studies"))
+@set_option
+@swap_option
+@seed_option
+@_replicas_option
+@_workers_option
+@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
+@click.option("--executor", type=click.Choice(["local", "dask"]), default="local")
+@click.option("--scheduler", metavar="ADDR", help="Dask scheduler, e.g. tcp://localhost:8786.")
+@_out_option
+@click.option("--metrics", is_flag=True, help="List what studies can measure.")
+@_figures_option
+@_measure_option
+@_json_option
+@click.option("--quiet", is_flag=True, help="Print nothing.")
 @plain_errors
 def study(**options: Any) -> None:
     """Run a STUDY: many runs of a scene over axes and random draws, with their statistics.
 
-    `show` prints the tables of a folder, `report` writes them as one self-contained HTML page.
+    --set changes a value of the study file: replicas=4, or set.blocks.radar.scan_rate_hz=2 for one
+    of its scene; --swap puts another component into a block of its scene.
     """
     from dsa_des.commands.study import study_command
 
     study_command(**options)
 
 
+main.add_command(study)
+
+
+@study.command("show")
+@click.argument("folder", metavar="FOLDER", type=click.Path())
+@_figures_option
+@_json_option
+@plain_errors
+def show(**options: Any) -> None:
+    """Print the tables of a study's folder, and draw its figures again."""
+    from dsa_des.commands.study import show_command
+
+    show_command(**options)
+
+
+@study.command("report")
+@click.argument("folder", metavar="FOLDER", type=click.Path())
+@click.option("--out", metavar="FILE", help="Another name for the page.")
+@_figures_option
+@_measure_option
+@plain_errors
+def report(**options: Any) -> None:
+    """Write the tables and figures of a study's folder as one self-contained HTML page."""
+    from dsa_des.commands.study import report_command
+
+    report_command(**options)
+
+
 @main.command()
-@click.argument("paths", nargs=-1, required=True, metavar="A [B ...]")
-@click.option(
-    "--swap",
-    "swaps",
-    multiple=True,
-    metavar="BLOCK=TYPE",
-    help="Compare A with itself after putting another component into a block.",
+@click.argument(
+    "paths", nargs=-1, required=True, metavar="A [B ...]", shell_complete=completing("examples")
 )
-@click.option("--replicas", type=int, default=20, help="Runs of each scene [default: 20].")
-@click.option("--metric", "results", multiple=True, help="Show these results only.")
+@set_option
+@swap_option
+@seed_option
+@_replicas_option
+@click.option("--metric", "results", multiple=True, metavar="NAME", help="Show these results only.")
 @_workers_option
-@click.option("--out", metavar="DIR", help="Folder for the results [default: studies/...].")
+@click.option("--out", metavar="DIR", help="Folder for the results [default: studies/compare-NNN].")
 @plain_errors
 def compare(**options: Any) -> None:
-    """Compare studies, scenes or a swap: paired differences on the same encounters and draws."""
+    """Compare studies, scenes or a swap: paired differences on the same encounters and draws.
+
+    --set and --seed are of all that is compared; --swap compares A with itself after the swap.
+    """
     from dsa_des.commands.compare import compare_command
 
     compare_command(**options)

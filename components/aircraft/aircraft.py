@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from operator import attrgetter
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter
+from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_validator
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters, ScenePath
@@ -103,6 +103,43 @@ class InfraredAreas(VisibleAreas):
     back_m2: float = Field(ge=0, description="Area of the sphere seen from behind, m².")
 
 
+class LaserSurface(Parameters):
+    """What a laser hits: a surface of some area, or a piece of wire."""
+
+    reflectivity: float = Field(
+        default=0.2,
+        gt=0,
+        le=1,
+        description="Diffuse reflectivity at the laser's wavelength; 0.2 is an assumption.",
+    )
+    area_m2: float | None = Field(
+        default=None,
+        gt=0,
+        description="Area that it shows from any side, m²; by default the silhouette of its EO "
+        "areas.",
+    )
+    wire_diameter_mm: float | None = Field(
+        default=None, gt=0, le=1000, description="Thickness of a wire in place of an area, mm."
+    )
+    wire_length_m: float | None = Field(
+        default=None, gt=0, description="Length of the wire that stands for this target, m."
+    )
+    wire_direction_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Where the wire runs to, deg from north."
+    )
+    wire_slope_deg: float = Field(
+        default=0.0, ge=-90, le=90, description="How much it rises that way, deg."
+    )
+
+    @model_validator(mode="after")
+    def _wire_or_surface(self) -> Self:
+        if (self.wire_diameter_mm is None) != (self.wire_length_m is None):
+            raise ValueError("wire_diameter_mm and wire_length_m belong together: give both")
+        if self.wire_diameter_mm is not None and self.area_m2 is not None:
+            raise ValueError("area_m2 and wire_diameter_mm are given: it is a surface or a wire")
+        return self
+
+
 # The thesis's general aviation class, so that a scene may leave the aircraft out.
 _EO = VisibleAreas(front_m2=12.0, side_m2=30.0, horizontal_m2=90.0)
 _IR = InfraredAreas(front_m2=4.6, back_m2=4.6, side_m2=11.15, horizontal_m2=35.52)
@@ -126,6 +163,9 @@ class Aircraft(Parameters):
     contrast_ir: float = Field(default=1.0, ge=0, description="Contrast gain P for IR (eq. 18).")
     paint_reflectance: float = Field(
         default=0.5, ge=0, le=1, description="Diffuse reflectance, for EO with a background."
+    )
+    laser: LaserSurface = Field(
+        default=LaserSurface(), description="What lasers hit of it; by default its EO silhouette."
     )
     engine: Literal["propeller", "turbofan", "turbojet"] = Field(
         default="propeller", description="Propulsion type (Table 4.5)."

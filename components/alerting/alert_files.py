@@ -14,6 +14,7 @@ from components.alerting.alert_tables import alert_table, bands_table, without_m
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
+from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
@@ -58,7 +59,7 @@ def alert_files(
             if option == "--figure":
                 check_ending(place, PICTURES, option)
             check_file(place, option)
-    configuration = _read(Path(conf))
+    configuration = _read(found_or_shipped(Path(conf), conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
     done = _alerts(configuration, paths, _wind_mps(wind))

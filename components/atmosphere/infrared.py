@@ -251,6 +251,14 @@ def haze_share(visibility_m: ArrayLike, band: str) -> Any:
     SPIE 4214, 2001. It was fitted up to 1.55 µm: what it says of 4 and 10 µm is extrapolated.
     """
     low, high = check_band(band)
+    return haze_share_at(visibility_m, 0.5 * (low + high))
+
+
+def haze_share_at(visibility_m: ArrayLike, wavelength_um: float) -> Any:
+    """Return the extinction of haze or fog at a wavelength, as a share of that of visible light.
+
+    The law of `haze_share`; for lasers, up to 1.55 µm as it was fitted.
+    """
     visibility = np.asarray(visibility_m, dtype=np.float64)
     if not np.all(visibility > 0.0):
         raise ValueError("visibility_m must be above 0 (infinite for none)")
@@ -258,7 +266,7 @@ def haze_share(visibility_m: ArrayLike, band: str) -> Any:
     q = np.select(
         [km > 50.0, km > 6.0, km > 1.0, km > 0.5], [1.6, 1.3, 0.16 * km + 0.34, km - 0.5], 0.0
     )
-    return np.power(0.5 * (low + high) / _VISIBLE_UM, -q)
+    return np.power(float(positive("wavelength_um", wavelength_um)) / _VISIBLE_UM, -q)
 
 
 def band_extinction_per_m(

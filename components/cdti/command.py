@@ -4,19 +4,19 @@ from typing import Any
 
 import click
 
-from dsa_des.commands.group import plain_errors
+from dsa_des.commands.group import plain_errors, scene_options
 
 
 @click.command()
-@click.argument("scene", metavar="SCENE")
-@click.option("--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a scene value.")
-@click.option("--swap", "swaps", multiple=True, metavar="BLOCK=TYPE", help="Use another type.")
-@click.option("--seed", type=int, help="Override the scene's seed.")
-@click.option("--duration", metavar="SECONDS", help="Override the scene's duration.")
+@scene_options()
 @click.option(
-    "--factor", default="1", show_default=True, help="Simulated seconds per second of the clock."
+    "--realtime",
+    metavar="FACTOR",
+    default="1",
+    show_default=True,
+    help="Simulated seconds per second of the clock.",
 )
-@click.option("--out", metavar="FOLDER", help="Where the run goes [default: runs/NAME].")
+@click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-NNN].")
 @click.option(
     "--host",
     default="127.0.0.1",
@@ -31,7 +31,7 @@ from dsa_des.commands.group import plain_errors
     help="Its port; 0 takes a free one.",
 )
 @click.option("--no-wait", is_flag=True, help="Begin before an operator is there and ready.")
-@click.option("--figures", is_flag=True, help="Draw the run's figures when it has ended.")
+@click.option("--no-figures", is_flag=True, help="Draw nothing; results are the same.")
 @plain_errors
 def cdti(**options: Any) -> None:
     """Run SCENE in real time, with the traffic display of its operator in a browser.

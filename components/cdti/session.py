@@ -13,7 +13,7 @@ from components.cdti.page import Admission
 from components.cdti.scope import Scope
 from components.operator.human import Desk, Human
 from components.operator.recorded import RecordedOperator
-from dsa_des.commands.scene import say_notes
+from dsa_des.commands.scene import check_command
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.library.scenes import load_scene
@@ -38,12 +38,12 @@ def run_session(
     swaps: tuple[str, ...],
     seed: int | None,
     duration: str | None,
-    factor: str,
+    realtime: str,
     out: str | None,
     host: str,
     port: int,
     no_wait: bool,
-    figures: bool,
+    no_figures: bool,
 ) -> None:
     """Run a scene with its display, and keep the run also when it is interrupted."""
     try:
@@ -54,12 +54,11 @@ def run_session(
         raise UsageError(
             "dsa-des cdti needs the package websockets: pip install 'dsa-des[view]'"
         ) from None
-    speed = parse_factor(factor, "--factor")
+    speed = parse_factor(realtime)
     _check_host(host)
     # By its whole path, so that the run folder's scene finds its files from wherever it is run.
     path = Path(os.path.abspath(chosen_file(scene, "scene")))
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    say_notes(loaded)
     console = _console(loaded)
     target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     target.check()
@@ -97,9 +96,9 @@ def run_session(
                 loaded,
                 target,
                 silent=True,
-                warn=True,
+                notes_command=check_command(scene, sets, swaps, seed, duration),
                 pacer=pacer,
-                draw=figures,
+                draw=not no_figures,
                 prepare=prepare,
                 recorded_as=replay,
             )

@@ -11,8 +11,10 @@ from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import Message
+from dsa_des.text.safe_text import shortened
 
 _NAN = math.nan
+_MOST_LINES = 9
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Sighting:
         return self.azimuth_rad, self.elevation_rad, self.range_m
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EncounterResult:
     """What one call of `simulate` came to; sightings by plane name or position.
 
@@ -79,6 +81,13 @@ class EncounterResult:
     missed: Mapping[str, int]
     messages: Mapping[str, Message]
 
+    def __repr__(self) -> str:
+        lines = [_line(one) for one in (*self.sightings, *self.false_alarms)]
+        if len(lines) > _MOST_LINES:
+            lines = [*lines[: _MOST_LINES - 1], f"... {len(lines) - _MOST_LINES + 1} more"]
+        scans = ", ".join(f"{name} {number}" for name, number in self.scans.items()) or "none"
+        return "\n  ".join([f"EncounterResult at {self.time_s:.10g} s, scans: {scans}", *lines])
+
     def __len__(self) -> int:
         return len(self.sightings)
 
@@ -97,6 +106,17 @@ class EncounterResult:
     def detected(self) -> FloatArray:
         """Azimuth (rad), elevation (rad) and range (m) of each plane, shape (planes, 3)."""
         return np.array([sighting.polar for sighting in self.sightings]).reshape(-1, 3)
+
+
+def _line(one: Sighting) -> str:
+    """Return one sighting as a line."""
+    name = shortened(one.name) or "false alarm"
+    if not one.detected:
+        return f"{name}: not detected"
+    azimuth, elevation = math.degrees(one.azimuth_rad), math.degrees(one.elevation_rad)
+    range_m = "" if math.isnan(one.range_m) else f", range {one.range_m:,.1f} m"
+    seen = ", ".join(one.sensors)
+    return f"{name}: azimuth {azimuth:.2f}°, elevation {elevation:.2f}°{range_m}, by {seen}"
 
 
 @lru_cache(maxsize=256)

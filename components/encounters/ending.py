@@ -9,9 +9,15 @@ from components.geometry import line_of_sight
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import ClockedParameters, Component, Input, NonNegativeRational, Output
+from dsa_des.block.component import (
+    ClockedParameters,
+    Component,
+    Input,
+    NonNegativeRational,
+    Output,
+    RunEnd,
+)
 from dsa_des.block.parameters import PositiveRational
-from dsa_des.block.run_end import RunEnd
 from dsa_des.block.wake import Wake
 
 

@@ -26,8 +26,8 @@ from components.metrics.rows import (
     with_trials,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.component import ends_its_run
 from dsa_des.block.message import Text
-from dsa_des.block.run_end import ends_its_run
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
 from dsa_des.time.clock import ClockSpec, ScanClock

@@ -85,7 +85,7 @@ class BandExtinction(Effect):
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
         density = weather.vapour_density_g_m3
-        extinction = band_extinction_per_m(band, *_obscuration(weather))
+        extinction = band_extinction_per_m(band, *obscuration(weather))
 
         def factor(cells: Cells) -> FloatArray:
             path = cells.range_m, cells.of_row("own_alt_m"), cells.alt_m
@@ -130,7 +130,7 @@ def own_band(block: Any) -> str | None:
     return band if band in BANDS else None
 
 
-def _obscuration(weather: Weather) -> tuple[float | None, float]:
+def obscuration(weather: Weather) -> tuple[float | None, float]:
     """Return the visibility in haze or fog alone (m), and the extinction by rain (1/m)."""
     rain = float(rain_extinction_per_m(weather.rain_rate_mm_h))
     if weather.visibility_km is not None:

@@ -136,13 +136,16 @@ CUED_INPUTS = {
 }
 
 
-def refuse_cues(block: Any) -> None:
+_NO_THRESHOLD = "all inside its range is detected, there is no threshold to lower"
+
+
+def refuse_cues(block: Any, because: str = _NO_THRESHOLD) -> None:
     """Raise ValueError if a sensor that cannot look harder is cued."""
     sources = [one.block for one in block.context.producers if one.port == PORT]
     if sources:
         raise ValueError(
-            f"{sources[0]} cues it, and it takes no cues: all inside its range is detected, "
-            "there is no threshold to lower; cue a sensor that has one, or leave the wire out"
+            f"{sources[0]} cues it, and it takes no cues: {because}; cue a sensor that has one, or "
+            "leave the wire out"
         )
 
 

@@ -1,7 +1,8 @@
 """The palette: one colour and marker for each kind of block, alike in every figure.
 
-The colours are Okabe and Ito's, told apart with any kind of colour vision. Sensors see the same
-target in the same place: big open marks and small filled ones keep all of them visible.
+The colours are Okabe and Ito's, the laser's Tol's, told apart with any kind of colour vision.
+Sensors see the same target in the same place: big open marks and small filled ones keep all of them
+visible.
 """
 
 from dsa_des.block.mark import Mark
@@ -9,5 +10,6 @@ from dsa_des.block.mark import Mark
 EO = Mark("#0072B2", "o", 7.5)
 IR = Mark("#E69F00", "^", 6.0)
 RADAR = Mark("#D55E00", "s", 4.0)
+LASER = Mark("#117733", "*", 6.0)
 FUSION = Mark("#009E73", "D", 5.0)
 TRACKER = Mark("#CC79A7", "v", 5.5)

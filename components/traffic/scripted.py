@@ -18,6 +18,7 @@ from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.flown_together import AllFlown
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
+from components.traffic.wires import OverheadWire
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
@@ -151,12 +152,21 @@ class ScriptedParameters(SourceParameters):
 
     ownship: Ownship = Field(description="The ownship.")
     intruders: list[Intruder] = Field(default=[], description="Any number of intruders.")
+    wires: list[OverheadWire] = Field(
+        default=[], description="Wires between posts, in the way at rest."
+    )
     sample_interval_s: float = Field(
         default=0.1,
         ge=0.001,
         le=86400,
         description="Spacing of the samples at which closest approach is sought, s.",
     )
+
+    @property
+    def targets(self) -> list[Intruder]:
+        """All that may be met: intruders, and after them the pieces of wires."""
+        pieces = [piece for wire in self.wires for piece in wire.pieces()]
+        return self.intruders + [Intruder(**piece) for piece in pieces]
 
 
 class ScriptedTraffic(TrafficSource):
@@ -173,20 +183,21 @@ class ScriptedTraffic(TrafficSource):
         self.own = ScriptedTrajectory(
             "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own, self.wind)
         )
-        used = Counter(intruder.name for intruder in parameters.intruders)
+        crafts = parameters.targets
+        used = Counter(intruder.name for intruder in crafts)
         for twice in sorted(name for name, count in used.items() if count > 1):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        flights = _intruders(parameters.intruders, reference, self.wind)
+        flights = _intruders(crafts, reference, self.wind)
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
-        self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
+        self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 
     def flown_of(self, parameters: Sequence[Any]) -> AllFlown | None:
         """Return the flights of replicas with these parameters, where all only fly straight on."""
         if self.wind is not None:
             return None
         own = [p.ownship for p in parameters]
-        crafts = [craft for p in parameters for craft in p.intruders]
+        crafts = [craft for p in parameters for craft in p.targets]
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
             return None

@@ -20,6 +20,7 @@ from pydantic import (
     field_validator,
 )
 
+from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.files.input_files import resolve_home
 from dsa_des.time.clock import ClockSpec, parse_rational
 
@@ -119,7 +120,7 @@ def _resolve_path(value: object) -> Path:
         raise ValueError("must be a path, as text")
     path = resolve_home(str(value))
     if isinstance(value, SourcedText) and not path.is_absolute():
-        path = value.folder / path
+        path = found_or_shipped(value.folder / path, str(value))
     return path
 
 

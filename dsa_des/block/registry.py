@@ -62,6 +62,9 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
         return _looked_at(type_name, type_name.cls)
     point = registered().get(type_name)
     if point is None and ":" not in type_name:
+        module, _, last = type_name.rpartition(".")
+        if module and last[:1].isupper():  # as Python writes it
+            raise UnknownType(f"unknown block type; did you mean '{module}:{last}' (module:Class)?")
         hint = did_you_mean(type_name, registered())
         raise UnknownType(f"unknown block type{hint} (or module:Class)")
     try:

@@ -13,12 +13,13 @@ from dsa_des.block.component import Component
 from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
-from dsa_des.commands.parameters import parameter_rows, scene_tables
-from dsa_des.errors import OutputError, UsageError
+from dsa_des.block.shipped_files import folders
+from dsa_des.commands.parameters import Row, parameter_rows, scene_tables
+from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest
 from dsa_des.files.output_file import unfinished
 from dsa_des.files.output_names import check_place, location_of, named, reason_of
+from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
-from dsa_des.scene.shipped_files import folders
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import printable
@@ -26,29 +27,57 @@ from dsa_des.text.safe_text import printable
 _PARAMETER_HEADS = ("  name", "type", "unit", "default", "meaning")
 
 
-def show_components(name: str | None) -> None:
-    """Print the list of block types, or the description of one."""
+def show_components(name: str | None, key: str | None = None) -> None:
+    """Print the list of block types, those of one kind, the description of one, or of its key."""
     console = terminal.console(120)
+    kinds = {one.partition(".")[0] for one in registered()}
     if name is None:
-        _list(console)
+        _list(console, list(registered()))
+        console.print()
+        console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
+        console.print(
+            "So are tables of scenes: scene, extends, blocks, wires, processors, weather, ..."
+        )
+        return
+    if name in kinds and name not in registered() and key is None:
+        _list(console, [one for one in registered() if one.partition(".")[0] == name])
         return
     table = scene_tables().get(name)
     if table is not None:
-        _describe_table(console, name, *table)
+        what, rows = table
+        _describe_table(console, name, what, lambda: _of_key(name, key, rows()))
         return
     try:
         cls = find(name)
     except UnknownType as error:
-        tables = f"; or a table of scenes: {', '.join(scene_tables())}"
-        raise UsageError(f"{name}: {error}{tables}") from error
+        known = [*registered(), *kinds, *scene_tables()]
+        close = nearest(name, known)
+        hint = f"; did you mean {close!r}?" if close else f"; kinds: {', '.join(sorted(kinds))}"
+        message = f"{name}: there is no such block type, kind of blocks or table of scenes{hint}"
+        raise UsageError(message if ":" not in name else f"{name}: {error}") from error
+    if key is not None:
+        keys = parameter_rows(cls.Parameters) + parameter_rows(BlockOptions)
+        _print_rows(console, _PARAMETER_HEADS, _of_key(name, key, keys))
+        return
     _describe(console, name, cls)
 
 
-def _list(console: Any) -> None:
+def _of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
+    """Return the row of one key and of what is inside it; all rows without a key."""
+    if key is None:
+        return rows
+    found = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
+    if not found:
+        hint = did_you_mean(key, [row[0].strip() for row in rows])
+        raise UsageError(f"{name}: has no key {key!r}{hint}")
+    return found
+
+
+def _list(console: Any, names: typing.Sequence[str]) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("type", "takes", "sends", "what it is"):
         table.add_column(heading, no_wrap=heading == "type")
-    for name in registered():
+    for name in names:
         try:
             cls = find(name)
         except UnknownType as error:  # a broken plug-in must not hide the others
@@ -56,11 +85,6 @@ def _list(console: Any) -> None:
             continue
         table.add_row(name, _ports(cls.inputs), _ports(cls.outputs), _summary(cls))
     console.print(table)
-    console.print()
-    console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
-    console.print(
-        "So are tables of scenes: scene, extends, blocks, wires, processors, weather, ..."
-    )
 
 
 def _describe_table(

@@ -4,6 +4,7 @@ import hashlib
 import io
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
+    as_sets,
     check_workers,
     finish,
     report_crashes,
@@ -48,24 +50,63 @@ _HOME = Path("studies")
 #: A comparison is not continued.
 _ANEW = "the same command and another --out: a comparison is begun anew"
 _MOST_SHOWN = 5
+_REPLICAS = 20
+
+
+@dataclass(frozen=True)
+class _OfAll:
+    """What the command line changes of all that is compared."""
+
+    sets: tuple[str, ...]
+    seed: int | None
+    replicas: int | None
+
+    def study(self, path: Path, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
+        """Return the study of a study file, or that of a scene."""
+        if _is_study(path):
+            sets = (*self.sets, *as_sets((), self.seed, self.replicas))
+            return read_study(path, swaps, sets)
+        replicas = _REPLICAS if self.replicas is None else self.replicas
+        metrics = self._applicable(path, swaps)
+        return study_of_scene(path, replicas, metrics, swaps, self.sets, self.seed or 0)
+
+    def _applicable(self, path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]:
+        """Return the metrics that a scene has everything for, with each of the swaps."""
+        scenes = [load_scene(path, sets=self.sets)]
+        for block, types in swaps:
+            scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
+        found = []
+        for name in registered(METRICS):
+            try:
+                for scene in scenes:
+                    MetricSpec(name).build(scene)
+            except ValueError:
+                continue
+            found.append(name)
+        if not found:
+            raise UsageError(f"{path}: no metric can be measured of this scene")
+        return found
 
 
 def compare_command(
     paths: tuple[str, ...],
+    sets: tuple[str, ...],
     swaps: tuple[str, ...],
-    replicas: int,
+    seed: int | None,
+    replicas: int | None,
     results: tuple[str, ...],
     workers: int | None,
     out: str | None,
 ) -> None:
     """Compare what the command line names."""
-    if replicas < 1:
+    if replicas is not None and replicas < 1:
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
     check_workers(workers)
+    changes = _OfAll(sets, seed, replicas)
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        found = _compare_swap(chosen_file(paths[0]), swaps, replicas, results, workers, out)
+        found = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
         report_crashes(found, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
@@ -74,7 +115,7 @@ def compare_command(
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
     files = [chosen_file(path) for path in paths]
-    studies = [_study_at(path, replicas) for path in files]
+    studies = [_study_at(path, changes) for path in files]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         result_names(record.results, results)
@@ -94,14 +135,14 @@ def compare_command(
 def _compare_swap(
     path: Path,
     swaps: Sequence[str],
-    replicas: int,
+    changes: _OfAll,
     results: Sequence[str],
     workers: int | None,
     out: str | None,
 ) -> list[Tables]:
     """Run a scene or study with and without swaps, and compare the two."""
     chosen: list[tuple[str, list[str]]] = []
-    scene = _base_scene(path)
+    scene = changes.study(path).scene(0) if _is_study(path) else load_scene(path, sets=changes.sets)
     for swap in swaps:
         block, equals, name = swap.partition("=")
         if not equals or not name:
@@ -114,7 +155,7 @@ def _compare_swap(
         if own == name:
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
-    study = _read(path, replicas, chosen)
+    study = changes.study(path, chosen)
     result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
@@ -138,44 +179,20 @@ def _first(results: Sequence[str]) -> Callable[[Tables], None]:
     return lambda tables: say_changes_along(tables, results)
 
 
-def _base_scene(path: Path) -> Any:
-    if _is_study(path):
-        study = read_study(path)
-        return study.scene(0)
-    return load_scene(path)
-
-
 def _is_study(path: Path) -> bool:
     data = read_scene_file(path).data
     return "scene" in data and "blocks" not in data
 
 
-def _read(path: Path, replicas: int, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
-    if _is_study(path):
-        return read_study(path, swaps)
-    return study_of_scene(path, replicas, _applicable(path, swaps), swaps)
-
-
-def _applicable(path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]:
-    """Return the metrics that a scene has everything for, with each of the swaps."""
-    scenes = [load_scene(path)]
-    scenes += [load_scene(path, swaps=[f"{block}={types[-1]}"]) for block, types in swaps]
-    found = []
-    for name in registered(METRICS):
-        try:
-            for scene in scenes:
-                MetricSpec(name).build(scene)
-        except ValueError:
-            continue
-        found.append(name)
-    if not found:
-        raise UsageError(f"{path}: no metric can be measured of this scene")
-    return found
-
-
-def _study_at(path: Path, replicas: int) -> Study | StudyRecord:
+def _study_at(path: Path, changes: _OfAll) -> Study | StudyRecord:
     """Return the study of a study file or a scene, or what a folder says of its own."""
-    return StudyFolder(path).record if _is_folder(path) else _read(path, replicas)
+    if not _is_folder(path):
+        return changes.study(path)
+    if changes.sets or changes.seed is not None or changes.replicas is not None:
+        raise UsageError(
+            f"{path}: is a folder of finished runs: --set, --seed and --replicas cannot change it"
+        )
+    return StudyFolder(path).record
 
 
 def _is_folder(path: Path) -> bool:

@@ -92,6 +92,90 @@ def _printable_errors() -> Iterator[None]:
         raise
 
 
+def scene_options(required: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that adds SCENE, --set, --swap, --seed and --duration to a command."""
+
+    def add(command: Callable[..., None]) -> Callable[..., None]:
+        for option in (
+            click.option("--duration", metavar="S", help="Length of the run in seconds."),
+            seed_option,
+            swap_option,
+            set_option,
+            click.argument(
+                "scene", metavar="SCENE", required=required, shell_complete=completing("scenes")
+            ),
+        ):
+            command = option(command)
+        return command
+
+    return add
+
+
+def completing(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
+    """Return what completes a word in a shell; `what` is a function of `completion`."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+        from dsa_des.commands import completion
+
+        found: list[Any] = getattr(completion, what)(ctx, incomplete)
+        return found
+
+    return complete
+
+
+seed_option = click.option("--seed", type=int, metavar="N", help="Seed of all random draws.")
+set_option = click.option(
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Change one value, e.g. blocks.radar.scan_rate_hz=2.",
+    shell_complete=completing("keys"),
+)
+swap_option = click.option(
+    "--swap",
+    "swaps",
+    multiple=True,
+    metavar="BLOCK=TYPE",
+    help="Put another component into a block; name and wires stay.",
+    shell_complete=completing("swaps"),
+)
+
+
+class WithSubcommands(click.Command):
+    """A command whose first word may name a further command, with options of its own."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.commands: dict[str, click.Command] = {}
+
+    def command(self, name: str) -> Callable[[Callable[..., None]], click.Command]:
+        """Return a decorator that adds a further command."""
+
+        def add(function: Callable[..., None]) -> click.Command:
+            self.commands[name] = click.command(name)(function)
+            return self.commands[name]
+
+        return add
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
+    ) -> click.Context:
+        """Read the words after the command's own name."""
+        if args and args[0] in self.commands:
+            name = f"{info_name} {args[0]}"
+            return self.commands[args[0]].make_context(name, args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, and the further commands behind them."""
+        super().format_options(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, one.get_short_help_str(70)) for name, one in self.commands.items()]
+            )
+
+
 class PluginGroup(click.Group):
     """A command group whose registered commands are loaded when they are named or listed.
 

@@ -13,14 +13,20 @@ from dsa_des.files.output_folder import OutputFolder
 from dsa_des.running.effects import Planned
 from dsa_des.running.pacing import Pacer, parse_factor
 from dsa_des.running.recorded_run import record_run
-from dsa_des.running.reports import load_reports, say_if_long, say_warnings, warnings_of
+from dsa_des.running.reports import (
+    load_reports,
+    notes_of_loading,
+    notes_of_scene,
+    say_if_long,
+    say_notes,
+)
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shell_line, shortened
 
 
 def load(
@@ -29,22 +35,31 @@ def load(
     swaps: Iterable[str],
     seed: int | None,
     duration: str | None,
-    quiet: bool = False,
+    noted: bool = False,
 ) -> Scene:
-    """Load and check a scene; parameters that were dropped are listed on standard error."""
+    """Load and check a scene; notes on that go to standard error, unless they are said later."""
     path = chosen_file(scene, "scene")
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    if not quiet:
-        say_notes(loaded)
+    if not noted:
+        say_notes(notes_of_loading(loaded))
     return loaded
 
 
-def say_notes(loaded: Scene) -> None:
-    """List on standard error what was done to a scene that its files do not show."""
-    for key in loaded.dropped:
-        say(f"note: the swap dropped {key}", err=True)
-    for note in loaded.notes:
-        say(f"note: {note}", err=True)
+def check_command(
+    scene: str,
+    sets: Iterable[str],
+    swaps: Iterable[str],
+    seed: int | None,
+    duration: str | None,
+) -> str:
+    """Return the command that shows the notes on a scene, fit to be pasted into a shell."""
+    words = ["dsa-des", "check", scene]
+    for option, values in (("--set", sets), ("--swap", swaps)):
+        for value in values:
+            words += [option, value]
+    words += [] if seed is None else ["--seed", str(seed)]
+    words += [] if duration is None else ["--duration", duration]
+    return shell_line(words)
 
 
 def run_scene(
@@ -62,14 +77,14 @@ def run_scene(
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
-    loaded = load(scene, sets, swaps, seed, duration, quiet)
+    loaded = load(scene, sets, swaps, seed, duration, noted=True)
     target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
         simulate_everything=simulate_everything,
         silent=quiet or as_json,
-        warn=not quiet,
+        notes_command=None if quiet else check_command(scene, sets, swaps, seed, duration),
         pacer=pacer,
         draw=not no_figures,
     )
@@ -115,7 +130,7 @@ def check_scene_file(
         say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
 
     with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
-        loaded = load(scene, sets, swaps, seed, duration)
+        loaded = load(scene, sets, swaps, seed, duration, noted=True)
         if no_import and policy.seen:
             say(
                 f"{scene}: nothing wrong as far as it was checked. {len(loaded.blocks)} blocks; "
@@ -126,7 +141,7 @@ def check_scene_file(
         simulation = Simulation(loaded)
     say_if_long(simulation)
     _say_if_slowed(simulation)
-    say_warnings(warnings_of(simulation), "warning")
+    say_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

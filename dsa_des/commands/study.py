@@ -1,7 +1,5 @@
 """``dsa-des study``: run a study, continue it, or show what it came to."""
 
-import os
-import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -9,23 +7,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
+from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import claim_folder, named
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
 from dsa_des.results.record import CLASS, Result, StudyRecord
-from dsa_des.results.tables import Tables
+from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
 from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.overrides import parse_assignment
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Clock, Stopped, draw_run, run_study, tables_of, why_one_by_one
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
-from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import shortened
+from dsa_des.terminal.terminal import say, say_json
+from dsa_des.text.safe_text import shell_line, shortened
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
@@ -34,8 +33,11 @@ _RUNS_TO_MEASURE = 100
 
 
 def study_command(
-    words: tuple[str, ...],
+    study: str | None,
     sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    replicas: int | None,
     workers: int | None,
     resume: bool,
     executor: str,
@@ -44,32 +46,53 @@ def study_command(
     metrics: bool,
     no_figures: bool,
     measure: bool,
+    as_json: bool,
     quiet: bool,
 ) -> None:
     """Do what the command line asks for; exit code 1 if runs crashed, 130 on ctrl-C."""
     if metrics:
         _list_metrics()
-    elif len(words) == 2 and words[0] == "show":
-        show_study(Path(words[1]), draw=not no_figures)
-    elif len(words) == 2 and words[0] == "report":
-        _report(Path(words[1]), out, draw=not no_figures, measure=measure)
-    elif len(words) == 1 and words[0] not in ("show", "report"):
-        study = read_study(chosen_file(words[0], "study"), sets=sets)
+        return
+    if study is None:
+        raise UsageError("give a STUDY (dsa-des examples lists those that are shipped)")
+    name, path = study, chosen_file(study, "study")
+    sets = (*sets, *as_sets(swaps, seed, replicas))
+    described = read_study(path, sets=sets)
 
-        def again(path: Path) -> str:
-            return _resume_command(words[0], path, sets, workers, executor, scheduler)
+    def again(folder: Path) -> str:
+        return _resume_command(name, folder, sets, workers, executor, scheduler)
 
-        target = _target(study, out, resume)
-        folder = run_into(study, target, workers, resume, executor, scheduler, again)
-        try:
-            tables = finish(study, folder, quiet=quiet, draw=not no_figures)
-            if measure or (_count(tables) >= _RUNS_TO_MEASURE and not no_figures):
-                _measure(folder)
-        except KeyboardInterrupt:
-            _stopped("interrupted", again(folder.path), 130)
-        report_crashes([tables], again(folder.path))
-    else:
-        raise UsageError("give STUDY.toml, or: show FOLDER, or: report FOLDER")
+    target = _target(described, out, resume)
+    folder = run_into(described, target, workers, resume, executor, scheduler, again)
+    try:
+        tables = finish(
+            described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
+        )
+        if measure or (_count(tables) >= _RUNS_TO_MEASURE and not no_figures):
+            _measure(folder)
+    except KeyboardInterrupt:
+        _stopped("interrupted", again(folder.path), 130)
+    report_crashes([tables], again(folder.path))
+
+
+def as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
+    """Return options as changes of a study file, as --set has them."""
+    sets = []
+    for swap in swaps:
+        parsed = parse_assignment(swap, "--swap")
+        if isinstance(parsed, Problem):
+            raise SceneError([parsed])
+        sets.append(f"swap.{parsed[0]}={parsed[1]}")
+    if seed is not None:
+        sets.append(f"seed={seed}")
+    if replicas is not None:
+        sets.append(f"replicas={replicas}")
+    return sets
+
+
+def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
+    """Print the tables of a study's folder."""
+    show_study(Path(folder), draw=not no_figures, as_json=as_json)
 
 
 def _target(study: Study, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
@@ -104,18 +127,7 @@ def _resume_command(
     if scheduler is not None:
         words += ["--scheduler", scheduler]
     # A name that begins with a dash is no option.
-    return " ".join(map(_quoted, [*words, *(["--"] if study.startswith("-") else []), study]))
-
-
-def _quoted(word: str) -> str:
-    """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
-    if word.isprintable():
-        return shlex.quote(word)
-    plain = word.replace("\\", "\\\\").replace("'", "\\'")
-    shown = "".join(
-        c if c.isprintable() else "".join(f"\\{b:03o}" for b in os.fsencode(c)) for c in plain
-    )
-    return f"$'{shown}'"
+    return shell_line([*words, *(["--"] if study.startswith("-") else []), study])
 
 
 def _stopped(reason: str, again: str, code: int) -> NoReturn:
@@ -186,12 +198,13 @@ def run_into(
 def finish(
     study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
     only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
-    draw: bool = True,
+    draw: bool = True, as_json: bool = False,
 ) -> Tables:  # fmt: skip
     """Write the tables of a finished study, draw its figures and print them.
 
     `only` names the results to print; by default those that the study draws. `first` prints what
-    stands before the tables; without `draw` there are no figures.
+    stands before the tables; without `draw` there are no figures; `as_json` prints the tables as
+    JSON and nothing else.
     """
     if isinstance(study, Study):
         tables, again = tables_of(study, folder), partial(draw_run, study, folder)
@@ -202,7 +215,9 @@ def finish(
         figures = draw_figures(tables, only, again) if draw else []
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
-    if not quiet:
+    if as_json:
+        say_json(_as_json(tables, figures))
+    elif not quiet:
         first(tables)
         show(terminal.console(160), tables, only)
         for path in figures:
@@ -214,13 +229,30 @@ def finish(
     return tables
 
 
+def _as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
+    """Return the tables that a study's folder holds as rows, and where it is."""
+    rows = {
+        name.removesuffix(".parquet"): [] if table is None else table.to_pylist()
+        for name in (SUMMARY, DIFFERENCES, RATIOS, REQUIREMENTS)
+        for table in [tables.folder.table(name)]
+    }
+    return {
+        "folder": str(tables.folder.path),
+        "runs": _count(tables),
+        "failed": tables.rows.failed,
+        "crashed": tables.rows.crashed,
+        **rows,
+        "figures": [str(path) for path in figures],
+    }
+
+
 def _count(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
 def show_study(
     path: Path, only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
-    draw: bool = True,
+    draw: bool = True, as_json: bool = False,
 ) -> None:  # fmt: skip
     """Print all tables of a study's folder, or those of some results; draw its figures again.
 
@@ -228,7 +260,7 @@ def show_study(
     """
     folder = StudyFolder(path)
     every = result_names(folder.record.results, only)
-    finish(folder.record, folder, only=only or every, first=first, draw=draw)
+    finish(folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json)
 
 
 def _measure(folder: StudyFolder) -> None:
@@ -243,20 +275,21 @@ def _measure(folder: StudyFolder) -> None:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
 
 
-def _report(path: Path, out: str | None, *, draw: bool, measure: bool) -> None:
+def report_command(folder: str, out: str | None, no_figures: bool, measure: bool) -> None:
     """Write one HTML page about a study's folder, into it or where `--out` says."""
     from dsa_des.results.report import REPORT, study_report
 
-    folder = StudyFolder(path)
+    path = Path(folder)
+    study = StudyFolder(path)
     target = path / REPORT if out is None else named(out)
     if out is not None:
         check_file(target)
     if measure:
-        _measure(folder)
+        _measure(study)
     try:
-        if draw:
-            draw_figures(Tables(folder.record, folder))
-        write_file(target, study_report(folder))
+        if not no_figures:
+            draw_figures(Tables(study.record, study))
+        write_file(target, study_report(study))
     except OSError as error:
         raise UsageError(f"{target}: cannot be written: {error.strerror or error}") from error
     say(f"wrote {target}")

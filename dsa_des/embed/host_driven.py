@@ -17,12 +17,11 @@ import numpy as np
 from networkx import ancestors
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Input
+from dsa_des.block.component import Input, ends_its_run
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.message import Message
-from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node

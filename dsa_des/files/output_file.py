@@ -180,7 +180,7 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         return folder, lock
-    raise FileNotFoundError(f"{target.parent} is removed again and again")
+    raise FileNotFoundError(f"no folder can be made in {target.parent}")
 
 
 def _about(target: Path) -> dict[str, Any]:

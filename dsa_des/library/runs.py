@@ -11,13 +11,13 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import pictures_in
+from dsa_des.record.drawing import kept_figures
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
 from dsa_des.running.recorded_run import info_of, record_run, summary_of
-from dsa_des.running.reports import Report, draw_all, load_reports
+from dsa_des.running.reports import Report, draw_all, load_reports, notes_of_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
@@ -77,6 +77,7 @@ def _in_memory(
     tables = MemorySink()
     recorder = Recorder([tables])
     simulation = Simulation(scene, recorder=recorder, simulate_everything=simulate_everything)
+    noted = notes_of_scene(simulation)
     reports = load_reports()
     notes: list[str] = []
     observers = ObserverSink(
@@ -88,8 +89,8 @@ def _in_memory(
     summary = summary_of(observers, outcome, None, notes)
     text = to_toml(scene.resolved())
     info = info_of(simulation, recorder, outcome, summary, text, time.perf_counter() - started)
-    if notes:
-        info["notes"] = notes
+    if noted or notes:
+        info["notes"] = [*noted, *notes]
     said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
     arrow = said.on(tables.tables())
     return Run(None, info, arrow, text, lambda: _drawn(reports, simulation, arrow, summary))
@@ -97,7 +98,7 @@ def _in_memory(
 
 def _drawn(
     reports: list[Report], simulation: Simulation, tables: dict[str, Any], summary: dict[str, Any]
-) -> dict[str, bytes]:
+) -> dict[str, Any]:
     """Return what reports draw of a run in memory: they read its tables from a folder."""
     import pyarrow.parquet as pq
 
@@ -105,8 +106,8 @@ def _drawn(
         folder = Path(place)
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
-        notes = draw_all(reports, simulation, folder, summary)
-        found = pictures_in(folder)
+        with kept_figures() as found:
+            notes = draw_all(reports, simulation, folder, summary)
     if notes and not found:
         raise UsageError("; ".join(notes))
-    return found
+    return dict(sorted(found.items()))

@@ -12,20 +12,22 @@ from weakref import finalize
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import PictureFile, pictures_in
+from dsa_des.record.drawing import kept_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
+from dsa_des.results.printing import show
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
 from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.scene_file import SceneFile, read_scene_file
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
 from dsa_des.studies.study import Study, changed_scene
 from dsa_des.studies.study_file import read_study, study_of_tables
+from dsa_des.terminal.terminal import html_of
 from dsa_des.text.safe_text import shortened
 
 if TYPE_CHECKING:
@@ -76,15 +78,14 @@ class StudyResult:
         return self._folder.results()
 
     @cached_property
-    def figures(self) -> dict[str, PictureFile]:
+    def figures(self) -> dict[str, Any]:
         """All figures by name."""
-        draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
-        return {
-            name: PictureFile(name, png) for name, png in pictures_in(self._folder.path).items()
-        }
+        with kept_figures() as drawn:
+            draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
+        return {**pictures_in(self._folder.path), **drawn}
 
-    def figure(self, name: str) -> PictureFile:
-        """Return one of the study's figures.
+    def figure(self, name: str) -> Any:
+        """Return one of the study's figures: a matplotlib figure with a method ``save(path)``.
 
         Raises
         ------
@@ -100,6 +101,9 @@ class StudyResult:
         if table is None:
             raise UsageError(f"{self._folder.path / name}: is not there or not of this study")
         return table.replace_schema_metadata(None)
+
+    def _repr_html_(self) -> str:
+        return html_of(lambda console: show(console, self._tables))
 
     def __repr__(self) -> str:
         rows = self._tables.rows
@@ -141,7 +145,8 @@ def study(
         Registered names, ``module:Class``, classes, or tables ``{"metric": NAME, ...}``. Left out
         for a study file, which says itself what it measures, over which axes and how often.
     axes, draws : mapping, optional
-        Dotted key → values or distribution, as in a study file; ``swap.BLOCK`` → types.
+        Dotted key → values or distribution, as in a study file; ``swap.BLOCK`` → types. Of a study
+        file given with them, they take the place.
     replicas, seed : int, optional
         1 and 0 for a scene; those of the file for a study file.
     sets : iterable of str
@@ -174,7 +179,7 @@ def study(
     """
     if metrics is None:
         keys = {"axes": axes, "draws": draws, "replicas": replicas, "seed": seed, **more}
-        described = _study_of_file(scene, [k for k, v in keys.items() if v is not None], sets)
+        described = _study_of_file(scene, {k: v for k, v in keys.items() if v is not None}, sets)
         return _run(described, _workers(described, workers), out, resume, progress)
     if sets := list(sets):
         message = "changes a study file; a scene is changed with load_scene(..., sets=...)"
@@ -189,12 +194,7 @@ def study(
         "metrics": list(metrics),
         **more,
     }
-    tables: dict[str, Any] = {}
-    for key, value in given.items():
-        try:
-            tables[key] = scene_value(value, METRICS) if key == "metrics" else scene_value(value)
-        except TypeError as error:
-            raise SceneError([Problem("study", key, str(error))]) from None
+    tables = _tables(given)
     for key in {"scene", "set", "swap"} & tables.keys():
         message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
         raise SceneError([Problem("study", key, message)])
@@ -202,21 +202,25 @@ def study(
     return _run(described, _workers(described, workers), out, resume, progress)
 
 
-def _study_of_file(source: Any, given: list[str], sets: Iterable[str]) -> Study:
+def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -> Study:
     """Read a study file, given by its path or as a shipped one by its name."""
     if not isinstance(source, str | os.PathLike):
         message = "is missing: a scene is measured by metrics; only a study file names its own"
         raise SceneError([Problem("study", "metrics", message)])
     name = os.fspath(source)
-    if given:
-        message = f'stands in the study file {name}: change it with sets=["{given[0]}=..."]'
-        raise SceneError([Problem("study", given[0], message)])
     path = chosen_file(name, "study")
-    file = read_scene_file(path)
-    if "scene" not in file.data and "blocks" in file.data:
-        message = "is missing: this file is a scene, which is measured by metrics"
-        raise SceneError([Problem(str(path), "metrics", message)])
-    return read_study(path, sets=sets)
+    return read_study(path, sets=sets, keys=_tables(given))
+
+
+def _tables(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keywords as the tables of a study file."""
+    tables: dict[str, Any] = {}
+    for key, value in given.items():
+        try:
+            tables[key] = scene_value(value, METRICS) if key == "metrics" else scene_value(value)
+        except TypeError as error:
+            raise SceneError([Problem("study", key, str(error))]) from None
+    return tables
 
 
 def _base_of(

@@ -1,15 +1,18 @@
-"""A figure as a value: its PNG bytes, shown inline in notebooks."""
+"""Figures: how they are drawn, and what they are as values that notebooks show."""
 
 import io
 import math
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.text.safe_text import printable, shortened
 
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PictureFile:
-    """A drawn figure.
+    """A figure that was drawn earlier, read back from its file.
 
     Parameters
     ----------
@@ -39,15 +42,76 @@ class PictureFile:
 
         Raises
         ------
+        UsageError
+            If the name asks for something else.
         OSError
             If it cannot be written.
         """
-        write_file(Path(path), self.png)
+        _save(self.name, self.png, path)
 
 
-def pictures_in(folder: Path) -> dict[str, bytes]:
-    """Return the figures of a folder as name → PNG bytes, in order of their names."""
-    return {file.stem: file.read_bytes() for file in sorted(folder.glob("*.png"))}
+def _save(
+    name: str,
+    png: bytes,
+    path: str | os.PathLike[str],
+    other: Callable[[str], bytes] | None = None,
+) -> None:
+    """Write a picture in the format that a file's name asks for."""
+    kind = Path(path).suffix.lower().removeprefix(".")
+    allowed = ["png", *(("svg", "pdf") if other is not None else ())]
+    if kind not in allowed:
+        also = "" if other is not None else " (a figure of a run in memory is written as .svg too)"
+        endings = ", ".join(f".{ending}" for ending in allowed)
+        raise UsageError(f"figure {name}: {path}: a name that ends in {endings} is needed{also}")
+    write_file(Path(path), png if other is None or kind == "png" else other(kind))
+
+
+@cache
+def _figure_class() -> Any:
+    """Return the class of figures: matplotlib's own, with its name and its PNG once it is drawn."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    class DrawnFigure(Figure):
+        """A matplotlib figure that a notebook shows and `save` writes as .png, .svg or .pdf."""
+
+        name, png = "", b""
+
+        def _repr_png_(self) -> bytes:
+            return self.png
+
+        def save(self, path: str | os.PathLike[str]) -> None:
+            """Write the figure in the format that the name asks for; see `PictureFile.save`."""
+            _save(self.name, self.png, path, self._as)
+
+        def _as(self, kind: str) -> bytes:
+            content = io.BytesIO()
+            date = {"Date": None} if kind == "svg" else {"CreationDate": None}
+            with matplotlib.rc_context({"svg.hashsalt": self.name}):
+                self.savefig(content, format=kind, metadata=date)
+            return content.getvalue()
+
+    return DrawnFigure
+
+
+_kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=None)
+
+
+@contextmanager
+def kept_figures() -> Iterator[dict[str, Any]]:
+    """Keep what is drawn into files inside of this: the file's stem → matplotlib figure."""
+    found: dict[str, Any] = {}
+    token = _kept.set(found)
+    try:
+        yield found
+    finally:
+        _kept.reset(token)
+
+
+def pictures_in(folder: Path) -> dict[str, PictureFile]:
+    """Return the figures of a folder by name, in order of their names."""
+    files = sorted(folder.glob("*.png"))
+    return {file.stem: PictureFile(file.stem, file.read_bytes()) for file in files}
 
 
 DPI = 110
@@ -68,7 +132,6 @@ def drawing(
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     with matplotlib.rc_context(), warnings.catch_warnings():
         # Names may hold letters that the font lacks, and be too long for their place.
@@ -86,16 +149,19 @@ def drawing(
                 "text.parse_math": False,  # a dollar sign in a name is a dollar sign
             }
         )
-        figure = Figure(figsize=(width_in, height_in), dpi=dpi)
+        figure = _figure_class()(figsize=(width_in, height_in), dpi=dpi)
         canvas = FigureCanvasAgg(figure)
         yield figure
         _make_plain(figure)
         content = io.BytesIO()
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
-        if isinstance(path, Path):
-            write_file(path, content.getvalue())
-        else:
+        if not isinstance(path, Path):
             path.write(content.getvalue())
+            return
+        write_file(path, content.getvalue())
+        if (kept := _kept.get()) is not None:
+            figure.name, figure.png = path.stem, content.getvalue()
+            kept[path.stem] = figure
 
 
 def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:

@@ -14,12 +14,15 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import installed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import RUN_JSON, with_files
 from dsa_des.files.output_names import new_folder_name
-from dsa_des.record.drawing import PictureFile, pictures_in
+from dsa_des.record.drawing import pictures_in
 from dsa_des.record.notes import OF_ROWS
+from dsa_des.terminal.terminal import html_of
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shortened
 
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["RUN_JSON", "Run", "new_folder_name", "read_run", "write_json", "write_run_json"]
 
 
+#: Entry points of the plug-ins that report on a run.
+REPORTS = "dsa_des.reports"
 # By these, rows of two tables belong together.
 _KEYS = {"block", "tick"}
 # Of what a run is shown as in Python.
@@ -67,14 +72,14 @@ class Run:
     scene : str
         The resolved scene, as TOML text.
     draw : callable
-        Returns its figures as name → PNG bytes; called when one is asked for.
+        Returns its figures by name; called when one is asked for.
     """
 
     path: Path | None
     info: dict[str, Any]
     tables: "dict[str, pa.Table]"
     scene: str
-    draw: Callable[[], dict[str, bytes]] = field(compare=False)
+    draw: Callable[[], dict[str, Any]] = field(compare=False)
 
     def __getitem__(self, table: str) -> "pa.Table":
         if table not in self.tables:
@@ -104,6 +109,16 @@ class Run:
         ]
         return "\n".join([*lines, *(["  ..."] if len(tables) > _MOST_LINES else [])])
 
+    def _repr_html_(self) -> str:
+        from rich.text import Text
+
+        def show(console: Any) -> None:
+            console.print(Text(repr(self)))
+            for point in registered(REPORTS).values():
+                installed(point)().show(console, self.summary)
+
+        return html_of(show)
+
     @property
     def summary(self) -> dict[str, Any]:
         """What the run came to, as ``dsa-des run --json`` prints it."""
@@ -111,12 +126,15 @@ class Run:
         return found
 
     @cached_property
-    def figures(self) -> dict[str, PictureFile]:
+    def figures(self) -> dict[str, Any]:
         """All figures by name; those of a run in memory are drawn when they are first asked for."""
-        return {name: PictureFile(name, png) for name, png in self.draw().items()}
+        return self.draw()
 
-    def figure(self, name: str) -> PictureFile:
+    def figure(self, name: str) -> Any:
         """Return one of the figures that the reports draw, for example ``plan``.
+
+        It is a matplotlib figure with a method ``save(path)``; of a run that was read from a folder
+        it is the PNG file there, with the same method.
 
         Raises
         ------

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import networkx as nx
 
-from dsa_des.block.component import Component
-from dsa_des.block.run_end import ends_its_run
+from dsa_des.block.component import Component, ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
 from dsa_des.running.node import Node

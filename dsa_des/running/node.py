@@ -14,10 +14,9 @@ import simpy
 
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message, by_output
-from dsa_des.block.run_end import RunEnd
 from dsa_des.block.wake import Wake
 from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs

@@ -5,9 +5,8 @@ from collections.abc import Callable, Collection, Mapping
 
 import simpy
 
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.message import Message
-from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.running.events import RunState
 from dsa_des.running.grain import Edge, Grain

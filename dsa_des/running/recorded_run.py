@@ -20,7 +20,7 @@ from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, attempt
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import PacedWindows, Pacer
-from dsa_des.running.reports import draw_all, load_reports, say_if_long, say_warnings, warnings_of
+from dsa_des.running.reports import draw_all, load_reports, notes_of_scene, say_if_long
 from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
@@ -36,7 +36,7 @@ def record_run(
     *,
     simulate_everything: bool = False,
     silent: bool = True,
-    warn: bool = False,
+    notes_command: str | None = None,
     pacer: Pacer | None = None,
     told: bool = True,
     progress: Callable[[float], None] | None = None,
@@ -53,8 +53,9 @@ def record_run(
     simulate_everything : bool
     silent : bool
         Whether there is no progress bar.
-    warn : bool
-        Whether what blocks warn of, listed in ``run.json``, is written to standard error as well.
+    notes_command : str, optional
+        The command that shows what there is to note of the scene; with it one line on standard
+        error says how many notes there are. ``run.json`` lists them.
     pacer : Pacer, optional
     told : bool
         Whether notes are written to standard error.
@@ -85,9 +86,9 @@ def record_run(
         prepare(simulation)
     if told:
         say_if_long(simulation)
-    warnings = warnings_of(simulation)
-    if warn:
-        say_warnings(warnings, "note")
+    noted = notes_of_scene(simulation)
+    if noted and notes_command is not None:
+        say(f"{len(noted)} note{'s' * (len(noted) > 1)}: {notes_command}", err=True)
     if pacer is not None:
         simulation.windows = PacedWindows(simulation.windows, pacer, simulation.ticks_per_s)
     reports = load_reports()
@@ -118,10 +119,8 @@ def record_run(
         info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
         if pacer is not None and pacer.stopped:
             info["duration_s"], info["stopped"] = pacer.time_s, True
-        if warnings:
-            info["warnings"] = warnings
-        if notes:
-            info["notes"] = list(notes)
+        if noted or notes:
+            info["notes"] = [*noted, *notes]
         write_run_json(folder, info)
     summary["out"] = str(target.path)
     # The run has its name: whatever happens while figures are drawn, it is not lost.

@@ -1,4 +1,4 @@
-"""Warnings before a run: of blocks about their own values, and of a run that will take long."""
+"""What a scene gives to note before it runs, and the plug-ins that report on a run."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
+from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, attempt
 from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shortened
 
@@ -16,31 +18,53 @@ if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
 
 
-MOST_WARNINGS = 20
+MOST_NOTES = 20
 _LONGEST = 500
 
 
-def warnings_of(simulation: Simulation) -> list[str]:
-    """Return what the blocks of a scene that is set up warn of, each with its block's name.
+def notes_of_scene(simulation: Simulation) -> list[str]:
+    """Return what there is to note of a scene that is set up, but for what it acknowledges.
 
-    Keys that change nothing come before what a block itself has to say.
+    First what was done to it that its files do not show, then keys that change nothing, then what
+    its blocks have to say of their own values.
     """
-    found: list[str] = []
-    for name, section in simulation.scene.sections.items():
+    scene = simulation.scene
+    found = notes_of_loading(scene)
+    for name, section in scene.sections.items():
         found += [f"{name}: {text}" for text in section.without_effect()]
     for name, component in simulation.components.items():
         found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
             found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
-    return found
+    return _unacknowledged(scene, found)
 
 
-def say_warnings(warnings: list[str], word: str) -> None:
-    """Print warnings on standard error, after a word such as ``note``."""
-    for text in warnings[:MOST_WARNINGS]:
-        say(f"{word}: {text}", err=True)
-    if len(warnings) > MOST_WARNINGS:
-        say(f"{word}: and {len(warnings) - MOST_WARNINGS} more", err=True)
+def notes_of_loading(scene: Scene) -> list[str]:
+    """Return what was done to a scene that its files do not show."""
+    dropped: dict[str, list[str]] = {}
+    for key in scene.dropped:
+        block, _, parameter = key.rpartition(".")
+        dropped.setdefault(block, []).append(parameter)
+    swapped = [f"{block}: the swap dropped {', '.join(keys)}" for block, keys in dropped.items()]
+    return _unacknowledged(scene, [*swapped, *scene.notes])
+
+
+def _unacknowledged(scene: Scene, notes: list[str]) -> list[str]:
+    """Return notes without those that the blocks they are about acknowledge."""
+    known = tuple(
+        f"blocks.{name}: {text}"
+        for name, block in scene.blocks.items()
+        for text in block.options.acknowledged
+    )
+    return [text for text in notes if not text.startswith(known)]
+
+
+def say_notes(notes: Sequence[str]) -> None:
+    """Print notes on standard error."""
+    for text in notes[:MOST_NOTES]:
+        say(f"note: {text}", err=True)
+    if len(notes) > MOST_NOTES:
+        say(f"note: and {len(notes) - MOST_NOTES} more", err=True)
 
 
 # Half a minute of the processor, for most scenes.
@@ -52,9 +76,6 @@ def say_if_long(simulation: Simulation) -> None:
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
         say(f"{message}{simulation.scans:.2g} scans", err=True)
-
-
-REPORTS = "dsa_des.reports"
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,9 @@ from typing import Any
 import simpy
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.message import Message
-from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.running.assembly import Assembly, WrapEffect

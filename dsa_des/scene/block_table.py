@@ -23,6 +23,11 @@ class BlockOptions(Parameters):
     processor: str | None = Field(
         default=None, description="Shared processor that its messages go through."
     )
+    acknowledged: list[str] = Field(
+        default=[],
+        description="Notes on this block that are known and meant, each by how it begins (a key's "
+        "name, mostly): they are not said again.",
+    )
 
 
 def split_options(

@@ -12,7 +12,7 @@ from dsa_des.block.class_text import sourced, type_text
 from dsa_des.block.component import Component, as_written
 from dsa_des.block.entry_points import COMPONENTS
 from dsa_des.errors import Problem, SceneError, UsageError
-from dsa_des.scene.overrides import set_value, swap_type
+from dsa_des.scene.overrides import read_sets, set_value, swap_type
 from dsa_des.scene.scene_file import SceneFile
 
 
@@ -131,20 +131,28 @@ class Changeable:
             raise UsageError("this scene cannot be changed: it was not made by dsa_des.load_scene")
         return self._origin
 
-    def set(self, values: Mapping[str, Any]) -> Self:
+    def set(self, values: Mapping[str, Any] | str, /, *more: str) -> Self:
         """Return a scene with other values; this one stays as it is.
 
         Parameters
         ----------
-        values : mapping
-            Dotted key → value, for example ``{"blocks.radar.scan_rate_hz": 2}``. Relative paths
-            are those of the working directory.
+        values : mapping or str
+            Dotted key → value, for example ``{"blocks.radar.scan_rate_hz": 2}``, or texts as
+            ``--set`` takes them: ``"blocks.radar.scan_rate_hz=2"``. Relative paths are those of
+            the working directory; a table may say ``extends``, as in a file.
+        *more : str
+            Further texts.
 
         Raises
         ------
         SceneError
             With every problem that the new scene has.
         """
+        if isinstance(values, str):
+            read, problems = read_sets((values, *more))
+            if problems:
+                raise SceneError(replace(one, source=_SET) for one in problems)
+            values = dict(read)
         return self._changed(values, _SET)
 
     def swap(

@@ -15,7 +15,7 @@ from dsa_des.block.component import Parameters
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.registry import NotImported, UnknownType, find, section_models
 from dsa_des.block.source_file import absolute
-from dsa_des.errors import Problem, did_you_mean
+from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene.block_table import Block, BlockOptions, ProcessorParameters, split_options
 from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.overrides import drop_of_other_type
@@ -275,7 +275,10 @@ def read_blocks(
             continue
         type_name = table.get("type")
         if not isinstance(type_name, str):
+            typed = [one for one, of in tables.items() if isinstance(of, dict) and "type" in of]
+            close = nearest(str(name), typed)
             message = 'needs a type, for example type = "radar.swerling"'
+            message += f"; or did you mean the block {close!r}?" if close else ""
             problems.append(scene_file.problem((*key, "type"), message))
             continue
         try:
@@ -287,6 +290,13 @@ def read_blocks(
             continue
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
+        for place, lost in scene_file.replaced.items():
+            if place[:2] == key:
+                source, gone = scene_file.source_of(place), ", ".join(lost)
+                notes.append(
+                    f"blocks.{name}: {dotted(place[2:])} of {source} takes the place of the whole "
+                    f"list, {gone} too; a table [{dotted(place)}.NAME] changes one item or adds one"
+                )
         extra, given = split_options(table, cls.Parameters)
         given = _as_written(scene_file, key, given, cls.Parameters)
         try:

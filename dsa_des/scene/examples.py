@@ -6,9 +6,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
+from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, nearest
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.scene.shipped_files import files_named, shipped_files
 
 
 def chosen_file(asked: Path | str, kind: Literal["scene", "study"] | None = None) -> Path:

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dsa_des.errors import Problem, did_you_mean
-from dsa_des.scene.keys import Key, dotted, names_of, no_item, place_of, step, unquoted
+from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.scene.keys import INDEX, Key, dotted, names_of, no_item, place_of, step, unquoted
 
 REMOVE = "remove"
 
@@ -53,6 +53,7 @@ class Inheritance:
     def __init__(self, sources: dict[Key, str], problems: list[Problem]) -> None:
         self.of_other_type: dict[Key, str] = {}
         self.beside: dict[Key, dict[str, Any]] = {}
+        self.replaced: dict[Key, list[str]] = {}
         self._sources = sources
         self._problems = problems
         self._any_removals = False
@@ -82,6 +83,9 @@ class Inheritance:
             elif isinstance(value, dict) and isinstance(mine, list) and names_of(mine):
                 self._merge_items(mine, value, (*at, key))
             else:
+                lost = _lost(mine, value)
+                if lost:
+                    self.replaced[(*at, key)] = lost
                 base[key] = value
         return base
 
@@ -129,6 +133,9 @@ class Inheritance:
             if isinstance(value, Removals):
                 continue
             place = place_of(items, name)
+            if place is None and _is_new(items, name, value):
+                place = len(items)
+                items.append({"name": name})
             if place is None:
                 source = self._sources.get((*at, name), "")
                 message = no_item(items, name)
@@ -190,3 +197,21 @@ class Inheritance:
                 )
                 key = dotted((*at, REMOVE))
                 self._problems.append(Problem(removal.source, key, message, removal.text))
+
+
+def _is_new(items: list[Any], name: str, value: Any) -> bool:
+    """Return whether a table of a name that a list lacks adds an item, and is no slip of the pen.
+
+    One of nearly a known name that lacks what all items have is meant to change that one.
+    """
+    if not isinstance(value, dict) or INDEX.fullmatch(name) or names_of(items).count(name):
+        return False
+    common = set.intersection(*(set(item) for item in items if isinstance(item, dict)))
+    return nearest(name, names_of(items)) is None or common <= {"name", *value}
+
+
+def _lost(old: Any, new: Any) -> list[str]:
+    """Return the named items of a list that another in its place has not."""
+    if not (isinstance(old, list) and isinstance(new, list)):
+        return []
+    return [name for name in names_of(old) if name not in names_of(new)]

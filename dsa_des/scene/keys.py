@@ -7,7 +7,7 @@ from dsa_des.errors import did_you_mean
 
 Key = tuple[str | int, ...]
 
-_INDEX = re.compile(r"[0-9]{1,9}")
+INDEX = re.compile(r"[0-9]{1,9}")
 #: A part between quotes is what is in them.
 _QUOTED = re.compile(r""""([^"]*)"|(?<![^.\[])'([^']*)'(?![^.\]])""")
 
@@ -57,7 +57,7 @@ def _item(items: list[Any], rest: str) -> tuple[int | None, str, str]:
 
 def place_of(items: list[Any], part: str) -> int | None:
     """Return which item a number or a name means; None where none does, or several do."""
-    if _INDEX.fullmatch(part):
+    if INDEX.fullmatch(part):
         return int(part) if int(part) < len(items) else None
     places = [number for number, item in enumerate(items) if _name(item) == part]
     return places[0] if len(places) == 1 else None

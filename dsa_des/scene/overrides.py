@@ -5,17 +5,19 @@ name, its wires and the parameters the new type knows, and lists those it droppe
 """
 
 import re
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import sourced
 from dsa_des.block.component import Component, SourcedText
 from dsa_des.block.registry import NotImported, UnknownType, find
-from dsa_des.errors import Problem, did_you_mean
+from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.keys import Key, dotted, no_item, step, unquoted
-from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
+from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
@@ -43,17 +45,33 @@ def parse_value(text: str) -> Any:
     return _sourced(value["value"] if set(value) == {"value"} else text)
 
 
-def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
-    """Apply one ``--set`` to the scene's tables and return what is wrong with it."""
-    parsed = parse_assignment(assignment, "--set")
-    if isinstance(parsed, Problem):
-        return [parsed]
-    text, written = parsed
-    try:
-        value = parse_value(written)
-    except TomlError as error:
-        return [Problem(COMMAND_LINE, text, str(error))]
-    return set_value(scene, text, value, COMMAND_LINE)
+def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
+    """Return the keys and values of all ``--set``, and what is wrong with how they are written."""
+    found: dict[str, Any] = {}
+    problems: list[Problem] = []
+    for assignment in assignments:
+        parsed = parse_assignment(assignment, "--set")
+        if isinstance(parsed, Problem):
+            problems.append(parsed)
+            continue
+        text, written = parsed
+        try:
+            value = parse_value(written)
+        except TomlError as error:
+            problems.append(Problem(COMMAND_LINE, text, str(error)))
+            continue
+        if text in found:
+            problems.append(Problem(COMMAND_LINE, text, "--set gives it twice", written))
+        found[text] = value
+    return list(found.items()), problems
+
+
+def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
+    """Apply all ``--set`` to the scene's tables and return what is wrong with them."""
+    found, problems = read_sets(assignments)
+    for text, value in found:
+        problems += set_value(scene, text, value, COMMAND_LINE)
+    return problems
 
 
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
@@ -70,6 +88,10 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     source : str
         Where it was written, for messages.
     """
+    try:
+        value = _extended(value, source)
+    except SceneError as error:
+        return [replace(one, key=f"{text}.{one.key}") for one in error.problems]
     container: Any = scene.data
     key: list[str | int] = []
     rest = unquoted(text)
@@ -100,6 +122,17 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     scene.sources[tuple(key)] = source
     scene.of_other_type.pop(tuple(key[:3]), None)
     return []
+
+
+def _extended(value: Any, source: str) -> Any:
+    """Return a table with all that it extends, as a file's would be; all else as it is."""
+    if isinstance(value, list):
+        return [_extended(item, source) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if "extends" in value:
+        return read_scene_tables(value, source).data
+    return {key: _extended(item, source) for key, item in value.items()}
 
 
 def apply_swap(

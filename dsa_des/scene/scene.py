@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from html import escape
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -31,7 +32,7 @@ from dsa_des.scene.graph import (
     windowed_blocks,
     windowed_queues,
 )
-from dsa_des.scene.overrides import apply_set, apply_swap
+from dsa_des.scene.overrides import apply_sets, apply_swap
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
@@ -87,6 +88,16 @@ class Scene(Changeable):
 
     def __repr__(self) -> str:
         return described(self)
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(printable(name))}<td>{escape(printable(block.type_name))}"
+            for name, block in self.blocks.items()
+        )
+        wires = "<br>".join(escape(printable(wire)) for wire in self.wires)
+        heading = escape(printable(self.title))
+        table = f"<table><tr><th>block</th><th>type</th></tr>{rows}</table>"
+        return f"<p><b>{heading}</b>, seed {self.seed}</p>{table}<p>{wires}</p>"
 
     @classmethod
     def _checked(cls, scene_file: SceneFile, problems: list[Problem]) -> "Scene":
@@ -230,8 +241,7 @@ def _overridden(
         found, gone = apply_swap(scene_file, swap)
         problems += found
         dropped += gone
-    for assignment in sets:
-        problems += apply_set(scene_file, assignment)
+    problems += apply_sets(scene_file, sets)
     if seed is not None:
         _override(scene_file, "seed", seed)
     if duration_s is not None:
@@ -249,6 +259,9 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     """
     problems = [] if problems is None else problems
     data = scene_file.data
+    if "scene" in data and "blocks" not in data:
+        message = "is a study, not a scene: dsa-des study takes it"
+        raise SceneError([Problem(str(scene_file.path), "", message)])
     known = (*_TOP_LEVEL, *section_models())
     for key in data:
         if key not in known:

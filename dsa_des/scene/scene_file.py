@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import sourced
+from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
@@ -26,7 +27,6 @@ from dsa_des.files.input_files import (
 from dsa_des.files.toml_files import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
 from dsa_des.scene.keys import Key, dotted
-from dsa_des.scene.shipped_files import files_named
 from dsa_des.text.safe_text import shortened
 
 COMMAND_LINE = "command line"
@@ -54,6 +54,8 @@ class SceneFile:
         Keys of blocks that were inherited from a table of another type → that type.
     beside : dict
         Tables within blocks → the values that stood beside them in the file that wrote them first.
+    replaced : dict
+        Lists that take the place of inherited ones → the named items that are gone with these.
     """
 
     path: Path
@@ -61,11 +63,13 @@ class SceneFile:
     sources: dict[Key, str] = field(default_factory=dict)
     of_other_type: dict[Key, str] = field(default_factory=dict)
     beside: dict[Key, dict[str, Any]] = field(default_factory=dict)
+    replaced: dict[Key, list[str]] = field(default_factory=dict)
 
     def copy(self) -> "SceneFile":
         """Return tables that can be changed without changing these."""
         data, beside = deepcopy(self.data), dict(self.beside)
-        return SceneFile(self.path, data, dict(self.sources), dict(self.of_other_type), beside)
+        of_other_type, replaced = dict(self.of_other_type), dict(self.replaced)
+        return SceneFile(self.path, data, dict(self.sources), of_other_type, beside, replaced)
 
     def source_of(self, key: Key) -> str:
         """Return the file in which `key`, or the nearest table around it, was written."""
@@ -94,7 +98,7 @@ def read_scene_file(path: Path | str) -> SceneFile:
     if problems:
         raise SceneError(problems)
     told = reader.inheritance
-    return SceneFile(path, data, reader.sources, told.of_other_type, told.beside)
+    return SceneFile(path, data, reader.sources, told.of_other_type, told.beside, told.replaced)
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
@@ -120,7 +124,7 @@ def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
         raise SceneError(replace(p, source=name) if p.source == str(place) else p for p in problems)
     sources = {k: name if file == str(place) else file for k, file in reader.sources.items()}
     told = reader.inheritance
-    return SceneFile(Path(name), data, sources, told.of_other_type, told.beside)
+    return SceneFile(Path(name), data, sources, told.of_other_type, told.beside, told.replaced)
 
 
 class _Reader:
@@ -151,7 +155,7 @@ class _Reader:
             message += f"at most {_LONGEST_CHAIN} are read"
         elif isinstance(tables, NoSuchFile):
             what = f"there is no file {name}" if chain else "there is no such file"
-            message = what + _similar_file(path)
+            message = what + _similar_file(path, shipped=bool(chain))
         elif is_folder(path):
             message = f"{name} is a folder; a TOML file is needed"
         else:
@@ -242,15 +246,21 @@ def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     return Inheritance({}, []).merge(base, over, ())
 
 
-def _similar_file(path: Path) -> str:
+def _similar_file(path: Path, shipped: bool) -> str:
+    """Return which file was meant: one beside, or else a shipped one where that would do."""
     from dsa_des.errors import nearest
 
+    missing, names = "", []
     try:
         names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
     except OSError:
-        return f" (there is no folder {shortened(str(path.parent), 300)})"
-    close = nearest(path.name, names)
-    return f"; did you mean {path.parent / close}?" if close else ""
+        missing = f" (there is no folder {shortened(str(path.parent), 300)})"
+    if close := nearest(path.name, names):
+        return f"; did you mean {path.parent / close}?"
+    known = [name for place, _ in shipped_files() for name in (place.name, str(place))]
+    if shipped and (close := nearest(path.name.removesuffix(".toml"), known)):
+        return f"; did you mean the shipped {close!r}?"
+    return missing
 
 
 __all__ = [

@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.results.record import StopWhen
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key
-from dsa_des.scene.overrides import apply_set
+from dsa_des.scene.overrides import apply_sets, read_sets
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
@@ -45,10 +45,12 @@ def read_study(
     path: Path | str,
     swaps: Iterable[tuple[str, list[str]]] = (),
     sets: Iterable[str] = (),
+    keys: Mapping[str, Any] | None = None,
 ) -> Study:
     """Read and check a study.
 
-    `swaps` are further swap axes; `sets` change the study itself, as ``key=value``.
+    `swaps` are further swap axes; `sets` change the study itself, as ``key=value``; `keys` take the
+    place of its own.
 
     Raises
     ------
@@ -56,22 +58,31 @@ def read_study(
         With every problem found.
     """
     reader = _StudyReader(read_scene_file(path))
-    for assignment in sets:
-        reader.problems += apply_set(reader.file, assignment)
+    reader.data.update(keys or {})
+    reader.problems += apply_sets(reader.file, sets)
     return reader.study(swaps)
 
 
 def study_of_scene(
-    scene: Path, replicas: int, metrics: Iterable[str], swaps: Iterable[tuple[str, list[str]]] = ()
+    scene: Path,
+    replicas: int,
+    metrics: Iterable[str],
+    swaps: Iterable[tuple[str, list[str]]] = (),
+    sets: Iterable[str] = (),
+    seed: int = 0,
 ) -> Study:
-    """Return a study of a scene as it is: some replicas, and the named metrics."""
+    """Return a study of a scene with some of its values set: some replicas, the named metrics."""
+    values, problems = read_sets(sets)
+    if problems:
+        raise SceneError(problems)
     data = {
         "title": scene.stem,
         "scene": SourcedText.of(str(scene.resolve()), scene.parent),
         "replicas": replicas,
+        "seed": seed,
         "metrics": list(metrics),
     }
-    return _StudyReader(SceneFile(scene, data)).study(swaps)
+    return _StudyReader(SceneFile(scene, data), sets=values).study(swaps)
 
 
 def study_of_tables(
@@ -114,6 +125,9 @@ class _StudyReader:
         self.problems.append(self.file.problem(key, message, *value))
 
     def study(self, swaps: Iterable[tuple[str, list[str]]]) -> Study:
+        if self._base is None and "scene" not in self.data and "blocks" in self.data:
+            message = "is a scene, not a study: dsa-des run takes it, dsa-des compare runs it often"
+            raise SceneError([Problem(str(self.file.path), "", message)])
         for key in self.data:
             if key not in KEYS:
                 self.add((key,), f"unknown key of a study{did_you_mean(key, KEYS)}")

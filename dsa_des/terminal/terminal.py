@@ -4,8 +4,10 @@ No other file prints, echoes, makes a console or writes to the standard streams;
 that. Rich is imported only when it is asked for.
 """
 
+import io
 import os
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -59,6 +61,19 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     found = SafeConsole(stderr=err)
     known = width is None or found.is_terminal or os.environ.get("COLUMNS", "").isdecimal()
     return found if known else SafeConsole(stderr=err, width=width)
+
+
+def html_of(show: Callable[[Any], None]) -> str:
+    """Return what a function prints on a console, as HTML for a notebook."""
+    from dsa_des.terminal.safe_console import SafeConsole
+
+    console = SafeConsole(file=io.StringIO(), record=True, width=110)
+    show(console)
+    style = "font-family:monospace;line-height:1.25;white-space:pre;overflow-x:auto"
+    plain: str = console.export_html(
+        inline_styles=True, code_format=f'<pre style="{style}">{{code}}</pre>'
+    )
+    return plain
 
 
 def progress(text: str) -> Any:

@@ -5,6 +5,10 @@ the text that follows around. `printable` writes each of them as an escape, so t
 is what is there.
 """
 
+import os
+import shlex
+from collections.abc import Iterable
+
 #: Longest value of a scene and longest name that a message, a table or a figure repeats in full.
 MOST_OF_A_VALUE = 80
 MOST_OF_A_NAME = 60
@@ -66,3 +70,19 @@ def _escape(letter: str) -> str:
     if code < 0x100:
         return f"\\x{code:02x}"
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def shell_line(words: Iterable[str]) -> str:
+    """Return words as a line that a shell reads back as the same words."""
+    return " ".join(map(_quoted, words))
+
+
+def _quoted(word: str) -> str:
+    """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
+    if word.isprintable():
+        return shlex.quote(word)
+    plain = word.replace("\\", "\\\\").replace("'", "\\'")
+    shown = "".join(
+        c if c.isprintable() else "".join(f"\\{b:03o}" for b in os.fsencode(c)) for c in plain
+    )
+    return f"$'{shown}'"

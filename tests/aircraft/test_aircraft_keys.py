@@ -10,11 +10,11 @@ import pyarrow.parquet as pq
 import pymap3d
 import pytest
 from covering import covers
-from wired import Row, chain, decided, run, sensor
+from wired import Row, chain, decided, rows, run, sensor
 
 import dsa_des
 from components.formats.set_file import read_set
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 50.0}
@@ -26,6 +26,7 @@ BASE: dict[str, Any] = {
 OWN = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400.0, "heading_deg": 217.0}
 OTHER = {"name": "one", "east_m": -700.0, "north_m": -1500.0, "up_m": 300.0}
 PATH_DEG = 217.0
+PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 
 def samples(path, daa: bool) -> str:
@@ -167,6 +168,48 @@ def test_rcs(carrier, tmp_path):
     only(before, after, "radar")
 
 
+LASER_KEYS = (
+    "reflectivity", "area_m2", "wire_diameter_mm", "wire_length_m", "wire_direction_deg",
+    "wire_slope_deg",
+)  # fmt: skip
+
+
+@covers(*(f"laser.{key}" for key in LASER_KEYS), of=tuple(CARRIERS))
+@pytest.mark.parametrize("carrier", list(CARRIERS))
+def test_what_lasers_hit(carrier, tmp_path):
+    """Echoes by hand, of a beam of 1 mrad that lights a disc at the target's range."""
+
+    def hit(laser, table="detections", **keys):
+        scene = chain({"laser": sensor("laser.scanning", **keys)}, record={"truth": True})
+        scene["blocks"]["traffic"] = CARRIERS[carrier]({**BASE, "laser": laser}, tmp_path)
+        done = run(scene)
+        own, other = done["truth"].slice(0, 2).to_pylist()
+        places = [other[key] for key in PLACE] + [own[key] for key in PLACE]
+        return rows(done, table)[0], np.array(pymap3d.geodetic2ned(*places))
+
+    row, line = hit({"reflectivity": 0.5, "area_m2": 0.3})
+    range_m = float(np.linalg.norm(line))
+    # Of a target that takes all and scatters all; recorded is the amplitude with its noise.
+    whole = 1e9 * 0.5 / 1e-9 * (0.025 / range_m) ** 2
+    expected = 0.5 * 0.3 / (math.pi * (1e-3 * range_m) ** 2 / 4.0)
+    assert 10.0 ** (row["snr_db"] / 20.0) == pytest.approx(whole * expected, rel=1e-5, abs=6.0)
+    wire = {"reflectivity": 0.4, "wire_diameter_mm": 8.0, "wire_length_m": 0.05}
+    # So few shots that a scan meets the wire now and then; all that meet it detect it.
+    sparse = {"azimuth_shots": 4000, "elevation_shots": 4000, "scan_rate_hz": "1/10000"}
+    shot_sr = 2.0 * math.pi**2 / 4000**2 * math.cos(row["true_elevation_rad"])
+    for direction_deg, slope_deg in ((20.0, 0.0), (120.0, 35.0)):
+        turn, rise = math.radians(direction_deg), math.radians(slope_deg)
+        along = [math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), -math.sin(rise)]
+        sine = math.sqrt(1.0 - (np.dot(along, line) / range_m) ** 2)
+        placed = {**wire, "wire_direction_deg": direction_deg, "wire_slope_deg": slope_deg}
+        thin, _ = hit(placed)
+        expected = 0.4 * sine * 4.0 * 0.008 / (math.pi * 1e-3 * range_m)
+        assert 10.0 ** (thin["snr_db"] / 20.0) == pytest.approx(whole * expected, rel=1e-5, abs=6.0)
+        seen, _ = hit(placed, "looks", pattern="scanned", **sparse)
+        expected = sine * 0.05 / range_m * 1e-3 * math.pi / 4.0 / shot_sr
+        assert seen["detection_probability"] == pytest.approx(expected, rel=1e-5)
+
+
 @covers("rcs_table", of=tuple(CARRIERS))
 @pytest.mark.parametrize("carrier", list(CARRIERS))
 def test_rcs_table(carrier, tmp_path):
@@ -280,7 +323,7 @@ def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of(carrier, tm
         scene = chain({"eye": sensor("optical.eo", silhouette=silhouette),
                        "warm": sensor("optical.ir", silhouette=silhouette)})  # fmt: skip
         scene["blocks"]["traffic"] = CARRIERS[carrier](target, tmp_path)
-        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+        said = [line for line in notes_of_scene(Simulation(dsa_des.load_scene(scene)))
                 if "were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
         assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 

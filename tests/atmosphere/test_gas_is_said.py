@@ -7,7 +7,7 @@ from wired import HEARS_ALL, chain
 
 from components.atmosphere.attenuation import gas_specific_attenuation
 from dsa_des.library.scenes import load_scene
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 
@@ -30,7 +30,7 @@ def test_what_clear_air_would_take_is_said(keys, range_km):
 
 def test_check_and_run_say_it_too():
     scene = load_scene(chain({"radar": HEARS_ALL}))
-    (line,) = (line for line in warnings_of(Simulation(scene)) if "gas attenuation" in line)
+    (line,) = (line for line in notes_of_scene(Simulation(scene)) if "gas attenuation" in line)
     assert line.startswith("blocks.radar: gas attenuation: at 35 GHz clear air")
 
 

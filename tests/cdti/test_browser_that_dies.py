@@ -51,7 +51,7 @@ def kill(process):
 def test_a_browser_that_is_killed_leaves_a_run_that_another_goes_on_with(tmp_path, monkeypatch):
     monkeypatch.setattr(control, "GONE_S", 0.2)
     sets = ("blocks.operator.unattended='pauses'", "record.truth=true")
-    session = Session(monkeypatch, tmp_path / "run", factor="8", duration="8", sets=sets)
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="8", sets=sets)
     with chromium(tmp_path / "profile") as (process, orders), sync_api.sync_playwright() as play:
         browser = play.chromium.connect_over_cdp(orders)
         screen = browser.contexts[0].new_page()

@@ -18,7 +18,7 @@ def call(*words):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ((SCENE, "--factor", "fast"), "error: --factor fast: must be a number above 0"),
+        ((SCENE, "--realtime", "fast"), "error: --realtime fast: must be a number above 0"),
         ((SCENE, "--host", "0.0.0.0"), "name the address under which others reach this machine"),
         ((SCENE, "--host", "192.0.2.1"), "error: cannot serve at 192.0.2.1:0: "),
         (("nothing.toml",), "nothing.toml"),

@@ -107,7 +107,7 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     browser, tmp_path, monkeypatch, key, judged, arrow, by_deg, kept
 ):
     sets = (*SETS, "blocks.operator.turn_rate_deg_s=6", "blocks.guidance.level=9")
-    session = Session(monkeypatch, tmp_path / "run", factor="8", duration="50", sets=sets)
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="50", sets=sets)
     screen = Screen(browser, session.address)
     page = screen.page
     assert page.evaluate("document.activeElement.id") == "ready"
@@ -160,7 +160,7 @@ def alerted(browser, tmp_path_factory):
                 f"blocks.traffic.intruders[0].name='{HOSTILE}'")  # fmt: skip
         out = tmp_path_factory.mktemp("alerted") / "run"
         session = Session(
-            patch, out, factor="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",)
+            patch, out, realtime="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",)
         )
         screen = Screen(browser, session.address)
         screen.page.keyboard.press("Enter")

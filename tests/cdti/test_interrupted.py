@@ -15,7 +15,7 @@ from tests import warm_process
 
 
 def test_what_was_decided_is_kept_when_the_run_is_stopped(tmp_path, monkeypatch):
-    session = Session(monkeypatch, tmp_path / "run", factor="4", duration="600", no_wait=True)
+    session = Session(monkeypatch, tmp_path / "run", realtime="4", duration="600", no_wait=True)
     with page(session) as (socket, _):
         hear(socket, "frame")
         say(socket, type="decide", decision="turn", target=-1, value=-20, id="0" * 16)

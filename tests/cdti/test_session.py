@@ -81,7 +81,7 @@ def test_no_socket_for_a_page_of_another_origin(live, options):
 
 def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
     swaps = ("tracker=tracking.stub",)
-    session = Session(monkeypatch, tmp_path / "run", factor="4", duration="20", swaps=swaps,
+    session = Session(monkeypatch, tmp_path / "run", realtime="4", duration="20", swaps=swaps,
                       sets=(*LATER, "blocks.operator.turn_rate_deg_s=5",
                             "blocks.operator.latency_s=0.4"))  # fmt: skip
     with page(session) as (socket, welcome), page(session) as (other, beside):
@@ -132,7 +132,7 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
 
 def test_what_is_no_message_changes_nothing(tmp_path, monkeypatch):
     """A tenth of `measure.py --fuzz`, over the socket of an operator."""
-    session = Session(monkeypatch, tmp_path / "run", factor="20", duration="2")
+    session = Session(monkeypatch, tmp_path / "run", realtime="20", duration="2")
     draw = random.Random(7)
     with page(session) as (socket, welcome):
         for number in range(300):
@@ -171,7 +171,7 @@ def test_what_is_too_long_closes_the_door(live):
 
 
 def test_a_page_that_draws_nothing_gets_two_pictures_and_holds_nobody_up(tmp_path, monkeypatch):
-    session = Session(monkeypatch, tmp_path / "run", factor="4", duration="4", no_wait=True)
+    session = Session(monkeypatch, tmp_path / "run", realtime="4", duration="4", no_wait=True)
     kinds = []
     with session.socket() as lazy:
         while kinds[-1:] != ["end"]:
@@ -186,7 +186,7 @@ def test_a_page_that_draws_nothing_gets_two_pictures_and_holds_nobody_up(tmp_pat
 def test_the_run_goes_on_or_pauses_without_its_operator(tmp_path, monkeypatch, unattended):
     monkeypatch.setattr(control, "GONE_S", 0.1)
     sets = ("record.truth=false", f"blocks.operator.unattended='{unattended}'")
-    session = Session(monkeypatch, tmp_path / "run", factor="8", duration="6", sets=sets)
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="6", sets=sets)
     with page(session) as (socket, _), session.socket() as other:
         assert hear(other, "welcome")["role"] == "watcher"
         say(socket, type="ready")

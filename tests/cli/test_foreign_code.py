@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -82,7 +83,9 @@ def call(home: Path, *arguments: object, **environment: str) -> subprocess.Compl
 def one_error(done: subprocess.CompletedProcess[str]) -> str:
     assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
     assert "Traceback" not in done.stderr
-    errors = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
+    errors = [
+        line for line in done.stderr.splitlines() if not re.match(r"note: |\d+ notes?: ", line)
+    ]
     assert len(errors) == 1 and errors[0].startswith("error: "), done.stderr
     return errors[0]
 

@@ -196,12 +196,12 @@ def test_failing_block_leaves_no_folder_and_exits_1(
     assert not (tmp_path / "out").exists()
 
 
-def test_stranger_component_of_the_readme_runs(
+def test_stranger_component_of_the_docs_runs(
     tmp_path: Path, configs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    readme = (configs.parent / "README.md").read_text(encoding="utf-8")
+    page = (configs.parent / "docs" / "extending.md").read_text(encoding="utf-8")
     code = next(
-        part.split("```")[0] for part in readme.split("```python\n") if "class MyRadar(" in part
+        part.split("```")[0] for part in page.split("```python\n") if "class MyRadar(" in part
     )
     (tmp_path / "mymodule.py").write_text(code)
     monkeypatch.chdir(tmp_path)
@@ -213,7 +213,10 @@ def test_stranger_component_of_the_readme_runs(
     assert result.exit_code == 0, result.output
     radar = json.loads(result.stdout)["sensors"]["radar"]
     assert radar["detections"] > 0
-    assert "the swap dropped blocks.radar.power_w" in result.stderr
+    swap = "--set blocks.radar.reach_km=8 --swap radar=mymodule:MyRadar"
+    assert result.stderr == f"1 note: dsa-des check {configs / 'first_light.toml'} {swap}\n"
+    said = call("check", configs / "first_light.toml", *swap.split()).stderr
+    assert said.startswith("note: blocks.radar: the swap dropped ") and "power_w" in said
 
 
 @pytest.mark.parametrize(

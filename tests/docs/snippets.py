@@ -41,10 +41,14 @@ _INSTALL = re.compile(r"^python3 -m venv \S+ && \S+/pip install -e \S+ && (?:\.v
 
 #: What is added to a command so that it takes a second: pattern, and options behind the line.
 SHORTER = (
-    (re.compile(r"^dsa-des study \S+\.toml"), "--set replicas=2 --workers 1 --no-figures"),
+    (re.compile(r"^dsa-des study \S+\.toml"), "--workers 1 --no-figures"),
+    (
+        re.compile(r"^dsa-des study (?!\S+/(?:operators|flown_intercepts)\.toml)\S+\.toml"),
+        "--replicas 2",
+    ),
     (
         re.compile(r"^dsa-des study \S+/(?:operators|flown_intercepts)\.toml"),
-        "--set replicas=1 --set set.duration_s=12",
+        "--replicas 1 --set set.duration_s=12",
     ),
     (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1"),
     (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),

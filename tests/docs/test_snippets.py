@@ -157,7 +157,7 @@ def test_the_reading_finds_notes_and_what_is_shortened() -> None:
     assert list(hidden.commands()) == ["dsa-des check mine.toml"]
     assert file_of(file) == ("mine.toml", 'extends = "a.toml"\n')
     assert [line.split() for line in last.commands()] == [
-        ["dsa-des", "study", "a.toml", "--quiet", *SHORTER[0][1].split()]
+        ["dsa-des", "study", "a.toml", "--quiet", *SHORTER[0][1].split(), *SHORTER[1][1].split()]
     ]
 
 

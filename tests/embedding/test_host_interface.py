@@ -45,6 +45,21 @@ def test_one_plane_dead_ahead(simulator):
     assert sighting.confidence["radar"] > 20  # dB
 
 
+def test_a_result_prints_in_a_few_lines(simulator):
+    for k in range(20):
+        simulator.add_plane(f"far{k}")
+    far = np.tile((0.9 + 2e-2, 0.07, 1000.0), (20, 1))
+    planes = np.vstack([(0.9 + 5e-5, 0.07, 1000.0), far])
+    result = simulator.simulate(OWN, LEVEL, planes, np.tile(HEAD_ON, (21, 1)), 0.2)
+    lines = repr(result).splitlines()
+    assert len(lines) == 10
+    assert lines[0].startswith("EncounterResult at 0.2 s, scans: ") and "radar" in lines[0]
+    azimuth, _, range_m = result["near"].polar
+    assert lines[1].startswith(f"  near: azimuth {math.degrees(azimuth):.2f}°, elevation ")
+    assert f"range {range_m:,.1f} m, by " in lines[1] and lines[2] == "  far0: not detected"
+    assert lines[-1] == f"  ... {21 + len(result.false_alarms) - 8} more"
+
+
 @pytest.mark.parametrize("height_m", [0.0, 900.0])
 def test_ground_clutter_hides_a_host_s_plane(scene, height_m):
     """Ground at the ellipsoid or above it, where the scene says: for a host as well."""

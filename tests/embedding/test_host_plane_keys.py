@@ -10,7 +10,7 @@ from wired import SENSORS, chain
 
 import dsa_des
 from dsa_des.embed import Simulator
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 AREAS = {"front_m2": 4.0, "side_m2": 0.0, "horizontal_m2": 0.0}
@@ -101,6 +101,39 @@ def test_bodies_engines_and_paint_by_the_attitude_that_the_host_gives():
     assert painted["lit"] > 1.0 and painted["eye"] == 1.0
 
 
+@covers(*(f"laser.{key}" for key in (
+            "reflectivity", "area_m2", "wire_diameter_mm", "wire_length_m", "wire_direction_deg",
+            "wire_slope_deg")), of=("traffic.host.planes",))  # fmt: skip
+def test_a_laser_hits_what_the_scene_says():
+    line = crooked.ned(crooked.DIVING)
+    range_m = math.sqrt(float(line @ line))
+
+    def strength_db(surface, **keys):
+        laser = {**SENSORS["laser.scanning"], **keys}
+        return look({**BASE, "laser": surface}, laser=laser).get("laser")
+
+    flat = {"reflectivity": 0.5, "area_m2": 0.3}
+    whole_db = strength_db(flat) - 20.0 * math.log10(
+        0.5 * 0.3 / (math.pi / 4.0 * (1e-3 * range_m) ** 2)
+    )
+    for keys in ({"reflectivity": 0.25}, {"area_m2": 0.15}):
+        assert strength_db({**flat, **keys}) - strength_db(flat) == pytest.approx(-6.02, abs=0.01)
+    wire = {"reflectivity": 0.4, "wire_diameter_mm": 8.0, "wire_length_m": 9.0}
+    for direction_deg, slope_deg in ((20.0, 0.0), (120.0, 35.0)):
+        turn, rise = math.radians(direction_deg), math.radians(slope_deg)
+        along = (math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), -math.sin(rise))
+        cosine = sum(a * b for a, b in zip(along, line, strict=True)) / range_m
+        share = math.sqrt(1.0 - cosine**2) * 4.0 * 0.008 / (math.pi * 1e-3 * range_m)
+        placed = {**wire, "wire_direction_deg": direction_deg, "wire_slope_deg": slope_deg}
+        found_db = strength_db(placed) - whole_db
+        assert found_db == pytest.approx(20.0 * math.log10(0.4 * share), abs=0.01)
+    many = {"azimuth_shots": 100, "elevation_shots": 50}
+    # So few shots that none meets a short wire.
+    for length_m, seen in ((1e-4, False), (1e5, True)):
+        found = strength_db({**wire, "wire_length_m": length_m}, pattern="scanned", **many)
+        assert bool(found and not math.isnan(found)) == seen
+
+
 @covers("eo.made_for", "ir.made_for", of=("traffic.host.planes",))
 def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of():
     fitted = {"eo": {**AREAS, "made_for": "convex_hull"}, "ir": {**WARM, "made_for": "convex_hull"}}
@@ -115,7 +148,7 @@ def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of():
         }
         scene = chain(sensors, fusion={"type": "fusion.pick_best"})
         scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [{**BASE, **keys}]}
-        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+        said = [line for line in notes_of_scene(Simulation(dsa_des.load_scene(scene)))
                 if "'one' were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
         assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 

@@ -151,11 +151,10 @@ def _simulate(argv: list[str]) -> None:
     """Run a scene with all that a run does but its folder and its figures."""
     import click
 
-    from dsa_des.cli import _scene_options
-    from dsa_des.commands.group import plain_errors
+    from dsa_des.commands.group import plain_errors, scene_options
 
     @click.command()
-    @_scene_options
+    @scene_options()
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
         from dsa_des.commands.scene import load

@@ -66,7 +66,7 @@ def test_what_no_radar_has_is_named(scene, assignment, text):
     if text is None:
         assert done.stderr == ""
     else:
-        assert f"warning: blocks.radar: {text}" in done.stderr or text in done.stderr
+        assert f"note: blocks.radar: {text}" in done.stderr or text in done.stderr
 
 
 def test_a_carrier_in_gigahertz_is_named_and_not_the_range(scene):
@@ -85,12 +85,10 @@ def test_notes_go_to_standard_error_and_run_json(scene, tmp_path):
     scene.write_text(RADAR.replace("false_alarm_probability = 1e-6\n", ""))
     done = run("run", scene, "--json", "--out", "a")
     assert json.loads(done.stdout)
-    assert (
-        "note: blocks.radar: false_alarm_probability is 0.05 per look (the thesis's" in done.stderr
-    )
+    assert done.stderr == f"1 note: dsa-des check {scene}\n"
     assert run("run", scene, "--quiet", "--out", "b").output == ""
     for folder in "ab":
-        (text,) = json.loads((tmp_path / folder / "run.json").read_text())["warnings"]
+        (text,) = json.loads((tmp_path / folder / "run.json").read_text())["notes"]
         assert text.startswith("blocks.radar: false_alarm_probability is 0.05")
 
 
@@ -142,6 +140,6 @@ def test_suspicious_flights_name_the_likely_error(scene, tmp_path, other, durati
     if text is None:
         assert done.stderr == ""
     else:
-        assert done.stderr.count("warning:") == 1
+        assert done.stderr.count("note:") == 1
         assert text in done.stderr
         assert "flights.csv" in done.stderr

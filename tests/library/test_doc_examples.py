@@ -68,9 +68,9 @@ def test_types_hold_for_strict_checkers(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_snippet_of_the_readme_runs(tmp_path):
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    snippet = text.partition("## From Python\n\n```python\n")[2].partition("```")[0]
+def test_the_first_snippet_of_the_page_leaves_nothing_behind(tmp_path):
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    snippet = text.partition("```python\n")[2].partition("```")[0]
     assert "dsa_des.study(" in snippet
     done = warm_process.run(["-c", snippet], cwd=tmp_path, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")

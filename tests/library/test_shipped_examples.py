@@ -43,3 +43,18 @@ def test_what_is_no_name_of_an_example(name):
 def test_a_stem_that_a_scene_and_a_part_share_means_the_scene():
     path = find_example("oasys", "scene")
     assert path is not None and path.parent.name == "systems"
+
+
+@pytest.mark.parametrize("conf", ["alerting/do365b.conf", "do365b.conf"])
+def test_a_file_beside_scenes_goes_by_its_name(tmp_path, monkeypatch, conf):
+    monkeypatch.chdir(tmp_path)
+    scene = dsa_des.load_scene("alerting/first_light", sets=[f"blocks.alerting.conf={conf}"])
+    found = scene.blocks["alerting"].parameters.conf
+    assert found.name == "do365b.conf" and found.is_file()
+    (tmp_path / "alerting").mkdir()
+    own = tmp_path / conf
+    own.write_text(found.read_text())
+    again = dsa_des.load_scene("alerting/first_light", sets=[f"blocks.alerting.conf={conf}"])
+    assert again.blocks["alerting"].parameters.conf == own
+    with pytest.raises(dsa_des.SceneError, match=r"blocks\.alerting\.conf"):
+        dsa_des.run(scene.set("blocks.alerting.conf=alerting/do356b.conf"))

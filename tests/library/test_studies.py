@@ -167,15 +167,19 @@ def test_a_shipped_study_is_found_by_its_name_and_changed_by_sets():
     small = ["replicas=2", "set.duration_s=5", "axes.blocks.radar.scan_rate_hz=[1, 5]"]
     result = dsa_des.study("radar_scan_rate", sets=small, workers=1)
     assert result.runs.num_rows == 4
+    by_keyword = dsa_des.study("radar_scan_rate", sets=small[1:], replicas=2, workers=1)
+    assert str(by_keyword.runs) == str(result.runs)
+    other = dsa_des.study("radar_scan_rate", sets=small[1:], replicas=2, seed=7, workers=1)
+    assert str(other.runs) != str(result.runs)
 
 
 @pytest.mark.parametrize(
     ("source", "more", "says"),
     [
-        ("first_light", {}, "metrics: is missing: this file is a scene"),
+        ("first_light", {}, "first_light.toml: is a scene, not a study"),
         ({"blocks": {}}, {}, "study: metrics: is missing"),
-        ("radar_scan_rate", {"replicas": 3}, r'study: replicas: .*sets=\["replicas=..."\]'),
-        ("radar_scan_rate", {"title": "x"}, "study: title: stands in the study file"),
+        ("radar_scan_rate", {"replicas": 0}, "replicas = 0: must be a whole number of 1 or more"),
+        ("radar_scan_rate", {"titel": "x"}, "titel: unknown key of a study; did you mean 'title'"),
         ("radar_scan_ratte", {}, "did you mean the shipped 'radar_scan_rate'"),
         ("first_light", {"metrics": ["first_detection"], "sets": ["seed=1"]}, "study: sets"),
     ],

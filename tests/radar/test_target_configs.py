@@ -73,9 +73,9 @@ def test_targets_are_those_of_the_tables(source, file, rcs, swerling, engine, tm
 
 @pytest.mark.parametrize("file", sorted(CONFIGS.glob("sensors/*.toml")), ids=lambda file: file.stem)
 def test_every_sensor_file_makes_a_block(file, tmp_path):
-    kind = {"o": "radar", "d": "radar", "a": "eo", "m": "ir"}[file.stem[0]]
+    kind = {"o": "radar", "d": "radar", "a": "eo", "m": "ir", "w": "laser"}[file.stem[0]]
     path = tmp_path / "scene.toml"
-    first_light = CONFIGS / "first_light.toml"
+    first_light = CONFIGS / {"laser": "laser/power_line.toml"}.get(kind, "first_light.toml")
     written = tomllib.loads(file.read_text(encoding="utf-8"))
     # What the file takes away of the one that it extends, the scene's own sensor has too.
     without = f"remove = {json.dumps(written.get('remove', []))}"

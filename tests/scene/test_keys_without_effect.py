@@ -6,7 +6,7 @@ from wired import HEARS_ALL, chain, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 STATED = {"errors": "stated", "azimuth_error_deg": 1.0}
@@ -16,7 +16,7 @@ FADING = {"type": "radar.swerling", "power_w": 1e9, "threshold_db": None}
 def told(table=None, **sections):
     scene = chain({"s": table or sensor("radar.range_boundary")}, **sections)
     scene["blocks"]["s"] = {k: v for k, v in scene["blocks"]["s"].items() if v is not None}
-    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
     return [line for line in found if "it has no effect" in line]
 
 
@@ -82,7 +82,7 @@ def test_keys_of_trackers_that_change_nothing_are_warned_of(kind, keys, key):
                                elevation_error_deg=1.0, range_error_m=9.0)},
                   fusion={"type": "fusion.pass_through"},
                   tracker={"type": kind, **keys})  # fmt: skip
-    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
     (line,) = (line for line in found if "it has no effect" in line)
     assert line.startswith(f"blocks.tracker: {key}")
 
@@ -102,7 +102,7 @@ def test_keys_of_manoeuvres_that_are_not_made_are_warned_of(kind, keys, key, tmp
     scene = by_bands(tmp_path)
     conf = scene["blocks"]["avoidance"]["conf"]
     scene["blocks"]["avoidance"] = {"type": kind, "conf": conf, **keys}
-    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
     (line,) = (line for line in found if "it has no effect" in line)
     assert line.startswith(f"blocks.avoidance: {key}")
 

@@ -6,7 +6,7 @@ from itertools import combinations
 import looks
 import numpy as np
 import pytest
-from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
+from covering import CAMERAS, LINK_BUDGETS, RADARS, RANGING, SENSORS, covers
 from looks import COLUMNS, ERRORS, RANGE_ERRORS, errors_of, mean_is, quantities
 from wired import run
 
@@ -27,8 +27,9 @@ OF_ANGLES = (
     "azimuth_error_deg", "azimuth_bias_deg", "azimuth_correlation_time_s",
     "elevation_error_deg", "elevation_bias_deg", "elevation_correlation_time_s",
 )  # fmt: skip
-OF_RANGE = (
-    "range_error_m", "range_bias_m", "range_correlation_time_s", "measures_range_rate",
+OF_RANGE = "range_error_m", "range_bias_m", "range_correlation_time_s"
+OF_RATE = (
+    "measures_range_rate",
     "range_rate_error_m_s", "range_rate_bias_m_s", "range_rate_correlation_time_s",
     "range_rate_resolution_m_s",
 )  # fmt: skip
@@ -47,7 +48,8 @@ def detections(kind):
 
 
 @covers("errors", "biases", "quantised", *OF_ANGLES, of=SENSORS)
-@covers(*OF_RANGE, of=RADARS)
+@covers(*OF_RANGE, of=RANGING)
+@covers(*OF_RATE, of=RADARS)
 def test_stated_errors_are_white_with_the_stated_spread_and_bias(detections, kind):
     for quantity in quantities(kind):
         columns = detections["stated"]

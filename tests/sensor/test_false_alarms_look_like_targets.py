@@ -147,7 +147,7 @@ def test_marked_false_alarms_come_last_without_pixels(kind):
 
 
 @covers("declare_by", of=(*LINK_BUDGETS, *CAMERAS, "radar.range_boundary"))
-@covers("declare_by", of=("optical.range_boundary",))
+@covers("declare_by", of=("optical.range_boundary", "laser.scanning"))
 def test_who_it_is_decides_no_declaration_by_place():
     """Other names and another order declare the same rows; noise takes part by its place."""
     rule = {"declare_m": 2, "declare_n": 3}
@@ -162,6 +162,7 @@ def test_who_it_is_decides_no_declaration_by_place():
             **rule,
         ),
         "told": sensor("optical.range_boundary", declare_by="place", **rule),
+        "laser": sensor("laser.scanning", declare_by="place", **rule),
     }
     first = run(chain(sensors, targets=CROWD, duration_s=8))["detections"]
     renamed = [{**target, "name": f"z{99 - i}"} for i, target in enumerate(CROWD)]
@@ -179,28 +180,31 @@ def test_who_it_is_decides_no_declaration_by_place():
     assert {*noise} == {True, False}
     by_name = dsa_des.load_scene(chain(sensors), sets=["blocks.told.declare_by=target"])
     assert by_name.blocks["told"].parameters.declares_by == "target"
+    assert by_name.blocks["laser"].parameters.declares_by == "place"
 
 
-def declared(duration_s=4, **keys):
-    """Declarations of one exact radar with noise nowhere, by place."""
-    eye = sensor("radar.range_boundary", scan_rate_hz=4, declare_m=2, declare_n=2,
+def declared(duration_s=4, kind="radar.range_boundary", **keys):
+    """Declarations of one exact sensor with noise nowhere, by place."""
+    eye = sensor(kind, scan_rate_hz=4, declare_m=2, declare_n=2,
                  declare_by="place", **keys)  # fmt: skip
     found = rows(run(chain({"sensor": eye}, targets=[crooked.ROLLING], duration_s=duration_s)))
     return [row["declared"] for row in found]
 
 
 @covers("declare_speed_m_s", "declare_rate_deg_s",
-        of=(*LINK_BUDGETS, *CAMERAS, "radar.range_boundary", "optical.range_boundary"))  # fmt: skip
-def test_a_place_moves_no_faster_than_the_scene_says():
+        of=(*LINK_BUDGETS, *CAMERAS, "radar.range_boundary", "optical.range_boundary",
+            "laser.scanning"))  # fmt: skip
+@pytest.mark.parametrize("kind", ["radar.range_boundary", "laser.scanning"])
+def test_a_place_moves_no_faster_than_the_scene_says(kind):
     """The intruder comes nearer by some 114 m/s and turns by about 0.3 deg/s, seen from there."""
     start, later = (crooked.ned(crooked.ROLLING, time_s) for time_s in (0.0, 0.25))
     nearer_m_s = 4.0 * abs(np.linalg.norm(start) - np.linalg.norm(later))
     unit = [vector / np.linalg.norm(vector) for vector in (start, later)]
     turn_deg_s = 4.0 * np.degrees(np.arccos(unit[0] @ unit[1]))
     both_ways = {"declare_speed_m_s": 1.02 * nearer_m_s, "declare_rate_deg_s": 1.02 * turn_deg_s}
-    assert declared(0.5, **both_ways) == [False, True]
+    assert declared(0.5, kind, **both_ways) == [False, True]
     for key, value in both_ways.items():
-        assert declared(0.5, **{**both_ways, key: 0.96 * value}) == [False, False], key
+        assert declared(0.5, kind, **{**both_ways, key: 0.96 * value}) == [False, False], key
 
 
 def test_a_turn_of_the_ownship_moves_no_place():

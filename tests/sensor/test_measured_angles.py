@@ -5,7 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
-from covering import CAMERAS, RADARS, SENSORS, covers
+from covering import CAMERAS, RANGING, SENSORS, covers
 from wired import alone, rows
 
 BODY = {target["name"]: crooked.body(target) for target in crooked.TARGETS}
@@ -37,10 +37,10 @@ def test_reports_are_on_the_grid_of_each_angle(kind, across_deg, up_deg):
         assert found[name]["elevation_rad"] == pytest.approx(expected, abs=1e-9)
 
 
-@covers("range_resolution_m", of=RADARS)
+@covers("range_resolution_m", of=RANGING)
 @pytest.mark.parametrize("kind", SENSORS)
 def test_ranges_are_on_their_grid_where_they_are_measured(kind):
-    if kind not in RADARS:
+    if kind not in RANGING:
         assert all(row["range_m"] is None for row in reports(kind).values())
         return
     exact = reports(kind)

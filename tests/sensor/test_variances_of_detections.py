@@ -5,7 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
-from covering import RADARS, SENSORS
+from covering import RANGING, SENSORS
 from scipy.stats import kstest
 from wired import alone, noise_crosses, rows
 
@@ -15,13 +15,13 @@ MOUNT = {"mount_azimuth_deg": -35.0, "mount_elevation_deg": 21.0, "mount_roll_de
 
 @pytest.mark.parametrize("kind", SENSORS)
 def test_a_grid_s_variance_is_a_twelfth_of_its_step_squared(kind):
-    keys = {"range_resolution_m": 60.0} if kind in RADARS else {}
+    keys = {"range_resolution_m": 60.0} if kind in RANGING else {}
     found = rows(alone(kind, **STEPS, **keys), block="sensor")
     assert len(found) == len(crooked.TARGETS)
     for row in found:
         assert row["azimuth_variance_rad2"] == pytest.approx(math.radians(3.0) ** 2 / 12.0)
         assert row["elevation_variance_rad2"] == pytest.approx(math.radians(1.0) ** 2 / 12.0)
-        expected = 300.0 if kind in RADARS else None
+        expected = 300.0 if kind in RANGING else None
         assert row["range_variance_m2"] == expected
         assert row["range_rate_m_s"] is None and row["range_rate_variance_m2_s2"] is None
 

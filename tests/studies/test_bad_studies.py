@@ -157,7 +157,7 @@ def test_folders_that_hold_something_else(small: Path) -> None:
     assert "full/study.json: is damaged" in refused("show", "full")
     assert "full/study.json: is damaged" in refused("study.toml", "--out", "full", "--resume")
     assert "--out study.toml: is a file" in refused("study.toml", "--out", "study.toml")
-    assert "give STUDY.toml" in refused()
+    assert "give a STUDY" in refused()
     assert "there is no studies/study-NNN to continue" in refused("study.toml", "--resume")
     assert "must be 1 or more" in refused("study.toml", "--workers", "0")
 

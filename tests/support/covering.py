@@ -6,9 +6,11 @@ from typing import TypeVar
 Test = TypeVar("Test", bound=Callable[..., object])
 
 RADARS = ("radar.threshold", "radar.swerling", "radar.range_boundary")
+#: Sensors that measure range.
+RANGING = (*RADARS, "laser.scanning")
 LINK_BUDGETS = ("radar.threshold", "radar.swerling")
 CAMERAS = ("optical.eo", "optical.ir", "optical.projection")
-SENSORS = (*RADARS, *CAMERAS, "optical.range_boundary")
+SENSORS = (*RADARS, *CAMERAS, "optical.range_boundary", "laser.scanning")
 
 
 def covers(*keys: str, of: tuple[str, ...] = ("",)) -> Callable[[Test], Test]:

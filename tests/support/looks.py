@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import wired
-from covering import CAMERAS, LINK_BUDGETS, RADARS
+from covering import CAMERAS, LINK_BUDGETS, RADARS, RANGING
 
 Columns = dict[str, Any]
 
@@ -37,7 +37,9 @@ def ring() -> list[dict[str, Any]]:
 
 def quantities(kind: str) -> tuple[str, ...]:
     """Return what a sensor of some type measures."""
-    return tuple(COLUMNS) if kind in RADARS else ANGLES
+    if kind in RADARS:
+        return tuple(COLUMNS)
+    return (*ANGLES, "range") if kind in RANGING else ANGLES
 
 
 #: Steps so fine that a target crosses many of them between two looks.
@@ -64,14 +66,22 @@ SIGNAL_KEYS: dict[str, dict[str, Any]] = {
 
 def modes(kind: str) -> dict[str, dict[str, Any]]:
     """Return the keys of each way in which a sensor's measured values may err."""
-    radar = kind in RADARS
-    stated = {"errors": "stated", "biases": "fixed", **ERRORS, **(RANGE_ERRORS if radar else {})}
-    lasts = {**TIMES, **(RANGE_TIMES if radar else {})}
+    radar, measured = kind in RADARS, quantities(kind)
+    of_range, of_time = (
+        {key: value for key, value in keys.items() if radar or "rate" not in key}
+        if "range" in measured
+        else {}
+        for keys in (RANGE_ERRORS, RANGE_TIMES)
+    )
+    stated = {"errors": "stated", "biases": "fixed", **ERRORS, **of_range}
+    lasts = {**TIMES, **of_time}
     coarse = {"azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 1.0}
+    if "range" in measured:
+        coarse["range_resolution_m"] = 50.0
     if radar:
-        coarse |= {"range_resolution_m": 50.0, "range_rate_resolution_m_s": 8.0}
+        coarse["range_rate_resolution_m_s"] = 8.0
     found: dict[str, dict[str, Any]] = {
-        "grid": {**FINE, **({"range_resolution_m": 1e-4} if radar else {})},
+        "grid": {**FINE, **({"range_resolution_m": 1e-4} if "range" in measured else {})},
         "stated": {**stated, "quantised": False},
         "lasting": {**stated, **lasts, "quantised": False},
         "quantised": {**stated, **coarse},

@@ -109,6 +109,12 @@ SENSORS: dict[str, dict[str, Any]] = {
         "type": "optical.range_boundary", "scan_rate_hz": 1, "range_km": 20.0,
         "azimuth_resolution_deg": 0.0, "elevation_resolution_deg": 0.0,
     },
+    "laser.scanning": {
+        "type": "laser.scanning", "scan_rate_hz": 1, "range_km": 20.0, "azimuth_shots": 1,
+        "elevation_shots": 1, "pattern": "one_shot", "errors": "grid", "quantised": True,
+        "divergence_mrad": 1.0, "peak_power_w": 1e9, "pulse_ns": 5.0, "aperture_mm": 50.0,
+        "noise_equivalent_power_w": 1e-9,
+    },
 }  # fmt: skip
 
 

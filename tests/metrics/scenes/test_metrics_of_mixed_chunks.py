@@ -12,7 +12,7 @@ from wired import chain, measured
 
 import dsa_des
 from components.encounters.ending import ClosestApproachPassed
-from dsa_des.block.run_end import RunEnd
+from dsa_des.block.component import RunEnd
 from dsa_des.block.wake import Wake
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas import replicas

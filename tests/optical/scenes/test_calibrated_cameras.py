@@ -116,6 +116,12 @@ def abeam(kind: str, aspect_deg: float) -> float:
     return ends + 20.0 * abs(math.sin(math.radians(aspect_deg)))
 
 
+# What a laser hits of it: a surface, or a wire.
+HIT = {
+    60.0: {"area_m2": 3.0},
+    180.0: {"wire_diameter_mm": 9.0, "wire_length_m": 4.0, "wire_direction_deg": 30.0,
+            "wire_slope_deg": 5.0},
+}  # fmt: skip
 CALIBRATE = [f"calibrate.{key}" for key in ("range_km", "pd", "area_m2", "aspect_deg", "contrast",
                                             "visibility_km")]  # fmt: skip
 CRAFT_KEYS = [
@@ -124,6 +130,7 @@ CRAFT_KEYS = [
         "rcs_dbsm", "rcs_table", "swerling", "contrast", "contrast_ir", "paint_reflectance",
         "engine", *(f"{band}.{key}" for band in ("eo", "ir") for key in AREAS), "ir.back_m2",
         "eo.silhouette_table", "ir.silhouette_table", "eo.made_for", "ir.made_for",
+        *(f"laser.{key}" for key in ("reflectivity", *HIT[60.0], *HIT[180.0])),
     )
 ]  # fmt: skip
 
@@ -145,7 +152,8 @@ def test_a_known_range_gives_noise_or_threshold(kind, aspect_deg, tmp_path):
         for band in ("eo", "ir")
     }
     other = {**CRAFT, **tables, "rcs_dbsm": 40.0, "swerling": 3, "engine": "turbojet",
-             "paint_reflectance": 0.9}  # fmt: skip
+             "paint_reflectance": 0.9,
+             "laser": {"reflectivity": 0.7, **HIT[aspect_deg]}}  # fmt: skip
     size = abeam(kind, aspect_deg)
     pixels = size / (2000.0 * PIXEL_RAD) ** (1 if kind == "optical.projection" else 2)
     left = math.exp(-3.912 * 2.0 / 5.0)

@@ -10,7 +10,7 @@ from scipy.special import chndtr
 from wired import Row, chain, decided, run
 
 import dsa_des
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 PFA = 1e-3
@@ -211,7 +211,7 @@ def test_a_calibration_may_say_at_which_false_alarm_probability_it_holds(kind):
     expected_db = 10.0 * math.log10(needed) + 40.0 * math.log10(4200 / 2000)
     assert row["snr_db"] == pytest.approx(expected_db, abs=1e-4)
     scene = dsa_des.load_scene(chain({"radar": radar}, ownship=OWN, targets=[at(2000, 5.0, 1)]))
-    (said,) = [text for text in warnings_of(Simulation(scene)) if "calibrate holds" in text]
+    (said,) = [text for text in notes_of_scene(Simulation(scene)) if "calibrate holds" in text]
     assert f"{PFA ** (1.0 / (1.0 + needed)):.3g} instead of 0.83" in said
 
 

@@ -15,7 +15,7 @@ from wired import chain, decided, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 CELL = {
@@ -61,7 +61,7 @@ def test_clutter_takes_detections_from_every_radar_and_a_threshold_at_the_noise_
         assert staying > clear
     for mode in ("noise", "adaptive"):
         loaded = dsa_des.load_scene(scene(kind, -20.0, clutter_threshold=mode))
-        said = [line for line in warnings_of(Simulation(loaded)) if "counts as signal" in line]
+        said = [line for line in notes_of_scene(Simulation(loaded)) if "counts as signal" in line]
         assert len(said) == (mode == "noise")
 
 

@@ -14,7 +14,7 @@ from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 RATE_MM_H, FREQUENCY_HZ, PFA = 25.0, 9.4e9, 1e-6
@@ -137,7 +137,7 @@ def test_a_boundary_obeys_rain_where_its_carrier_is_known():
 
 def said_of(kind: str, **keys) -> str:
     scene = chain({"radar": sensor(kind, **keys)}, weather={"rain_rate_mm_h": 5.0})
-    return " ".join(warnings_of(Simulation(dsa_des.load_scene(scene))))
+    return " ".join(notes_of_scene(Simulation(dsa_des.load_scene(scene))))
 
 
 def test_check_says_where_rain_has_no_echo():
@@ -278,7 +278,7 @@ def test_a_loss_of_shape_wants_a_beam():
 )
 def test_gain_and_beam_that_contradict_each_other_are_said(keys, said):
     scene = chain({"radar": sensor("radar.threshold", **{**BEAM, **keys})})
-    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
     assert any("antenna_gain_db is" in line and "6 x 4 deg" in line for line in found) is said
 
 

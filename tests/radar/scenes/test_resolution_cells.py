@@ -16,7 +16,7 @@ import dsa_des
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 CELL = {
@@ -128,7 +128,7 @@ def test_explain_says_where_noise_is_reported_exactly_at_the_target(keys, said):
 
 def warned(kind: str = "radar.threshold", **keys) -> list[str]:
     radar = {**sensor(kind), **VIEW, **keys}
-    found = warnings_of(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
     # A beam that contradicts the gain speaks of false alarms too.
     return [line for line in found if "false" in line and "which is a beam of" not in line]
 
@@ -160,7 +160,7 @@ def test_a_threshold_that_noise_never_crosses_is_said():
 def test_the_thesis_s_probability_is_said_to_be_its():
     default = sensor("radar.swerling", false_alarm_probability=None)
     scene = chain({"radar": {**default, **VIEW, "false_alarms": True}})
-    said = " ".join(warnings_of(Simulation(dsa_des.load_scene(scene))))
+    said = " ".join(notes_of_scene(Simulation(dsa_des.load_scene(scene))))
     assert "(the thesis's, as the scene gives none): with 15,000 resolution cells" in said
 
 

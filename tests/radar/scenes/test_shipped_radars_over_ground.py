@@ -9,7 +9,7 @@ import pytest
 from wired import chain, rows, run
 
 import dsa_des
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -76,5 +76,5 @@ def test_ground_takes_detections_from_it(name):
 def test_its_beam_is_stated_and_fits_its_gain(name):
     radar = RADARS[name]
     assert radar["azimuth_beamwidth_deg"] > 0 and radar["elevation_beamwidth_deg"] > 0
-    said = warnings_of(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
+    said = notes_of_scene(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
     assert not [line for line in said if "antenna_gain_db" in line]

@@ -9,7 +9,7 @@ from components.messages.detections import LastingError, SensorOffer
 from components.optical.sensors import OpticalRangeBoundary
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 FIRST_COMMAND = ["blocks.fusion.type='fusion.pass_through'", "blocks.tracker.type='tracking.ekf'"]
@@ -102,7 +102,7 @@ def test_a_filter_that_is_told_nothing_of_it_warns():
     scene = scene_of_case(case, traffic)
 
     def said():
-        found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+        found = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
         return [text for text in found if "lasts from look to look" in text]
 
     assert said() == []

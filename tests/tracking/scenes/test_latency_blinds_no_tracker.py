@@ -7,7 +7,7 @@ from wired import chain, rows, run
 
 import dsa_des
 from components.display.terminal import outcome_lines
-from dsa_des.running.reports import warnings_of
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 STATED = {"errors": "stated", "quantised": False, "azimuth_error_deg": 0.3,
@@ -86,7 +86,7 @@ def test_whatever_else_is_late_or_put_together(keys):
 
 
 def shares(*arguments, **keys):
-    found = warnings_of(Simulation(dsa_des.load_scene(scene(*arguments, **keys))))
+    found = notes_of_scene(Simulation(dsa_des.load_scene(scene(*arguments, **keys))))
     return [text for text in found if "too late" in text]
 
 

@@ -4,6 +4,8 @@ A package registers a function under the entry-point group `GROUP`. It takes not
 the folder of its scenes and studies.
 """
 
+import glob
+import os
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
@@ -33,6 +35,29 @@ def folders() -> list[Path]:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__
     return [folder for folder in found if folder.is_dir()]
+
+
+def found_or_shipped(path: Path, name: str) -> Path:
+    """Return a path that exists, or else the shipped file that a name means, or else the path.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        As it was written: ``alerting/do365b.conf``, or ``do365b.conf`` where only one is called so.
+
+    Raises
+    ------
+    UsageError
+        If a package that registered a folder cannot be asked.
+    """
+    wanted = PurePosixPath(name)
+    if os.path.lexists(path) or wanted.is_absolute() or not wanted.suffix or ".." in wanted.parts:
+        return path
+    there = [folder / wanted for folder in folders() if (folder / wanted).is_file()]
+    if not there and len(wanted.parts) == 1:
+        there = [found for folder in folders() for found in folder.rglob(glob.escape(name))]
+    return there[0] if len(there) == 1 else path
 
 
 def shipped_files() -> Iterator[tuple[PurePosixPath, Path]]:

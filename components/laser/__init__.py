@@ -1,0 +1,1 @@
+"""Scanning lasers: the range equation, the pattern of a scan, and the block."""

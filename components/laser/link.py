@@ -1,0 +1,229 @@
+"""The laser range equation, and how often a scan's shots meet a target.
+
+A beam of divergence θ and even brightness lights a disc of π (θR)² / 4 at the range R. What of it
+a target takes, times its reflectivity, is scattered evenly over the half space (Lambert), and the
+aperture D collects its part:
+
+    P = P0 ρ s η T² D² / (4 R²)
+
+with the share s of the disc that the target fills: 1 for one that is larger than the beam (P falls
+with R²), A over the disc for a small one (with R⁴), 4 d / (π θ R) for a wire through the middle of
+the disc (with R³), and T the transmission one way. These are the laser radar cross-sections
+π ρ R² θ², 4 ρ A and 4 ρ d θ R of A. V. Jelalian, Laser Radar Systems, Artech House 1992, chapter 1.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from components.optical.detection import detection_probability
+
+__all__ = [
+    "laser_power_w",
+    "scan_detection_probability",
+    "shots_on_target",
+    "target_share",
+    "wire_share",
+]
+
+
+def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
+    """Return the share of the beam's disc that a target fills.
+
+    Parameters
+    ----------
+    area_m2 : array_like, m²
+        That the target shows, 0 or more.
+    range_m : array_like, m
+        Above 0.
+    divergence_rad : float
+        Full angle of the beam, above 0.
+
+    Returns
+    -------
+    array of the broadcast shape, in [0, 1]
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+    """
+    shape, (area, distance) = broadcast_flat(
+        area_m2=not_negative("area_m2", area_m2), range_m=positive("range_m", range_m)
+    )
+    width_m = float(positive("divergence_rad", divergence_rad)) * distance
+    return unflatten(np.minimum(area / (0.25 * math.pi * width_m**2), 1.0), shape)
+
+
+def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
+    """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R).
+
+    Parameters
+    ----------
+    diameter_m : array_like, m
+        Of the wire, 0 or more.
+    range_m : array_like, m
+        Above 0.
+    divergence_rad : float
+        Full angle of the beam, above 0.
+
+    Returns
+    -------
+    array of the broadcast shape, in [0, 1]
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+    """
+    shape, (thick, distance) = broadcast_flat(
+        diameter_m=not_negative("diameter_m", diameter_m), range_m=positive("range_m", range_m)
+    )
+    width_m = float(positive("divergence_rad", divergence_rad)) * distance
+    return unflatten(np.minimum(thick / (0.25 * math.pi * width_m), 1.0), shape)
+
+
+def laser_power_w(
+    share: ArrayLike,
+    range_m: ArrayLike,
+    *,
+    peak_power_w: float,
+    aperture_m: float,
+    efficiency: float = 1.0,
+    reflectivity: ArrayLike = 1.0,
+    extinction_per_m: float = 0.0,
+) -> Any:
+    """Return the peak power that comes back from a target, W.
+
+    Parameters
+    ----------
+    share : array_like
+        Of the beam that the target takes: `target_share`, `wire_share`.
+    range_m : array_like, m
+        Above 0.
+    peak_power_w : float, W
+    aperture_m : float, m
+        Diameter of the receiver.
+    efficiency : float
+        Of transmitter and receiver together.
+    reflectivity : array_like
+        Of a Lambertian surface.
+    extinction_per_m : float, 1/m
+        Of the air, at the laser's wavelength.
+
+    Returns
+    -------
+    array of the broadcast shape, W
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+
+    Notes
+    -----
+    A. V. Jelalian, Laser Radar Systems, 1992, eq. 1.1 with the cross-sections of its chapter 1; R.
+    D. Richmond and S. C. Cain, Direct-Detection LADAR Systems, SPIE 2010, chapter 1.
+    """
+    shape, (part, distance, bright) = broadcast_flat(
+        share=not_negative("share", share),
+        range_m=positive("range_m", range_m),
+        reflectivity=not_negative("reflectivity", reflectivity),
+    )
+    sent_w = float(positive("peak_power_w", peak_power_w)) * float(
+        not_negative("efficiency", efficiency)
+    )
+    depth = 2.0 * float(not_negative("extinction_per_m", extinction_per_m)) * distance
+    with np.errstate(under="ignore"):
+        left = np.exp(-depth)
+        collected = (0.5 * float(positive("aperture_m", aperture_m)) / distance) ** 2
+        return unflatten(sent_w * part * bright * collected * left, shape)
+
+
+def shots_on_target(
+    area_rad2: ArrayLike, beam_area_rad2: ArrayLike, spacing_rad2: ArrayLike
+) -> Any:
+    """Return how many shots of a scan meet a target in the mean, each with its whole share.
+
+    The larger of the target and the beam, over the solid angle of a shot. What a beam meets with
+    its edge alone is not counted as a shot of its own: shots times share times the disc is the
+    target's area whatever the beam, so that no light is made.
+
+    Parameters
+    ----------
+    area_rad2 : array_like, sr
+        Solid angle of the target; of a wire, its length by its thickness.
+    beam_area_rad2 : array_like, sr
+        Of the beam's disc, π θ² / 4; along a wire, its length by π θ / 4.
+    spacing_rad2 : array_like, sr
+        From shot to shot, both ways.
+
+    Returns
+    -------
+    array of the broadcast shape
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+    """
+    shape, (target, beam, each) = broadcast_flat(
+        area_rad2=not_negative("area_rad2", area_rad2),
+        beam_area_rad2=not_negative("beam_area_rad2", beam_area_rad2),
+        spacing_rad2=positive("spacing_rad2", spacing_rad2),
+    )
+    return unflatten(np.maximum(target, beam) / each, shape)
+
+
+def scan_detection_probability(
+    snr: ArrayLike, shots: ArrayLike, *, threshold: float, needed: int = 1
+) -> Any:
+    """Return the probability that a scan detects a target.
+
+    Each shot that meets it is detected where its amplitude with Gaussian noise reaches the
+    threshold, Q(threshold - SNR), and `needed` of them must be. Where the mean number of shots is
+    not whole, the pattern's phase says whether there is one more: it is even from scan to scan.
+
+    Parameters
+    ----------
+    snr : array_like
+        Amplitude over the noise's standard deviation (of optical power, not of its square).
+    shots : array_like
+        Mean number of shots that meet the target, 0 or more.
+    threshold : float
+        In standard deviations of noise.
+    needed : int
+        Shots that must be detected, 1 or more.
+
+    Returns
+    -------
+    array of the broadcast shape, in [0, 1]
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+
+    Notes
+    -----
+    Direct detection of a pulse in the noise of the receiver: Richmond and Cain, chapter 3. Speckle
+    is left out: an aperture of many speckles averages it, and so does a wide band.
+    """
+    from scipy.special import bdtrc
+
+    shape, (ratio, mean) = broadcast_flat(
+        snr=not_negative("snr", snr), shots=not_negative("shots", shots)
+    )
+    one = detection_probability(ratio, threshold, 1.0)
+    whole = np.floor(mean)
+
+    def enough(count: Any) -> Any:
+        possible = count >= needed
+        tried = bdtrc(needed - 1, np.where(possible, count, needed).astype(np.int64), one)
+        return np.where(possible, tried, 0.0)
+
+    more = mean - whole
+    return unflatten((1.0 - more) * enough(whole) + more * enough(whole + 1.0), shape)

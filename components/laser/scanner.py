@@ -1,0 +1,349 @@
+"""A scanning laser that ranges by time of flight (``laser.scanning``), and its ladder."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.atmosphere.infrared import haze_share_at
+from components.atmosphere.visibility import KOSCHMIEDER
+from components.geometry import sector_width_rad, unit_vector
+from components.laser.link import (
+    laser_power_w,
+    scan_detection_probability,
+    shots_on_target,
+    target_share,
+    wire_share,
+)
+from components.messages.detections import OwnOfEntries
+from components.messages.reach import farthest_look
+from components.messages.targets import RelativeTargets
+from components.optical.area_of_cells import area_of_cells
+from components.optical.detection import detection_probability, deviations_exceeded
+from components.optical.weather_effects import obscuration
+from components.radar.beam import BeamSweep, Sweep
+from components.radar.measurement import range_variance
+from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells, Look
+from components.sensor.marks import LASER
+from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
+from components.sensor.sensor import Sensor
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
+from dsa_des.block.message import Message
+from dsa_des.block.wake import Wake
+
+_PD = Quantity("detection_probability", "Pd")
+# So many standard deviations of noise are no more than any laser's echo.
+_STRONGEST = 1e12
+
+
+class LaserParameters(SensorParameters):
+    """Parameters of a scanning laser."""
+
+    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
+
+    errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
+        default="signal",
+        description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "
+        "the standard deviations and biases that the scene gives; 'signal', those that follow from "
+        "the pulse, the echo's strength and the beam's width, beside the stated ones.",
+    )
+    quantised: bool = Field(
+        default=False,
+        description="Whether values with errors other than 'grid' are rounded to the grid too.",
+    )
+    range_km: float = Field(gt=0, description="Farthest range that is looked at, km.")
+    azimuth_shots: int = Field(gt=0, description="Shots across the field of view in a scan.")
+    elevation_shots: int = Field(gt=0, description="Shots from its lower to its upper edge.")
+    pattern: Literal["scanned", "one_shot"] = Field(
+        default="scanned",
+        description="Whether the shots that meet a target follow from the scan's pattern, or each "
+        "scan has one shot at it.",
+    )
+    beam_sweep: bool = Field(
+        default=False,
+        description="Whether columns of shots follow each other clockwise through the scan: each "
+        "target is measured at the instant at which its column is shot, which is recorded.",
+    )
+    wavelength_um: float = Field(
+        default=1.55, ge=0.4, le=2.5, description="Wavelength, µm; for haze and fog."
+    )
+    divergence_mrad: float = Field(gt=0, le=100, description="Full angle of the beam, mrad.")
+    peak_power_w: float = Field(gt=0, description="Peak power of a pulse, W.")
+    pulse_ns: float = Field(gt=0, le=1000, description="Length of a pulse, ns.")
+    aperture_mm: float = Field(gt=0, description="Diameter of the receiver, mm.")
+    efficiency: float = Field(
+        default=0.5, gt=0, le=1, description="Of transmitter and receiver together."
+    )
+    noise_equivalent_power_w: float = Field(
+        gt=0, description="Standard deviation of the receiver's noise, as optical power, W."
+    )
+    false_alarm_probability: float = Field(
+        default=1e-9, gt=0, lt=0.5, description="Probability that noise passes for an echo."
+    )
+    hits_needed: int = Field(
+        default=1, ge=1, le=1000, description="Shots of a scan that must detect a target."
+    )
+    range_resolution_m: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
+    )
+    range_error_m: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range, m."
+    )
+    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
+    )
+
+    @model_validator(mode="after")
+    def _one_pulse_in_the_air(self) -> Self:
+        rate_hz = float(self.scan_rate_hz) * self.azimuth_shots * self.elevation_shots
+        farthest_km = 299_792.458 / (2.0 * rate_hz)
+        if self.range_km > farthest_km:
+            raise ValueError(
+                f"range_km is {self.range_km:g}: {self.azimuth_shots} x {self.elevation_shots} "
+                f"shots at {float(self.scan_rate_hz):g} scans/s are {rate_hz:,.0f} pulses/s, whose "
+                f"echoes are unambiguous to {farthest_km:.4g} km; allowed: at most that"
+            )
+        return self
+
+    def without_effect(self) -> list[str]:
+        """Say that a single shot needs no pattern."""
+        said = super().without_effect()
+        if self.pattern == "one_shot" and self.hits_needed > 1:
+            said.append("hits_needed is more than the one shot of a scan: nothing is detected")
+        return said
+
+
+class LaserExtinction(Effect):
+    """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
+
+    lockstep = True
+    name = "laser extinction"
+    acts_on = "extinction"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather]`` for a visibility, fog or rain."""
+        per_m = _extinction_per_m(block)
+        if not per_m:
+            return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
+        return Verdict(True, f"[weather] takes {per_m * 1e4 / math.log(10.0):.3g} dB/km")
+
+    def build(self, block: Any) -> float:
+        """Return the extinction, 1/m."""
+        return _extinction_per_m(block)
+
+
+def _extinction_per_m(block: Any) -> float:
+    haze_m, rain_per_m = obscuration(block.context.sections["weather"])
+    if haze_m is None:
+        return rain_per_m
+    share = float(haze_share_at(haze_m, block.p.wavelength_um))
+    return rain_per_m + KOSCHMIEDER / haze_m * share
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability of detection at every (scan, target); a boundary sees all within."""
+    sensor: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        if isinstance(sensor, ScanningLaser):
+            return {_PD.name: sensor.detection_probability(cells)}
+        return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
+
+    found: dict[str, AnyArray] = dict(over_cells(sensor, wake, values, out_of_range=0.0))
+    return found
+
+
+def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
+    if not block.get("range_km"):
+        raise Unavailable("needs range_km to put the boundary at")
+    beam_deg = math.degrees(1e-3 * block["divergence_mrad"])
+    return {
+        "range_km": block["range_km"], "range_resolution_m": 0.15 * block["pulse_ns"],
+        "azimuth_resolution_deg": beam_deg, "elevation_resolution_deg": beam_deg,
+    }  # fmt: skip
+
+
+SHOTS = Ladder(
+    "shots",
+    (
+        Rung("range_boundary", "all inside range_km", "radar.range_boundary", _boundary),
+        Rung("one_shot", "one shot a scan at each target", parameters={"pattern": "one_shot"}),
+        Rung("scanned", "the shots of the scan's pattern", parameters={"pattern": "scanned"}),
+    ),
+    "scanned",
+    (_PD,),
+    measure,
+)
+
+
+class ScanningLaser(Sensor):
+    """A laser that scans a narrow field and ranges by time of flight.
+
+    Echoes follow the laser range equation (`components.laser.link`) for a target larger than the
+    beam, a small one and a wire; each aircraft's ``laser`` says what is hit. A shot's amplitude is
+    detected where with Gaussian noise it reaches the threshold of ``false_alarm_probability``; a
+    scan detects by ``hits_needed`` of the shots that its pattern puts on the target. ``snr_db`` is
+    20 lg of the strongest echo's amplitude over noise, confidence that over the threshold in dB.
+    With ``errors = "signal"`` range errs by pulse length over amplitude, and angles by anywhere in
+    the beam. Isolated false alarms are not reported: systems reject them pixel by pixel.
+    """
+
+    mark = LASER
+    measures_range = True
+    lockstep = True
+    Parameters = LaserParameters
+    inputs = CUED_INPUTS
+    hooks = {"extinction": "extinction by the air at the laser's wavelength, 1/m"}
+    effects: ClassVar[tuple[Effect, ...]] = (LaserExtinction(), BeamSweep())
+    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
+    ladders = (SHOTS,)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.divergence_rad = 1e-3 * parameters.divergence_mrad
+        #: Amplitude that is detected, in standard deviations of the receiver's noise.
+        self.threshold = deviations_exceeded(parameters.false_alarm_probability)
+        width = sector_width_rad(*self.reach.azimuth_rad)
+        height = self.reach.elevation_rad[1] - self.reach.elevation_rad[0]
+        self._spacing_rad2 = width / parameters.azimuth_shots * height / parameters.elevation_shots
+        self._draws = self.stream("shots")
+        self._extinction_per_m = 0.0
+
+    def setup(self) -> None:
+        """Take what the scene's air does to a pulse, and refuse cues."""
+        refuse_cues(self, "its pattern is fixed, with one threshold")
+        (self._extinction_per_m,) = self.built("extinction") or [0.0]
+
+    @property
+    def _sweep(self) -> Sweep | None:
+        return self.context.effects.get(BeamSweep.name)
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where columns sweep, the ownship at each entry's instant."""
+        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
+
+    def request(self, port: str) -> Any:
+        """Ask for the targets in our reach; a sweep decides for itself when that is."""
+        reach = super().request(port)
+        if self._sweep is None or not self.p.enabled:
+            return reach
+        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
+
+    def seen(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets at the instants at which their columns are shot."""
+        if self._sweep is None:
+            return targets, rows
+        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+
+    def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
+        """Return each cell's amplitude over noise in one shot, and the mean shots of a scan."""
+        column = cells.roster.column
+        thick_m = 1e-3 * cells.of_target(column("laser.wire_diameter_mm"))
+        wire = np.isfinite(thick_m)
+        thick_m = np.where(wire, thick_m, 0.0)
+        area_m2 = cells.of_target(column("laser.area_m2"))
+        if np.isnan(area_m2[~wire]).any():
+            area_m2 = np.where(np.isnan(area_m2), area_of_cells(cells, "eo", "exact"), area_m2)
+        area_m2 = np.where(wire, 0.0, area_m2)
+        # A wire that runs away from us shows less of its length, and is lit at a slant.
+        slant = _slant(cells) if wire.any() else np.ones(len(cells))
+        range_m, beam_rad = cells.range_m, self.divergence_rad
+        share = np.where(
+            wire,
+            slant * wire_share(thick_m, range_m, beam_rad),
+            target_share(area_m2, range_m, beam_rad),
+        )
+        power_w = laser_power_w(
+            share, range_m, peak_power_w=self.p.peak_power_w,
+            aperture_m=1e-3 * self.p.aperture_mm, efficiency=self.p.efficiency,
+            reflectivity=cells.of_target(column("laser.reflectivity")),
+            extinction_per_m=self._extinction_per_m,
+        )  # fmt: skip
+        snr = np.minimum(power_w / self.p.noise_equivalent_power_w, _STRONGEST)
+        if self.p.pattern == "one_shot":
+            return snr, np.ones(len(cells))
+        length_m = np.where(wire, cells.of_target(column("laser.wire_length_m")), 0.0)
+        length_rad = slant * length_m / range_m
+        # Rows of shots are as far apart everywhere, columns nearer to each other up and down.
+        _, elevation = self.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
+        shots = shots_on_target(
+            np.where(wire, length_rad * thick_m / range_m, area_m2 / range_m**2),
+            0.25 * math.pi * beam_rad * np.where(wire, length_rad, beam_rad),
+            self._spacing_rad2 * np.maximum(np.cos(elevation), 1e-6),
+        )
+        return snr, shots
+
+    def detection_probability(self, cells: Cells) -> FloatArray:
+        """Return the probability that a scan detects each cell's target."""
+        return self._probability(*self.snr_and_shots(cells))
+
+    def _probability(self, snr: FloatArray, shots: FloatArray) -> FloatArray:
+        found: FloatArray = scan_detection_probability(
+            snr, shots, threshold=self.threshold, needed=self.p.hits_needed
+        )
+        return found
+
+    def look(self, cells: Cells) -> Look:
+        """Decide by one draw whether a scan detects each target, and how strong its echo was."""
+        from scipy.special import ndtri
+
+        snr, shots = self.snr_and_shots(cells)
+        probability = self._probability(snr, shots)
+        drawn = 1.0 - cells.draws(self._draws)
+        detected = drawn <= probability
+        # What crossed the threshold, by the share of such echoes that come out stronger.
+        one = detection_probability(snr, self.threshold, 1.0)
+        tail = one * np.where(detected, drawn / np.where(detected, probability, 1.0), 1.0)
+        with np.errstate(divide="ignore"):
+            strength = np.where(detected, snr - ndtri(tail), self.threshold)
+        strength = np.maximum(strength, self.threshold)
+        snr_db = 20.0 * np.log10(strength)
+        extras: dict[str, AnyArray] = {"snr_db": snr_db}
+        if self._says_looks:
+            extras["detection_probability"] = probability
+        above_db = snr_db - 20.0 * math.log10(self.threshold)
+        return Look(detected, above_db, extras, {"amplitude": strength})
+
+    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+        """Return what is recorded beside a detection: nothing that only the truth gives."""
+        extras = dict(super()._extras(cells, look))
+        extras.pop("detection_probability", None)
+        return extras
+
+    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the variances of a pulse's flight and of where in the beam its echo was made."""
+        amplitude = signal["amplitude"]
+        angle = np.full(len(amplitude), self.divergence_rad**2 / 12.0)
+        pulse_m = 0.5 * 0.299792458 * self.p.pulse_ns
+        return {
+            "azimuth": angle, "elevation": angle, "range": range_variance(pulse_m, amplitude**2)
+        }  # fmt: skip
+
+    def report(self) -> dict[str, Any]:
+        """Return the threshold and the rate of pulses in use."""
+        pulses = self.p.azimuth_shots * self.p.elevation_shots * float(self.p.scan_rate_hz)
+        used = {"threshold": self.threshold, "pulse_rate_hz": pulses}
+        return {**super().report(), "lasers": {self.name: used}}
+
+
+def _slant(cells: Cells) -> FloatArray:
+    """Return the sine of the angle between each cell's line of sight and its wire."""
+    direction, slope = (
+        np.radians(cells.of_target(cells.roster.column(f"laser.wire_{name}_deg")))
+        for name in ("direction", "slope")
+    )
+    along = np.stack(unit_vector(direction, slope))
+    sight = np.stack(unit_vector(cells.azimuth_rad, cells.elevation_rad))
+    cosine = (along * sight).sum(axis=0)
+    return np.asarray(np.sqrt(np.maximum(1.0 - cosine**2, 0.0)))

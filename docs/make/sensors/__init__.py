@@ -1,0 +1,1 @@
+"""Makers of the tables of docs/sensors.md."""

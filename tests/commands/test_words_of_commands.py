@@ -1,0 +1,137 @@
+"""Options that commands share, further commands, completion, and one line for each slip."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.shell_completion import ShellComplete
+from click.testing import CliRunner, Result
+from covering import covers
+
+from dsa_des.cli import main
+
+SMALL = ("--set", "axes.blocks.radar.scan_rate_hz=[1,2]", "--set", "set.duration_s=5")
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("run", "a.toml"), "a.toml: extends: there is no file first_lihgt; "
+         "did you mean the shipped 'first_light'?"),
+        (("run", "b.toml"), 'b.toml: blocks.raddar.type: needs a type, for example '
+         'type = "radar.swerling"; or did you mean the block \'radar\'?'),
+        (("run", "first_light", "--swap", "radar=my_sensor.Fmcw"), "command line: --swap radar = "
+         "'my_sensor.Fmcw': unknown block type; did you mean 'my_sensor:Fmcw' (module:Class)?"),
+        (("run", "first_light", "--set", "seed=1", "--set", "seed=2"),
+         "command line: seed = '2': --set gives it twice"),
+        (("study", "radar_scan_rate", "--replicas", "2", "--set", "replicas=3"),
+         "command line: replicas = '2': --set gives it twice"),
+        (("components", "radr"), "radr: there is no such block type, kind of blocks or table of "
+         "scenes; did you mean 'radar'?"),
+        (("components", "radar.swerling", "scanrate"),
+         "radar.swerling: has no key 'scanrate'; did you mean 'scan_rate_hz'?"),
+    ],
+)  # fmt: skip
+def test_a_slip_is_one_line_with_the_nearest_name(words, says):
+    Path("a.toml").write_text('extends = "first_lihgt"')
+    Path("b.toml").write_text('extends = "first_light"\n[blocks.raddar]\nscan_rate_hz = 2')
+    done = call(*words)
+    assert (done.exit_code, done.stdout, done.stderr) == (2, "", f"error: {says}\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "says"),
+    [
+        ("run", "radar_scan_rate", "is a study, not a scene: dsa-des study takes it"),
+        ("study", "first_light", "is a scene, not a study: dsa-des run takes it, "
+         "dsa-des compare runs it often"),
+    ],
+)  # fmt: skip
+def test_a_study_is_no_scene_and_a_scene_no_study(command, name, says):
+    done = call(command, name)
+    assert done.exit_code == 2 and done.stderr.endswith(f"{name}.toml: {says}\n")
+
+
+def test_a_study_takes_the_options_of_a_run():
+    words = ("study", "radar_scan_rate", *SMALL, "--workers", "1", "--no-figures", "--json")
+    done = call(*words, "--replicas", "2", "--seed", "3", "--swap", "radar=radar.threshold")
+    assert done.exit_code == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["runs"] == 4 and told["failed"] == 0
+    record = json.loads(Path(told["folder"], "study.json").read_text())
+    assert "radar.threshold" in json.dumps(record) and '"seed": 3' in json.dumps(record)
+    again = json.loads(call("study", "show", told["folder"], "--json", "--no-figures").stdout)
+    assert again == told
+
+
+def test_further_commands_of_study_have_their_own_help():
+    assert "--replicas" in call("study", "--help").stdout
+    for name in ("show", "report"):
+        text = call("study", name, "--help").stdout
+        assert f"study {name} [OPTIONS] FOLDER" in text and "--replicas" not in text
+        assert f"  {name} " in call("study", "--help").stdout
+
+
+def test_a_comparison_changes_all_that_is_compared():
+    words = "compare first_light --swap fusion=fusion.gated --replicas 2 --set duration_s=4"
+    only = ("--workers", "1", "--metric", "age_of_information_mean_s")
+    first, same, other = (
+        call(*words.split(), *only, "--seed", seed, "--out", f"s{k}").stdout.partition("wrote")[0]
+        for k, seed in enumerate((5, 5, 6))
+    )
+    assert first == same != other
+    refused = call("compare", "s0", "s1", "--seed", "3")
+    assert refused.exit_code == 2 and "s0: is a folder of finished runs" in refused.stderr
+
+
+def test_a_kind_of_blocks_and_one_key():
+    listed = call("components", "radar").stdout
+    assert "radar.swerling" in listed and "optical.eo" not in listed
+    (row,) = call("components", "radar.swerling", "scan_rate_hz").stdout.splitlines()[1:]
+    assert "Hz" in row and "required" in row
+    inner = call("components", "radar.swerling", "calibrate").stdout
+    assert "calibrate.rcs_dbsm" in inner and "power_w" not in inner
+
+
+@pytest.mark.parametrize(
+    ("words", "incomplete", "found"),
+    [
+        (["run"], "first_li", ["first_light"]),
+        (["study"], "sh", ["show"]),
+        (["study"], "radar_scan", ["radar_scan_rate"]),
+        (["run", "first_light", "--set"], "blocks.radar.scan_r", ["blocks.radar.scan_rate_hz="]),
+        (["run", "first_light", "--swap"], "rad", ["radar="]),
+        (["run", "first_light", "--swap"], "radar=radar.th", ["radar=radar.threshold"]),
+        (["components"], "radar.th", ["radar.threshold"]),
+        (["components", "radar.swerling"], "scan_r", ["scan_rate_hz"]),
+    ],
+)
+def test_a_shell_completes(words, incomplete, found):
+    shell = ShellComplete(main, {}, "dsa-des", "_DSA_DES_COMPLETE")
+    assert [item.value for item in shell.get_completions(words, incomplete)] == found
+
+
+def test_a_file_is_left_to_the_shell():
+    shell = ShellComplete(main, {}, "dsa-des", "_DSA_DES_COMPLETE")
+    (item,) = shell.get_completions(["run"], "./mine")
+    assert item.type == "file"
+
+
+@covers("[blocks].acknowledged")
+def test_what_a_scene_acknowledges_is_not_said(tmp_path):
+    noted = 'extends = "first_light"\nduration_s = 2\n[blocks.radar]\nacknowledged = {}\n'
+    for text, lines in (('["gas att"]', 1), ("[]", 2), ('["false_alarm", "gas"]', 0)):
+        Path("noted.toml").write_text(noted.format(text))
+        done = call("check", "noted.toml")
+        assert done.exit_code == 0 and len(done.stderr.splitlines()) == lines
+        assert all(line.startswith("note: blocks.radar: ") for line in done.stderr.splitlines())
+    assert call("run", "first_light", "--duration", "1", "--no-figures").stderr == ""
