@@ -69,7 +69,8 @@ def test_fmpy_runs_it(chain):
 
     # FMPy loads it into its own process, which is not to be ours.
     program = (
-        "import fmpy, sys; r = fmpy.simulate_fmu(sys.argv[1], stop_time=1.0, step_size=0.1, output_interval=0.1, "
+        "import fmpy, sys; r = fmpy.simulate_fmu(sys.argv[1], stop_time=1.0, "
+        "step_size=0.1, output_interval=0.1, "
         "start_values={'own_alt_m': 1000.0, 'plane[1].lat_rad': 0.0003, 'plane[1].alt_m': 1000.0, "
         "'plane[2].present': False}); print(bool(r['plane[1].detected'].any()), "
         "bool(r['plane[2].detected'].any()), r['time_s'][-1])"
