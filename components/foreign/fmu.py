@@ -500,6 +500,10 @@ class ForeignFmu(Component):
                     )
                 self.p.model.converted(offer[column], variable)
 
+    def close(self) -> None:
+        """End the FMU's process: the simulation is over."""
+        self._process.close()
+
     # -- running -------------------------------------------------------------------------------
 
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
@@ -530,6 +534,11 @@ class ForeignFmu(Component):
         )  # fmt: skip
         if type(self).rewindable:
             self._saved = _Saved(answer["slot"], self._freed.slots)
+        own = own[: answer["done"]]
+        if len(own) == 0:
+            return None
+        for name in ("numbers", "raised"):
+            answer[name] = answer[name][: len(own)]
         return self._messages(wake.ticks[own], answer, traffic, own)
 
     #: Whether a scheduled FMU has a clock that it sets itself, so that every wake may be its.

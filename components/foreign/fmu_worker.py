@@ -137,7 +137,7 @@ class Instance:
         self.component = c.c_void_p(self.fmu.component)
         self.saved: dict[int, Any] = {}
         self.slot = self.names = 0
-        self.started = False
+        self.started = self.ended = False
         self.tick, self.pending = 0, {}  # type: ignore[var-annotated]
         self._groups()
 
@@ -223,8 +223,7 @@ class Instance:
             self.fmu.enterEventMode()
         for _ in range(1000):
             again, ended, *_ = self.fmu.updateDiscreteStates()
-            if ended:
-                raise FmuFailure("it asks to end the simulation")
+            self.ended = self.ended or ended
             if not again:
                 self.fmu.enterStepMode()
                 return
@@ -242,27 +241,39 @@ class Instance:
         if discrete:
             self._events(entered=True)
 
-    def step(self, start_s: float, end_s: float) -> None:
-        """Go from one communication point to the next, past the events between them."""
+    def step(self, start_s: float, end_s: float) -> bool:
+        """Go from one communication point to the next; return whether it got there.
+
+        Events on the way are handled. It may ask to end before, or there (`ended`).
+        """
         if not self.three:
-            status = self._do_step(self.component, start_s, end_s - start_s, 0)
-            if status > 1:
-                self.refuse("fmi2DoStep", status)
-            return
+            return self._step2(start_s, end_s)
         event, ended, early, last = self._flags
         for _ in range(1_000_000):
             size = end_s - start_s
             status = self._do_step(self.component, start_s, size, False, *self._pointers)
             if status > 1:
                 self.refuse("fmi3DoStep", status)
-            if ended.value:
-                raise FmuFailure("it asks to end the simulation")
-            if event.value:
+            self.ended = self.ended or ended.value
+            if event.value and not ended.value:
                 self._events()
-            if not early.value or last.value >= end_s:
-                return
+            there = not early.value or last.value >= end_s
+            if self.ended:
+                return there or end_s - last.value <= 1e-9 * max(1.0, abs(end_s))
+            if there:
+                return True
             start_s = last.value
         raise FmuFailure("it returned early from a step 1000000 times")
+
+    def _step2(self, start_s: float, end_s: float) -> bool:
+        status = self._do_step(self.component, start_s, end_s - start_s, 0)
+        if status == 2 and self.fmu.getBooleanStatus(3):
+            self.ended = True
+            last: float = self.fmu.getRealStatus(2)
+            return end_s - last <= 1e-9 * max(1.0, abs(end_s))
+        if status > 1:
+            self.refuse("fmi2DoStep", status)
+        return True
 
     # -- clocks --------------------------------------------------------------------------------
 
@@ -318,9 +329,9 @@ class Instance:
         if slot != self.slot:
             if slot == 0:
                 self.fmu.reset()
-                self.started, self.pending, self.tick = False, {}, 0
+                self.started, self.ended, self.pending, self.tick = False, False, {}, 0
             else:
-                state, self.tick, pending = self.saved[slot]
+                state, self.tick, pending, self.ended = self.saved[slot]
                 self.fmu.setFMUState(state)
                 self.pending, self.started = dict(pending), True
             self.slot = slot
@@ -331,7 +342,7 @@ class Instance:
     def save(self) -> int:
         """Remember its state; return the number it is known by."""
         self.names += 1
-        self.saved[self.names] = self.fmu.getFMUState(), self.tick, dict(self.pending)
+        self.saved[self.names] = self.fmu.getFMUState(), self.tick, dict(self.pending), self.ended
         self.slot = self.names
         return self.slot
 
@@ -356,7 +367,11 @@ class Instance:
         scheduled, step = self.spec["kind"] == "se", self.step
         times = [tick / per_s for tick in ticks]
         before = self.tick / per_s
+        done = count
         for row, (tick, time_s) in enumerate(zip(ticks, times, strict=True)):
+            if self.ended:  # it asked to; what it gave last is the last
+                done = row
+                break
             beat[0] += 1
             request["at"] = time_s
             if not self.started:
@@ -364,8 +379,9 @@ class Instance:
                 if scheduled:
                     self._count_down(tick, per_s)
             else:
-                if not scheduled:
-                    step(before, time_s)
+                if not scheduled and not step(before, time_s):
+                    done = row
+                    break
                 if changed[row]:
                     self._set(rows[row])
             if scheduled:
@@ -382,7 +398,14 @@ class Instance:
                     group.go()
                 texts.append([word for group in self.texts for word in group.words()])
         slot = self.save() if request["save"] else self.slot
-        return {"numbers": numbers, "texts": texts, "raised": raised, "exact": exact, "slot": slot}
+        return {
+            "numbers": numbers,
+            "texts": texts,
+            "raised": raised,
+            "exact": exact,
+            "slot": slot,
+            "done": done,
+        }
 
 
 def _watch_parent(parent: int, folder: str) -> None:

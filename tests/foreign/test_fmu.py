@@ -304,3 +304,49 @@ def test_clocks_tick_at_exact_instants(lab, reference_fmus):
     time_s, raised = _values(tables, "c", "outClock")
     assert time_s[raised > 0].tolist() == [2, 6, 9]  # where the ticks are 5, 10 and 15
     assert not math.isnan(raised[0])
+
+
+def test_one_that_ends_gives_nothing_more(lab, lag):
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; '
+                "start = { events = 0.05, fault = 5 }"},
+        [], duration_s=2,
+    )  # fmt: skip
+    for window in (None, 1):
+        time_s, _ = _values(lab.run(scene, window=window).tables, "lag", "x")
+        assert time_s[-1] == pytest.approx(0.5)  # it asks to at its event at 0.55 s
+
+
+def test_a_terminal_takes_its_members_from_one_message(lab, lag):
+    import zipfile
+
+    path = lag()
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(
+            "terminalsAndIcons/terminalsAndIcons.xml",
+            '<fmiTerminalsAndIcons><Terminals><Terminal name="Nav" matchingRule="plug">'
+            '<TerminalMemberVariable variableName="u" memberName="own_alt_m" '
+            'variableKind="signal"/></Terminal></Terminals></fmiTerminalsAndIcons>',
+        )
+    text = """
+[blocks.lag]
+type = "foreign.fmu"
+file = "LAG"
+start = { n = 1 }
+inputs = { Nav = "traffic" }
+"""
+    tables = lab.run(_scene(lab, path, text, wires=["traffic -> lag"], duration_s=2)).tables
+    x = _values(tables, "lag", "x")[1]
+    assert _values(tables, "lag", "xu", 1)[1] == pytest.approx(x * 1000 / 0.3048)
+    assert x[-1] > 0
+
+
+def test_what_has_no_solver_is_refused(lab, lag):
+    import zipfile
+
+    path, other = lag(), lab.folder / "other.fmu"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(other, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"<CoSimulation", b"<ModelExchange"))
+    scene = lab.write({"b": f'foreign.fmu; file = "{other}"; scan_rate_hz = 1'}, [])
+    assert "made for model exchange only" in str(lab.problems(scene)[0])
