@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from covering import covers
 
 from dsa_des.errors import BlockFailure, SceneError, SetupFailure
 
+FMU = ("foreign.fmu",)
 _CHAIN = [
     "traffic -> transform -> gate",
     "gate -> radar", "gate -> eo", "gate -> ir",
@@ -53,16 +55,17 @@ def _left_behind():
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@covers("file", "scan_rate_hz", "offset_s", "start", of=FMU)
 def test_steps_are_those_of_the_closed_form(lab, lag, version):
     start = "u = [3, 1, 2], " if version == 3 else "u = 6, "
     scene = lab.write(
-        {"lag": f'foreign.fmu; file = "{lag(version)}"; scan_rate_hz = "10/3"; '
+        {"lag": f'foreign.fmu; file = "{lag(version)}"; scan_rate_hz = "10/3"; offset_s = 0.5; '
                 f'start = {{ {start}gain = 2, x = 1 }}'},
         [], duration_s=6,
     )  # fmt: skip
     time_s, x = _values(lab.run(scene).tables, "lag", "x")
-    assert len(time_s) == 20
-    assert x == pytest.approx(12 - 11 * np.exp(-time_s), rel=1e-12)
+    assert time_s == pytest.approx(0.5 + 0.3 * np.arange(19))
+    assert x == pytest.approx(12 - 11 * np.exp(0.5 - time_s), rel=1e-12)
 
 
 def test_it_returns_early_and_handles_its_events(lab, lag):
@@ -78,6 +81,7 @@ def test_it_returns_early_and_handles_its_events(lab, lag):
     assert _values(eventful, "lag", "x")[1] == pytest.approx(_values(plain, "lag", "x")[1], 1e-12)
 
 
+@covers("outputs", of=FMU)
 def test_arrays_have_the_length_that_the_scene_says(lab, lag):
     scene = lab.write(
         {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 1; outputs = ["xu", "largest"]; '
@@ -91,6 +95,7 @@ def test_arrays_have_the_length_that_the_scene_says(lab, lag):
     assert rows[2]["text"] == str(2**64 - 1)
 
 
+@covers("inputs", of=FMU)
 def test_windows_and_wires_change_nothing(lab, lag):
     scene = _scene(lab, lag(), """
 [blocks.lag]
@@ -136,6 +141,7 @@ manoeuvre = { turn_rad = "turn", rate_rad_s = "turn_rate" }
 _BACK = '{ from = "pilot", to = "traffic", delay_s = 0.001, holds = "nothing" }'
 
 
+@covers("manoeuvre", of=FMU)
 def test_one_that_can_be_taken_back_looks_ahead_in_a_loop(lab, lag):
     wires = ["tracker -> pilot", _BACK]
     scene = _scene(lab, lag(), _LOOP, wires=wires, duration_s=110)
@@ -154,6 +160,7 @@ def test_one_that_cannot_says_so(lab, lag):
     assert "cannot" not in said and "not all blocks can be rewound: " in said and "pilot" in said
 
 
+@covers("ownship", of=FMU)
 def test_traffic_goes_on_with_the_ownship_where_the_fmu_flies_it(lab, lag):
     text = """
 [blocks.dynamics]
@@ -188,6 +195,7 @@ ownship = { own_alt_m = "x" }
         (4, "ended with code 0"),
     ],
 )
+@covers("deadline_s", of=FMU)
 def test_one_clear_error_and_nothing_left(lab, lag, fault, said):
     before = _left_behind()
     scene = lab.write(
@@ -291,6 +299,7 @@ def test_reference_fmus_give_their_published_output(lab, reference_fmus, name, r
                         assert value == pytest.approx(float(number), rel=1e-12, abs=1e-12)
 
 
+@covers("clocks", of=FMU)
 def test_clocks_tick_at_exact_instants(lab, reference_fmus):
     scene = lab.write(
         {"c": f'foreign.fmu; file = "{reference_fmus / "Clocks.fmu"}"; '
