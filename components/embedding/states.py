@@ -19,6 +19,9 @@ _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LA
 
 def numbers_in(label: str, value: object) -> FloatArray:
     """Return what a host gave as an array of numbers; ValueError names it where it is none."""
+    mask = getattr(value, "mask", None)
+    if mask is not None and np.any(mask):  # what a mask hides would be taken for a number
+        raise ValueError(f"{label} has masked values: what is not there is NaN")
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

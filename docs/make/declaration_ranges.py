@@ -178,7 +178,7 @@ def fading_section(images: Path, approach: HeadOn, m: int, n: int, certain: floa
             for tau in lasts:
                 run, drawn = cells[budget, rate, tau]
                 texts.append(
-                    f"{reached(run) / 1000:.2f} ({reached(drawn) / 1000:.2f}), mean "
+                    f"{in_km(reached(run))} ({in_km(reached(drawn))}), mean "
                     f"{np.nanmean(run) / 1000:.2f} ({np.nanmean(drawn) / 1000:.2f})"
                 )
             lines.append(f"| {budget} | {rate:.3g} | {' | '.join(texts)} |")
@@ -192,6 +192,11 @@ def fading_section(images: Path, approach: HeadOn, m: int, n: int, certain: floa
         m=m, n=n, trials=TRIALS, table="\n".join(lines), figure=FIGURE, gain=gain(lasts[0]),
         gain_fast=gain(lasts[-1]), slow=rates[0], fast=rates[-1], tau=lasts[-1],
     )  # fmt: skip
+
+
+def in_km(range_m: float) -> str:
+    """Return a range for a table; 0 stands for runs that declare too seldom."""
+    return f"{range_m / 1000:.2f}" if range_m > 0 else "never"
 
 
 def _simulated() -> dict[tuple[str, float, float], FloatArray]:

@@ -14,6 +14,7 @@ from docs.make.declaration_ranges import (
     HeadOn,
     certain_range_m,
     fading_section,
+    in_km,
     known_snr_at_1_m,
     mean_range_m,
     ranges_of_declaration,
@@ -167,10 +168,10 @@ def table(found: dict[tuple[str, float], Any], approach: HeadOn, rates: list[flo
         cells = [f"{rate:.3g}", f"{math.floor(approach.pulses / rate + 1e-9)}"]
         for budget in ("free", "dwell"):
             expected = of_budget(approach, budget, rate)
-            cells += [_km(_certain_of(found[budget, rate])), _km(_certain(*expected)),
-                      _km(float(np.nanmean(found[budget, rate])))]  # fmt: skip
+            cells += [in_km(_certain_of(found[budget, rate])), in_km(_certain(*expected)),
+                      in_km(float(np.nanmean(found[budget, rate])))]  # fmt: skip
             if budget == "dwell":
-                cells.append(_km(mean_range_m(*expected)))
+                cells.append(in_km(mean_range_m(*expected)))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
@@ -178,10 +179,6 @@ def table(found: dict[tuple[str, float], Any], approach: HeadOn, rates: list[flo
 def _certain_of(ranges_m: Any) -> float:
     """Return the range by which 95 % of runs have declared; NaN if fewer ever do."""
     return float(np.sort(np.nan_to_num(ranges_m))[math.floor((1 - CERTAIN) * len(ranges_m))])
-
-
-def _km(range_m: float) -> str:
-    return f"{range_m / 1000:.2f}" if range_m > 0 else "never"
 
 
 def _explained(approach: HeadOn) -> str:

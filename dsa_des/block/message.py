@@ -169,13 +169,12 @@ class Message:
             return
         if not isinstance(offsets, np.ndarray) or offsets.dtype.kind not in "iu":
             raise TypeError(f"{_of(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed")
-        ends = offsets.tolist()
-        if len(ends) != rows + 1 or (rows > 1 and bool((offsets[1:] < offsets[:-1]).any())):
+        if offsets.shape != (rows + 1,) or (rows > 1 and bool((offsets[1:] < offsets[:-1]).any())):
             raise ValueError(
                 f"{_of(self, 'offsets')} of shape {offsets.shape} must be ascending, one more than "
                 f"the {rows} rows"
             )
-        _check_each(self, entry_names, ends[-1] - ends[0], "entries")
+        _check_each(self, entry_names, int(offsets[-1]) - int(offsets[0]), "entries")
 
     def take(self, rows: slice | IntArray) -> Self:
         """Return the message of the given rows (slices give views, index arrays give copies)."""

@@ -74,6 +74,15 @@ def is_empty(values: Any) -> bool:
     return isinstance(values, np.ndarray) and values.base is _NAN
 
 
+def same_bits(some: AnyArray, others: AnyArray) -> bool:
+    """Return whether two columns are the same, NaN and the sign of 0 too; differing ends tell."""
+    if some.dtype != others.dtype or len(some) != len(others):
+        return False
+    bits = f"u{some.itemsize}"
+    some, others = some.view(bits), others.view(bits)
+    return bool(some[0] == others[0] and some[-1] == others[-1] and (some == others).all())
+
+
 _NAN = np.full((), np.nan)
 _NAN.flags.writeable = False
 

@@ -15,6 +15,7 @@ from dsa_des.block.recorded_columns import (
     Text,
     is_empty,
     nothing_in,
+    same_bits,
 )
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
@@ -259,6 +260,7 @@ class Recorder:
         order: IntArray | None,
         ticks: IntArray,
     ) -> AnyArray | Text:
+        count = len(ticks) if order is None else len(order)
         if name in ("time_s", "tick", "replica"):
             values = self._time_column(name, ticks)
             return values if order is None else values[order]
@@ -267,12 +269,14 @@ class Recorder:
             codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
             return Text(codes if order is None else codes[order], text.names)
         if kind == "float64" and all(_is_missing(columns.get(name)) for _, columns in pieces):
-            return nothing_in(len(ticks) if order is None else len(order))
+            return nothing_in(count)
         parts = [
             _values(self._in_seconds(columns.get(name), columns), kind, len(columns["tick"]))
             for _, columns in pieces
         ]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        if same_bits(values, np.broadcast_to(values[:1], len(values))):
+            values, order = np.broadcast_to(values[:1].copy(), count), None
         if name == "scan" and self._span_ticks:
             values = own_scans(values)
         return values if order is None else values[order]

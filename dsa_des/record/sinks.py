@@ -5,7 +5,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from dsa_des.block.recorded_columns import Columns, Schema, Text
+from dsa_des.arrays.types import AnyArray
+from dsa_des.block.recorded_columns import Columns, Schema, Text, same_bits
 
 
 def attempt(
@@ -58,8 +59,12 @@ class Sink(Protocol):
         """Take note that no more rows come."""
 
 
+# Smaller pieces are kept as they come: to look at them costs more than they hold.
+_WORTH_PACKING = 4096
+
+
 class _Keeping:
-    """Keeps all rows in memory, as they come."""
+    """Keeps all rows in memory: whole numbers as narrow as they are, what tables share once."""
 
     def __init__(self) -> None:
         self._schemas: Mapping[str, Schema] = {}
@@ -72,10 +77,36 @@ class _Keeping:
 
     def write(self, table: str, columns: Columns) -> None:
         """Keep rows of one table."""
+        if len(next(iter(columns.values()), ())) >= _WORTH_PACKING:
+            columns = {name: self._packed(name, values) for name, values in columns.items()}
         self._parts[table].append(columns)
+
+    def _packed(self, name: str, values: Any) -> Any:
+        if isinstance(values, Text):
+            return Text(_narrow(values.codes), values.names)
+        if values.dtype.kind == "i":
+            values = _narrow(values)
+        if not values.strides[0]:
+            return values
+        for parts in self._parts.values():
+            other: Any = parts[-1].get(name) if parts else None
+            if other is not None and same_bits(other, values):
+                return other
+        return values
 
     def close(self) -> None:
         """Nothing to do."""
+
+
+def _narrow(values: AnyArray) -> AnyArray:
+    """Return whole numbers in the narrowest type that holds them; constant ones as they are."""
+    if not values.strides[0]:
+        return values
+    ends = np.array([values.min(), values.max()])
+    for kind in (np.int8, np.int16, np.int32):
+        if values.dtype.itemsize > np.dtype(kind).itemsize and (ends == ends.astype(kind)).all():
+            return values.astype(kind)
+    return values
 
 
 class ColumnSink(_Keeping):
@@ -86,20 +117,22 @@ class ColumnSink(_Keeping):
         return {table: self._joined(table, parts) for table, parts in self._parts.items()}
 
     def _joined(self, table: str, parts: list[Columns]) -> Columns:
-        if len(parts) == 1:
-            return parts[0]
         joined: Columns = {}
         for name, kind in self._schemas[table].items():
             pieces: list[Any] = [part[name] for part in parts]
             if kind == "text":  # later pieces know at least the names of earlier ones
                 codes = [piece.codes for piece in pieces]
                 names = pieces[-1].names if pieces else ()
-                empty = np.empty(0, dtype=np.int32)
-                joined[name] = Text(np.concatenate(codes) if codes else empty, names)
+                joined[name] = Text(_dense(codes, np.int32), names)
             else:
-                empty = np.empty(0, dtype=np.dtype(kind))
-                joined[name] = np.concatenate(pieces) if pieces else empty
+                joined[name] = _dense(pieces, np.dtype(kind))
         return joined
+
+
+def _dense(pieces: list[AnyArray], kind: Any) -> AnyArray:
+    if len(pieces) == 1:
+        return pieces[0].astype(kind, copy=False)
+    return np.concatenate(pieces, dtype=kind) if pieces else np.empty(0, dtype=kind)
 
 
 class MemorySink(_Keeping):

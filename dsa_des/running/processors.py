@@ -18,6 +18,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, static
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.scene.block_table import ProcessorParameters
+from dsa_des.scene.queue_policy import find_policy
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream, key_of
 
@@ -138,7 +139,7 @@ class Service:
         return self._least + extra.astype(np.int64)
 
 
-@dataclass
+@dataclass(eq=False)
 class _Job:
     block: str
     entered: int
@@ -174,7 +175,7 @@ class Processor:
         record: Callable[[str, Message], None],
     ) -> None:
         self.name = name
-        self.p = parameters
+        self._policy = find_policy(parameters.when_busy)()
         self._env = env
         self._ticks_per_s = ticks_per_s
         self._service = service
@@ -190,7 +191,7 @@ class Processor:
 
     def refuses(self, block: str) -> bool:
         """Whether a scan at this instant is to be left out because the processor is busy."""
-        if self.p.when_busy != "skip" or not self._busy:
+        if not self._policy.skips(self._busy):
             return False
         now = int(self._env.now)
         self._note(_Job(block, now), now, SKIPPED)
@@ -211,12 +212,16 @@ class Processor:
         entering, self._entering = sorted(self._entering, key=lambda job: job.block), []
         now = int(self._env.now)
         for job in entering:
-            if self.p.when_busy == "skip" and (self._busy or self._line):
+            if self._policy.skips(self._busy or bool(self._line)):
                 self._note(job, now, SKIPPED)  # another block of this instant was first
                 continue
-            if self.p.when_busy == "drop_oldest" and self._line:
-                self._note(self._line.popleft(), now, DROPPED)
-            self._line.append(job)
+            gone: Any = self._policy.dropped(tuple(self._line), job)
+            for left in gone:
+                if left is not job:
+                    self._line.remove(left)
+                self._note(left, now, DROPPED)
+            if job not in gone:
+                self._line.append(job)
         if self._line and not self._busy and self._bell.callbacks:
             self._bell.ring()
 

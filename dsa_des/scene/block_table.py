@@ -7,11 +7,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from dsa_des.block.component import Component, NonNegativeRational, Parameters, PositiveRational
+from dsa_des.scene.queue_policy import find_policy
 
 
 class BlockOptions(Parameters):
@@ -48,11 +49,18 @@ class ProcessorParameters(Parameters):
         default=Fraction(0),
         description="Largest extra time, s; each message takes a uniformly drawn part of it.",
     )
-    when_busy: Literal["wait", "drop_oldest", "skip"] = Field(
+    when_busy: str = Field(
         default="wait",
-        description="Messages wait in line; or only the newest waits; or a block whose scan finds "
-        "the processor busy leaves that scan out.",
+        description="'wait', messages wait in line; 'drop_oldest', only the newest waits; 'skip', "
+        "a block whose scan finds the processor busy leaves that scan out; or module:Class of a "
+        "policy of your own.",
     )
+
+    @field_validator("when_busy", mode="before")
+    @classmethod
+    def _known(cls, name: Any) -> Any:
+        find_policy(name)
+        return name
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,9 @@ class Scene(Changeable):
 
     def windowed_queues(self) -> set[str]:
         """Return the shared processors that serve a look-ahead window at once."""
-        able = [name for name, p in self.processors.items() if p.when_busy != "skip"]
+        # Those whose line can be worked through at once (`dsa_des.running.windowed_queue`).
+        closed = ("wait", "drop_oldest")
+        able = [name for name, p in self.processors.items() if p.when_busy in closed]
         return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
 
     def resolved(self) -> dict[str, Any]:

@@ -34,6 +34,21 @@ def test_without_a_turn_they_would_have_met():
     assert closest_m("crossing.toml", "blocks.avoidance.level=9") < 40.0
 
 
+def test_a_line_through_coarse_bearings_alerts_of_who_passes_by_and_a_filter_does_not():
+    """The page says so; by the truth the fighter of first light never has an alert."""
+    scene, ekf = CONFIGS.parent / "alerting" / "first_light.toml", "tracker=tracking.ekf"
+    first: dict[int, dict] = {}
+    for swaps in ((), (ekf, "fusion=fusion.pass_through")):
+        found = dsa_des.run(dsa_des.load_scene(scene, swaps=swaps, duration_s="60"))
+        rows = found.tables["alerts"].to_pylist()
+        first[len(swaps)] = {}
+        for row in rows:
+            if row["level"] > 1:
+                first[len(swaps)].setdefault((row["target"], row["level"]), row["time_s"])
+    assert first[0] == {("crossing", 2): 14.0, ("head_on", 2): 18.0, ("head_on", 3): 51.0}
+    assert first[2] == {("head_on", 2): 17.0, ("head_on", 3): 47.0}
+
+
 def test_a_filter_s_estimates_lead_out_of_the_way():
     """Its margins make the alert come before that of the truth, which is certain."""
     found = dsa_des.run(dsa_des.load_scene(CONFIGS / "crossing_tracked.toml"))

@@ -8,6 +8,7 @@ import pytest
 from snippets import file_of, read_snippets
 
 from dsa_des.block.message import Text
+from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica
@@ -22,8 +23,12 @@ MODULE = "blocks_of_the_page"
 @pytest.fixture(autouse=True)
 def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Put the page's module on the path."""
-    parts = [part.text for part in read_snippets("docs/extending.md") if file_of(part)]
-    (tmp_path / f"{MODULE}.py").write_text("\n".join(parts), encoding="utf-8")
+    files: dict[str, list[str]] = {}
+    for part in read_snippets("docs/extending.md"):
+        if known := file_of(part):
+            files.setdefault(known[0].replace("mymodule", MODULE), []).append(part.text)
+    for name, parts in files.items():
+        (tmp_path / name).write_text("\n".join(parts), encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
 
 
@@ -113,6 +118,76 @@ def test_the_association_takes_only_what_is_beyond_doubt(configs: Path) -> None:
     known = tracked(configs, "tracking.ekf", "blocks.traffic.intruders[1].north_m=90000")
     assert len(known["tick"]) > 50
     np.testing.assert_array_equal(alone["north_m"], known["north_m"])
+
+
+def test_the_column_says_how_much_farther_than_the_nearest(configs: Path) -> None:
+    swap = [f"tracker={MODULE}:MyRankingTracker"]
+    tracks = recorded(configs / "first_light.toml", sets=SHORT, swaps=swap)["tracks"]
+    for tick in np.unique(tracks["tick"]):
+        now = tracks["tick"] == tick
+        if np.isfinite(tracks["range_m"][now]).any():
+            nearest_m = np.nanmin(tracks["range_m"][now])
+            behind_m = tracks["range_m"][now] - nearest_m
+            np.testing.assert_array_equal(tracks["behind_m"][now], behind_m)
+    assert np.nanmax(tracks["behind_m"]) > 100.0
+
+
+def test_the_radome_takes_its_loss_twice_and_nothing_where_it_has_none(configs: Path) -> None:
+    found = {}
+    for loss_db in (None, 0.0, 0.8):
+        radar = "radar.swerling" if loss_db is None else f"{MODULE}:MyRadomeRadar"
+        sets = [*SHORT, "record.looks=true"]
+        sets += [f"blocks.radar.radome_loss_db={loss_db}"] if loss_db else []
+        tables = recorded(configs / "first_light.toml", sets=sets, swaps=[f"radar={radar}"])
+        seen = tables["looks"]
+        snr_db = zip(seen["tick"].tolist(), seen["target"], seen["snr_db"].tolist(), strict=True)
+        found[loss_db] = {(tick, name): value for tick, name, value in snr_db if value == value}
+    assert found[0.0] == found[None]
+    assert len(found[None]) > 50
+    for key in found[None]:
+        assert found[None][key] - found[0.8][key] == pytest.approx(1.6, abs=1e-9)
+
+
+def test_the_reader_flies_its_file_and_says_all_that_is_wrong_with_one(
+    configs: Path, tmp_path: Path
+) -> None:
+    scene, swaps = configs / "replay_daa.toml", [f"traffic={MODULE}:MyTraffic"]
+    file = tmp_path / "flights.jsonl"
+    sets = [f"blocks.traffic.file={file}"]
+    traffic: Any = Simulation(load_scene(scene, swaps=swaps, sets=sets)).components["traffic"]
+    own, (other,) = traffic.own, traffic.targets
+    assert (own.name, other.name) == ("own", "other")
+    assert other.at(np.array([0.0, 60.0])).lat_deg.tolist() == [52.06, 52.03]
+    detections = recorded(scene, sets=sets, swaps=swaps)["detections"]
+    assert set(detections["target"]) == {"other"}
+    file.write_text('["own", 0, 52, 4, 1]\n["own", 1]\n{}\n', encoding="utf-8")
+    with pytest.raises(SceneError, match=r"line 2: must be .*(\n.*)*line 3: must be"):
+        Simulation(load_scene(scene, swaps=swaps, sets=sets))
+
+
+def test_the_policy_lets_two_wait_and_loses_the_next(configs: Path, tmp_path: Path) -> None:
+    scene = tmp_path / "busy.toml"
+    text = scene.read_text(encoding="utf-8").replace("configs/first", f"{configs}/first")
+    scene.write_text(text.replace("mymodule", MODULE), encoding="utf-8")
+    rows = recorded(scene, sets=SHORT)["processing"]
+    outcomes = np.array(rows["outcome"])
+    assert set(outcomes) == {"done", "dropped"}
+    assert rows["queue_length"].max() == 2
+    # Two cameras' frames and more come while one is worked on: whoever is lost never waited.
+    lost = outcomes == "dropped"
+    assert (rows["entered_s"][lost] == rows["tick"][lost] / 1e9).all()
+    assert (np.diff(rows["entered_s"][~lost]) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("policy", "says"),
+    [("wiat", "did you mean 'wait'"), (f"{MODULE}:Looks", "is not a .*QueuePolicy"),
+     (f"{MODULE}:TwoWiat", "did you mean 'TwoWait'")],
+)  # fmt: skip
+def test_no_policy_is_one_error_of_the_key(configs: Path, policy: str, says: str) -> None:
+    table = f'{{gpu={{service_s=0.07, when_busy="{policy}"}}}}'
+    with pytest.raises(SceneError, match=rf"processors.gpu.when_busy.*{says}"):
+        load_scene(configs / "first_light.toml", sets=[f"processors={table}"])
 
 
 def test_the_avoidance_turns_once_when_a_track_is_near(configs: Path) -> None:

@@ -239,6 +239,8 @@ def test_a_loaded_scene_is_taken_as_it_is(scene):
         ((OWN, LEVEL, AHEAD, HEAD_ON, math.nan), "time_s is nan"),
         ((OWN, LEVEL, AHEAD, HEAD_ON, -1.0), "time_s is -1.0"),
         ((OWN, LEVEL, AHEAD, HEAD_ON, "soon"), "time_s is 'soon'"),
+        ((OWN, LEVEL, AHEAD, HEAD_ON, np.ma.masked), "time_s is masked"),
+        ((OWN, LEVEL, np.ma.masked_less(AHEAD, 0.5), HEAD_ON, 1), "lla_intruder has masked values"),
         ((OWN, LEVEL, AHEAD, HEAD_ON, 1e12), "time_s is 1000000000000.0"),
         ((OWN, LEVEL, AHEAD, HEAD_ON, 0.1), "must not go back"),
     ],

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.formats.csv_file import read_csv
-from components.formats.daa_file import read_daa
+from components.formats.daa_file import read_daa, read_daa_samples
 from components.formats.sample_table import elapsed_times
 from components.formats.text_rows import TrafficFileError
 from components.geometry.ellipsoid import line_of_sight
@@ -53,6 +53,18 @@ def test_names_times_and_units(tmp_path):
     assert (east == 0).all()
     assert north == pytest.approx(120 * KNOT)
     assert up == pytest.approx(600 * 0.3048 / 60)
+
+
+def test_latitude_and_longitude_are_the_file_s_own(tmp_path):
+    path = write(tmp_path, encounter())
+    file, samples = read_daa(path), read_daa_samples(path)
+    north = 45 + np.arange(5) * 120 / 3600 / 60
+    for lat_deg, lon_deg in (
+        (file.ownship.lat_deg, file.ownship.lon_deg),
+        (samples["Own"]["lat"], samples["Own"]["lon"]),
+    ):
+        np.testing.assert_allclose(lat_deg, north, atol=1e-9)
+        assert (lon_deg == -75.0).all()
 
 
 @pytest.mark.parametrize("t0", [0.0, 0.3, 325374.2, 503880.4, 1577836800.1])
