@@ -91,6 +91,17 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     return seen, jacobian
 
 
+def range_share(
+    away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
+) -> FloatArray:
+    """Return the standard deviation of the range over the range, of vectors (3, n)."""
+    squared = squared_length(away)
+    along = sum(
+        away[i] * away[j] * covariance[min(i, j), max(i, j)] for i in range(3) for j in range(3)
+    )
+    return np.asarray(np.sqrt(np.maximum(along, 0.0)) / np.maximum(squared, _NEAREST_M**2))
+
+
 def direction(
     away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -6,7 +6,7 @@ import click
 
 from dsa_des.commands.group import plain_errors
 
-FORMATS = ("csv", "kml", "czml", "daa", "mat", "operator-csv")
+FORMATS = ("csv", "kml", "czml", "daa", "xyz", "asterix", "mcap", "mat", "operator-csv")
 
 
 @click.command()
@@ -18,7 +18,9 @@ def export(**options: Any) -> None:
     """Write a run's folder in another format.
 
     csv is a folder with a file for each table; mat a MATLAB file with all of them; kml and czml the
-    flights and what was detected, for globes; daa the flights, as DAIDALUS reads them;
+    flights and what was detected, for globes; daa and xyz the flights, as DAIDALUS reads them;
+    asterix what radars, trackers and the ownship report; mcap all tables, flights and detections
+    for viewers of robots' logs;
     operator-csv a row for each alert, with what the operator did about it and when.
     """
     from components.export.exported import export_run

@@ -15,17 +15,17 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import printable
 
 #: A run has no date; its second 0 is put here.
-_START = datetime(2000, 1, 1, tzinfo=UTC)
+START = datetime(2000, 1, 1, tzinfo=UTC)
 _POSE = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
          "own_roll_rad")  # fmt: skip
 
 
 def _when(time_s: float) -> str:
-    moment = _START + timedelta(microseconds=round(1e6 * time_s))
+    moment = START + timedelta(microseconds=round(1e6 * time_s))
     return moment.isoformat().replace("+00:00", "Z")
 
 
-def _detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, float, float]]:
+def detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, float, float]]:
     """Give sensor, target, time, longitude, latitude and height of detections with a range."""
     if "detections" not in run.tables:
         return
@@ -63,7 +63,7 @@ def kml_text(run: RecordedTables) -> str:
         columns = (flight[key].tolist() for key in ("lon_deg", "lat_deg", "alt_m"))
         lines += [f"<gx:coord>{x} {y} {z}</gx:coord>" for x, y, z in zip(*columns, strict=True)]
         lines.append("</gx:Track></Placemark>")
-    for sensor, target, time_s, lon, lat, alt in _detected(run):
+    for sensor, target, time_s, lon, lat, alt in detected(run):
         lines += [
             f"<Placemark><name>{_xml(f'{sensor} {target}'.strip())}</name>",
             f"<TimeStamp><when>{_when(time_s)}</when></TimeStamp><Point>",
@@ -107,7 +107,7 @@ def czml_text(run: RecordedTables) -> str:
                 "path": {"width": 1},
             }
         )
-    for number, (sensor, target, time_s, lon, lat, alt) in enumerate(_detected(run)):
+    for number, (sensor, target, time_s, lon, lat, alt) in enumerate(detected(run)):
         packets.append(
             {
                 "id": f"detection/{number}",

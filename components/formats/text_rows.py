@@ -129,17 +129,20 @@ class TrafficFile:
 
 
 class Problems:
-    """Collects what is wrong with one file, to be reported at once."""
+    """Collects what is wrong with one file, to be reported at once.
 
-    def __init__(self, path: str) -> None:
-        self.path = path
+    Its rows are lines of text, unless `of` calls them something else.
+    """
+
+    def __init__(self, path: str, of: str = "line") -> None:
+        self.path, self._of = path, of
         #: Line (infinite for none) and text.
         self._found: list[tuple[float, str]] = []
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         """Note a problem, with its line and column where it has them."""
-        place = [f"line {line}"] if line is not None else []
+        place = [f"{self._of} {line}"] if line is not None else []
         place += [f"column {column}"] if column is not None else []
         if len(self._found) < MOST_PROBLEMS:
             text = f"{', '.join(place)}: {problem}" if place else problem

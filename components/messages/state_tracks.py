@@ -84,7 +84,9 @@ class StateTracks(PositionAndVelocity, FrameOrigin, Message):
     elevation_rad: FloatArray = column("rad", FRAME, "its elevation, upward")
     azimuth_variance_rad2: FloatArray = column("rad²", FRAME, "variance of that azimuth")
     elevation_variance_rad2: FloatArray = column("rad²", FRAME, "variance of that elevation")
-    has_range: BoolArray = column("", "", "whether any range was measured", "bool")
+    has_range: BoolArray = column(
+        "", "", "whether its range is known: measured, or by the ownship's manoeuvres", "bool"
+    )
     age_s: FloatArray = column("s", "", "time since the track was started")
     state_s: FloatArray = column("s", "", "the instant that the state speaks of")
     updated_s: FloatArray = column("s", "", "when the last measurement in it was made")

@@ -83,7 +83,9 @@ def _camera(kind: type[Camera], name: str) -> Camera:
 
 
 def _without_type(name: str) -> dict[str, Any]:
-    return {key: value for key, value in table(name).items() if key != "type"}
+    """Return a block's parameters: without its type, and what it says to the engine of notes."""
+    beside = "type", "acknowledged"
+    return {key: value for key, value in table(name).items() if key not in beside}
 
 
 @dataclass

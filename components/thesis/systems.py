@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from components.display.flights import Flights
+from components.estimation.measurement import range_share
 from components.geometry import line_of_sight_ned, wrap_by_sines
+from components.messages.state_tracks import COVARIANCE
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
 from components.thesis.drawing import (
@@ -200,9 +202,7 @@ _WITHOUT_ROW = (
     "",
     "Without a row: Table 2.1 (strengths and weaknesses in words), the CDTI's pictures (Fig. 2.1, "
     "4.15 and 4.16), the flight tests' ranges by geometry (Fig. 4.1, a plot), a block diagram and "
-    "silhouettes (Fig. 4.6 and 4.7) print no number; PaRCA's range errors (40 %, about 10 % after "
-    "its manoeuvres) need passive ranging, which the project does not have: its cameras measure "
-    "no range.",
+    "silhouettes (Fig. 4.6 and 4.7) print no number.",
 )
 _COLOURS = (BLUE, ORANGE, GREEN, SKY, GREY, PINK)
 
@@ -219,7 +219,12 @@ def systems(printed: Cells) -> Made:
         for target, km in found.items()
         if name not in ("afrl", "afrl_low_threshold")
     ]  # fmt: skip
-    rows += [*_afrl(printed, runs, first["afrl"]), *statistics, *_smart_uav(printed)]
+    rows += [
+        *_afrl(printed, runs, first["afrl"]),
+        *statistics,
+        *_smart_uav(printed),
+        *_parca(printed),
+    ]
     by_laser = first_ranges_km(runs["smart_uav"], "laser")
     rows += [
         Row(f"smart_uav.toml, first detection of {target} by the laser", km, "km",
@@ -340,6 +345,25 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
             "Printed of an earlier study: 100 % below 3 NM, 90 % beyond.",
             predicted("the flight tests' camera", "systems:BONANZA_M2",
                       "systems/afrl.toml:blocks.centre.static_weight")))  # fmt: skip
+    return rows
+
+
+def _parca(printed: Cells) -> list[Row]:
+    """Return how well a camera's track knows the range before and after a weaving flight."""
+    tracks = run(scene("tracking/passive_ranging", "blocks.tracker.passive_range_share=10")).rows(
+        "state_tracks", track_status="confirmed"
+    )
+    away = np.stack([tracks[f"{a}_m"] - tracks[f"own_{a}_m"] for a in ("north", "east", "down")])
+    share = range_share(away, {place: tracks[name] for place, name in COVARIANCE.items()})
+    rows = []
+    for cell, when, time_s in (("parca_before", "before", 10.0), ("parca_after", "after", 46.0)):
+        at = int(np.searchsorted(tracks["time_s"], time_s))
+        rows.append(printed[cell].beside(
+            f"PaRCA, error of the range {when} the manoeuvre", 100.0 * float(share[at]), "%",
+            "The standard deviation that the track states; printed of the flight tests.",
+            predicted("a camera's errors, a first guess to 50 %, and S-turns of 45 degrees",
+                      "tracking/passive_ranging.toml:blocks.eo.azimuth_error_deg",
+                      "tracking/passive_ranging.toml:blocks.traffic.ownship")))  # fmt: skip
     return rows
 
 

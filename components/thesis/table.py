@@ -68,6 +68,8 @@ _OTHER_CAMERA = (
     "another camera, on a helicopter, whose pixels are not printed; it saw motion, not size"
 )
 
+_MANOEUVRE = "neither the manoeuvre of the flight tests nor what its errors are of is printed"
+
 # §4.1.3; "off by" in §5.1.3.
 _FLIGHTS = {
     "pd_small": Printed("0.9114"),
@@ -176,6 +178,7 @@ ITEMS = (
           **_texts({"first_small_nm": "5.5", "first_large_nm": "7.4"}, because=_THRESHOLD),
           **_texts({"declared_small_nm": "3.9", "declared_large_nm": "4.9"}, because=_DECLARES),
           **_texts({"pd_near": "100", "pd_far": "90"}, because=_OTHER_CAMERA),
+          **_texts({"parca_before": "40", "parca_after": "10"}, because=_MANOEUVRE),
           "runs": Printed("100", 0.0), "eo_km": Printed("3", 0.075),
           **_texts({"power_line": "-20", "building": "15", "wooden_hill": "20",
                     "small_aircraft": "1.76", "medium_aircraft": "3.01",

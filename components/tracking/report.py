@@ -9,7 +9,7 @@ import numpy as np
 from components.estimation.batched import selected
 from components.estimation.estimator import Estimates, combined
 from components.estimation.frame import SensorPose
-from components.estimation.measurement import direction
+from components.estimation.measurement import direction, range_share
 from components.messages.state_tracks import COVARIANCE, StateTracks
 from components.tracking.management import existence
 from components.tracking.track_store import TrackStore
@@ -52,6 +52,7 @@ def state_tracks(
     rows: IntArray,
     wake: Wake,
     sensors: tuple[str, ...],
+    passive_range_share: float | None = None,
 ) -> StateTracks:
     """Return the message of what is reported."""
     ticks = wake.ticks[rows]
@@ -70,6 +71,8 @@ def state_tracks(
     own, origin = selected(poses.position_m, look), selected(origin, look)
     seen = direction(state[:3] - own, covariance)
     unknown = ~store.plain("ranged")
+    if passive_range_share is not None:
+        unknown &= range_share(state[:3] - own, covariance) > passive_range_share
     hidden = bool(unknown.any())
 
     def known(values: FloatArray) -> FloatArray:

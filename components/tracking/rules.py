@@ -151,6 +151,12 @@ class TrackerParameters(Parameters):
         description="Range that is assumed of what is seen without one, m; its inverse is taken to "
         "be known to 50 %. By default a quarter of the farthest reach of the sensors.",
     )  # fmt: skip
+    passive_range_share: float | None = Field(
+        default=None, gt=0, le=10,
+        description="Standard deviation of the range, as a share of it, from which on a track of "
+        "directions alone is reported with its range: what the ownship's manoeuvres tell of it. "
+        "By default never.",
+    )  # fmt: skip
     use_range_rate: bool = Field(
         default=True,
         description="Whether range rates are used where a sensor states them with a variance; not "

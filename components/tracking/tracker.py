@@ -235,7 +235,8 @@ class Tracker(Component):
         if len(plan.look) == 0:
             return None
         rows = np.unique(plan.row)
-        return state_tracks(reported, poses, origin, rows, wake, self._sensors)
+        share = self.p.passive_range_share
+        return state_tracks(reported, poses, origin, rows, wake, self._sensors, share)
 
     def _remember(
         self,

@@ -1,4 +1,4 @@
-"""Recorded traffic: flights read from files (``traffic.daa_file``, ``traffic.csv``)."""
+"""Recorded traffic: flights read from files of DAIDALUS, CSV tables and ASTERIX."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -14,6 +14,7 @@ from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.fleet import SampledFleet
 from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.flights.sampled_flight import SampledTrajectory
+from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.text_rows import TrafficFile
@@ -165,7 +166,7 @@ class DaaFileParameters(FileParameters):
 
 
 class CsvParameters(FileParameters):
-    """Parameters of a CSV traffic file."""
+    """Parameters of a file in which the ownship may be named."""
 
     ownship: str | None = Field(
         default=None, description="Name of the ownship; by default the first aircraft named."
@@ -271,3 +272,14 @@ class CsvFile(RecordedTraffic):
     def read(self) -> TrafficFile:
         """Return the content of the file."""
         return read_csv(self.p.file, self.p.ownship)
+
+
+class AsterixFile(RecordedTraffic):
+    """Traffic from an ASTERIX file: system tracks (062) and ADS-B reports (021)."""
+
+    Parameters = CsvParameters
+    lockstep = True
+
+    def read(self) -> TrafficFile:
+        """Return the content of the file."""
+        return read_asterix(self.p.file, self.p.ownship)

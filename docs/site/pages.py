@@ -12,7 +12,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Add a page for each block type."""
     page = files.get_file_from_path(_PAGE)
     for name, text in _blocks(page.content_string):
-        content = f"# {name}\n{text}\n[All block types](../../{_PAGE})\n"
+        content = f"---\nhide: [toc]\n---\n# {name}\n{text}\n[All block types](../../{_PAGE})\n"
         files.append(File.generated(config, f"{_FOLDER}/{name}.md", content=content))
     return files
 

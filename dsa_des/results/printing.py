@@ -1,5 +1,6 @@
 """The tables of a study on the terminal."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -214,6 +215,19 @@ def interval_text(estimate: Estimate) -> str:
     if estimate.low != estimate.low:
         return ""
     return f"{short(estimate.low)} to {short(estimate.high)}" + (" *" if estimate.few else "")
+
+
+def rounded(estimate: Estimate) -> tuple[str, str]:
+    """Return a value and its interval, rounded to two digits of half the interval."""
+    half = (estimate.high - estimate.low) / 2
+    if not 0 < half < math.inf:
+        return short(estimate.value), interval_text(estimate)
+    places = 1 - math.floor(math.log10(half))
+    value, low, high = (
+        f"{round(number, places) + 0.0:,.{max(places, 0)}f}"
+        for number in (estimate.value, estimate.low, estimate.high)
+    )
+    return value, f"{low} to {high}" + (" *" if estimate.few else "")
 
 
 #: Intervals that shrink more than this rest on the rounding of equal numbers.

@@ -14,7 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import short
+from dsa_des.results.labels import axis_label, readable, short, value_label
 from dsa_des.results.models import (
     EffectRecord,
     MeasuredErrors,
@@ -23,16 +23,10 @@ from dsa_des.results.models import (
     read_explained,
     versions,
 )
-from dsa_des.results.printing import (
-    ANSWER_HEADS,
-    RATIO_HEADS,
-    answer_cells,
-    interval_text,
-    ratio_cells,
-)
-from dsa_des.results.record import run_command
+from dsa_des.results.printing import RATIO_HEADS, ratio_cells, rounded
+from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO, run_command
 from dsa_des.results.sealed_files import read_regular
-from dsa_des.results.summary import one_sided
+from dsa_des.results.summary import Answer, Line, one_sided
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.text.safe_text import printable, shortened
 
@@ -41,6 +35,7 @@ _LARGEST_PICTURE = 20 * 2**20
 _MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 #: Letters of a text.
 _LONGEST = 400
+_MOST_SHOWN = 60
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" \
@@ -59,7 +54,12 @@ td,th{padding:.15em .7em;border-bottom:1px solid var(--line);text-align:left;ver
 }td{max-width:34em}th{background:var(--soft)}code,pre{background:var(--soft);
 font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figure{margin:1em 0}
 img{max-width:100%;height:auto}.note{color:var(--note)}
-@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}}
+nav{position:sticky;top:0;background:var(--paper);padding:.4em 0;
+border-bottom:1px solid var(--line)}
+nav a{margin-right:.8em;color:inherit}details{margin:.6em 0}summary{cursor:pointer}
+h2{scroll-margin-top:3em}
+@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}
+table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
 @media print{.wide{overflow:visible}}
 </style></head><body>
 {% macro table(heads, rows) %}{% if rows %}
@@ -73,34 +73,57 @@ img{max-width:100%;height:auto}.note{color:var(--note)}
 <p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
 {% endif %}{% endmacro %}
 <h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
-{{ tables.rows.failed }} without result</p>
-<h2>What was asked</h2>
-{{ table(("", ""), asked) }}{{ table(("axis", "values", ""), axes) }}
-{{ table(("result", "kind", "meaning"), results) }}
-<h2>The scene</h2><p><code>{{ record.scene }}</code></p>
-{{ table(("in every cell", ""), changes) }}
-{% if explained and explained.scene %}
-<details><summary>The first run's scene, every default written out</summary>\
-{{ explained.scene.splitlines() | verbatim }}</details>
+{{ tables.rows.failed }} without result; made by dsa_des {{ version }}</p>
+<nav><a href="#question">Question</a> <a href="#answer">Answer</a>
+{% if ratios %} <a href="#risk">Risk</a>{% endif %}
+{% if differences %} <a href="#differences">Differences</a>{% endif %}
+{% if others_drawn %} <a href="#figures">Figures</a>{% endif %} <a href="#models">Models</a> \
+<a href="#effects">Effects</a> <a href="#results">All results</a> <a href="#runs">Runs</a> \
+<a href="#repeat">To repeat it</a></nav>
+<h2 id="question">The question</h2>
+{{ table(("axis", "values", ""), axes) }}{{ table(("", ""), asked) }}
+<h2 id="answer">The answer</h2>
+{% for title, heads, rows in pivots %}
+<h3>{{ title }}</h3>{{ table(heads, rows) }}
+{% endfor %}
+{% if pivots %}
+<p class='note'>The cheapest value whose interval, and that of all dearer ones, lies within the \
+limit; {{ sure }} sure. "none": not even the dearest does. The value by the estimate alone, which \
+is sure of nothing, stands in brackets where it differs.</p>
+{% endif %}
+{% for stem, name, data in answering %}
+<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
+<figcaption>{{ name }}</figcaption></figure>
+{% endfor %}
+{% if shown %}
+{{ table(heads, shown) }}
+<p class='note'>{{ level }} intervals: {{ methods }}. Rounded to two digits of half an \
+interval.{% if few %} "few": too few values to rely on it.{% endif %}</p>
+{% endif %}
+{% if ratios %}
+<h2 id="risk">Ratios of events</h2>{{ table(axis_heads + ratio_heads, ratios) }}
+<p class='note'>Unresolved and induced add up to the ratio. Nominal, mitigated, induced: units \
+with the event without and with the remedy, and with it alone. Effective size: Kish's, of the \
+weights.</p>
+{% endif %}
+{% if differences %}
+<h2 id="differences">Paired differences</h2>
+{{ table(others + [tables.baseline[0] | axis, "less", "result", "difference", "interval", "pairs"],
+         differences) }}
+{% endif %}
+{% if others_drawn %}
+<h2 id="figures">Further figures</h2>
+{% for stem, name, data in others_drawn %}
+<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
+<figcaption>{{ name }}</figcaption></figure>
+{% endfor %}
 {% endif %}
 {% if not explained %}
-<h2>Models and effects</h2><p>This folder is of a version that kept neither. Which model each \
-block uses, with its proven error, and which effects are left out and why:</p>\
-<pre>{{ explain }}</pre>
+<h2 id="models">Models and effects</h2><p id="effects">This folder is of a version that kept \
+neither. Which model each block uses, with its proven error, and which effects are left out and \
+why:</p><pre>{{ explain }}</pre>
 {% else %}
-<h2>Models and their errors</h2>
-{% for scene in explained.scenes if scene.models %}
-{{ where(scene, scene is sameas explained.scenes[0]) }}
-{{ table(("block", "model", "what it is", "its place among models of its kind"),
-         scene | models) }}
-{% endfor %}
-{% if bounds %}
-<h3>Proven: largest influence</h3>
-{{ table(("block", "effect", "largest influence", ""), bounds) }}
-{% else %}
-<p class='note'>No model was chosen and no effect left out within an allowed error ([accuracy]), \
-so there is no bound to prove.</p>
-{% endif %}
+<h2 id="models">Models and their errors</h2>
 {% if not errors %}
 <p class='note'>Errors of the models were not measured (a study of 100 runs or more does it by \
 itself): <code>dsa-des study report FOLDER --measure</code>.</p>
@@ -113,7 +136,22 @@ itself): <code>dsa-des study report FOLDER --measure</code>.</p>
 {% for note in errors.notes %}<li>{{ note }}</li>{% endfor %}</ul>
 {% endif %}
 {% endif %}
-<h2>Effects</h2>
+{% if bounds %}
+<h3>Proven: largest influence</h3>
+{{ table(("block", "effect", "largest influence", ""), bounds) }}
+{% else %}
+<p class='note'>No model was chosen and no effect left out within an allowed error ([accuracy]), \
+so there is no bound to prove.</p>
+{% endif %}
+<details><summary>The model of each block, and its place among those of its kind</summary>
+{% for scene in explained.scenes if scene.models %}
+{{ where(scene, scene is sameas explained.scenes[0]) }}
+{{ table(("block", "model", "what it is", "its place among models of its kind"),
+         scene | models) }}
+{% endfor %}
+</details>
+<h2 id="effects">Effects</h2>
+<details><summary>Which are simulated, which are left out, and why</summary>
 {% for scene in explained.scenes if scene.effects or scene.spared %}
 {{ where(scene, scene is sameas explained.scenes[0]) }}
 {% for title, simulated in (("Simulated", true), ("Left out, and why", false)) %}
@@ -124,49 +162,40 @@ itself): <code>dsa-des study report FOLDER --measure</code>.</p>
 <h3>Work that is spared</h3>{{ table(("block", "what, and why"), scene.spared) }}
 {% endif %}
 {% endfor %}
+</details>
 {% endif %}
-<h2>Results</h2><p class='note'>Cut off: values that the beginning or the end of a run censored; \
-the mean holds them.</p>
-{{ table(tables.rows.axes + ["result", "value", "interval", "units", "no value", "", "cut off",
-                              "expected"], lines) }}
+<h2 id="results">All results</h2>
+<details><summary>{{ tables.lines | length }} values with their intervals</summary>
+<p class='note'>Cut off: values that the beginning or the end of a run censored; the mean holds \
+them.</p>
+{{ table(heads, lines) }}
 {% if tables.lines | length > most %}
 <p>and {{ tables.lines | length - most }} more lines in summary.parquet</p>
 {% endif %}
-{% if ratios %}
-<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. Nominal, \
-mitigated, induced: units with the event without and with the remedy, and with it alone. \
-Effective size: Kish's, of the weights.</p>
-{{ table(tables.rows.axes + ratio_heads, ratios) }}
+</details>
+<details><summary>What each result means</summary>
+{{ table(("result", "kind", "meaning"), results) }}
+</details>
+<h2>The scene</h2><p><code>{{ record.scene }}</code></p>
+{{ table(("in every cell", ""), changes) }}
+{% if explained and explained.scene %}
+<details><summary>The first run's scene, every default written out</summary>\
+{{ explained.scene.splitlines() | verbatim }}</details>
 {% endif %}
-{% if answers %}
-<h2>Requirements</h2><p class='note'>The cheapest value whose interval, and that of all dearer \
-ones, lies within the limit; {{ sure }} sure.</p>
-{{ table(answer_heads, answers) }}
-{% endif %}
-{% if differences %}
-<h2>Paired differences</h2>
-{{ table(others + [tables.baseline[0], "less", "result", "difference", "interval", "pairs"],
-         differences) }}
-{% endif %}
-{% if pictures %}
-<h2>Figures</h2>
-{% for stem, name, data in pictures %}
-<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
-<figcaption>{{ name }}</figcaption></figure>
-{% endfor %}
-{% endif %}
-<h2>Failed and censored runs</h2><p>Runs: {{ status }}. Values cut off by a run's beginning or \
-end: {{ censored }}.</p>
+<h2 id="runs">Failed and censored runs</h2><p>Runs: {{ status }}. Values cut off by a run's \
+beginning or end: {{ censored }}.</p>
 {{ table(("cell", "replica", "status", "error", "command"), failed) }}
 {% if tables.rows.failed > failed | length %}
 <p>and {{ tables.rows.failed - failed | length }} more</p>
 {% endif %}
 <h2>Seeds, versions and hashes</h2><p>Seed of the study: <code>{{ record.seed }}</code>. Every \
 run's own seed is in the column <code>seed</code> of the parts.</p>
+<details><summary>Packages, and digests of the parts</summary>
 {{ table(("package", "when the study was begun", "when this page was made"), packages) }}
 {{ table(("", "SHA-256"), hashes) }}
-<h2>To repeat it</h2>{{ commands | verbatim }}<p class='note'>Any other run: the same with the \
-seed, axes and draws that stand in its row of the parts; rows of failed runs hold it as \
+</details>
+<h2 id="repeat">To repeat it</h2>{{ commands | verbatim }}<p class='note'>Any other run: the same \
+with the seed, axes and draws that stand in its row of the parts; rows of failed runs hold it as \
 <code>command</code>.</p>
 </body></html>
 """
@@ -186,12 +215,16 @@ def study_report(folder: StudyFolder) -> bytes:
     explain = run_command(record.scene, record.seed, record.swaps, record.sets)
     explain = explain.replace("dsa-des run ", "dsa-des explain ", 1)
     begun, now = explained.versions if explained else {}, versions()
+    pictures = _pictures(folder)
+    answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
+    answering = answering or pictures[:1]
     page = _environment().from_string(_PAGE).render(
         tables=tables, record=record, explained=explained, errors=read_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
-        asked=_asked(tables),
+        version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_asked(tables),
         axes=[
-            (axis.column, ", ".join(map(str, axis.values[:40])) + ", …" * (len(axis.values) > 40),
+            (axis_label(axis.column), ", ".join(map(_value, axis.values[:40]))
+             + ", …" * (len(axis.values) > 40),
              "a sample: its values are independent units" if axis.over else "")
             for axis in record.axes
         ],
@@ -203,24 +236,26 @@ def study_report(folder: StudyFolder) -> bytes:
              "simulated" if e.simulated else "left out")
             for scene in (explained.scenes if explained else ()) for e in scene.effects if e.bound
         ],
-        lines=[
-            (*line.at, line.result.name, short(line.estimate.value), interval_text(line.estimate),
-             line.estimate.count, line.missing, "few" if line.estimate.few else "",
-             cut_off_text(line), "" if line.expected is None else short(line.expected))
-            for line in tables.lines[:_MOST_ROWS]
-        ],
-        ratio_heads=list(RATIO_HEADS), answer_heads=ANSWER_HEADS,
-        ratios=[(*map(short, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
-        answers=[answer_cells(tables, answer) for answer in tables.answers[:_MOST_ROWS]],
+        heads=[*map(axis_label, tables.rows.axes), "result", "value", "interval", "units",
+               "no value", "", "cut off", "expected"],
+        shown=[_line(line) for line in tables.shown_lines()[:_MOST_SHOWN]],
+        lines=[_line(line) for line in tables.lines[:_MOST_ROWS]],
+        few=any(line.estimate.few for line in tables.lines),
+        level=f"{100 * record.confidence:g} %", methods=_methods(tables),
+        axis_heads=list(map(axis_label, tables.rows.axes)),
+        ratio_heads=list(RATIO_HEADS), pivots=_pivots(tables),
+        ratios=[(*map(_value, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
         sure=f"{100 * one_sided(record.confidence):g} %",
-        others=[n for n in tables.rows.axes if tables.baseline and n != tables.baseline[0]],
+        others=[axis_label(n) for n in tables.rows.axes
+                if tables.baseline and n != tables.baseline[0]],
         differences=[
-            (*item.at, item.value, item.baseline, item.result.name,
-             short(item.difference.paired.value), interval_text(item.difference.paired),
+            (*map(_value, item.at), _value(item.value), _value(item.baseline),
+             readable(item.result.name), *rounded(item.difference.paired),
              item.difference.paired.count)
             for item in tables.compared[:_MOST_ROWS]
+            if item.result in {line.result for line in tables.shown_lines()}
         ],
-        pictures=_pictures(folder),
+        answering=answering, others_drawn=[one for one in pictures if one not in answering],
         status=", ".join(f"{many} {name}" for name, many in sorted(stored.status.items())),
         censored=sum(many for line in tables.lines for _, many in line.cut_off),
         failed=[
@@ -246,7 +281,12 @@ def _environment() -> Environment:
         autoescape=True, finalize=_text, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters.update(
-        verbatim=_verbatim, plain=Markup, models=_models, measured=_measured, effects=_effects
+        verbatim=_verbatim,
+        plain=Markup,
+        axis=axis_label,
+        models=_models,
+        measured=_measured,
+        effects=_effects,
     )
     return environment
 
@@ -264,12 +304,69 @@ def _verbatim(lines: Iterable[str]) -> Markup:
     return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
 
 
+def _line(line: Line) -> tuple[Any, ...]:
+    """Return one line of the summary as the cells of a row."""
+    return (
+        *map(_value, line.at), readable(line.result.name), *rounded(line.estimate),
+        line.estimate.count, line.missing, "few" if line.estimate.few else "", cut_off_text(line),
+        "" if line.expected is None else short(line.expected),
+    )  # fmt: skip
+
+
+def _value(value: Any) -> str:
+    return short(value) if isinstance(value, float) else str(value)
+
+
+def _methods(tables: Tables) -> str:
+    """Return which interval belongs to which kind of result."""
+    kinds = {line.result.kind for line in tables.lines}
+    means = "studentised bootstrap" if tables.record.interval == "bootstrap" else "Student's t"
+    known = {EVENT: "shares by Wilson's score", FRACTION: "fractions by Wilson's score",
+             NUMBER: f"means by {means}"}  # fmt: skip
+    known[RATIO] = "ratios of events by a gamma interval or by drawing units again, as they say"
+    return ", ".join(text for kind, text in known.items() if kind in kinds)
+
+
+def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
+    """Return a table for each requirement, with the values of the last other axis side by side."""
+    found = []
+    for requirement in tables.record.requirements:
+        mine = [one for one in tables.answers if one.requirement == requirement][:_MOST_ROWS]
+        if not mine:
+            continue
+        others = [name for name in tables.rows.axes if name != requirement.axis]
+        title = f"{axis_label(requirement.axis)} for {requirement.text()}"
+        if not others:
+            found.append((title, ["cheapest"], [[_cheapest(mine[0])]]))
+            continue
+        columns = list(dict.fromkeys(one.at[-1] for one in mine))
+        rows: dict[tuple[Any, ...], dict[Any, str]] = {}
+        for one in mine:
+            rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest(one)
+        heads = [axis_label(name) for name in others[:-1]]
+        heads += [value_label(others[-1], column) for column in columns]
+        found.append((title, heads, [
+            [*map(_value, at), *(cells.get(column, "") for column in columns)]
+            for at, cells in rows.items()
+        ]))  # fmt: skip
+    return found
+
+
+def _cheapest(answer: Answer) -> str:
+    """Return the cheapest value that meets a requirement, and the one by the estimate alone."""
+    sure = "none" if answer.value is None else _value(answer.value)
+    alone = "none" if answer.estimated is None else _value(answer.estimated)
+    notes = [f"({alone})"] if alone != sure else []
+    notes += ["few"] if answer.line.estimate.few else []
+    notes += ["uneven"] if answer.uneven else []
+    return " ".join([sure, *notes])
+
+
 def _asked(tables: Tables) -> list[tuple[str, Any]]:
     record = tables.record
     rows: list[tuple[str, Any]] = [
         ("replicas of each cell", record.replicas),
         ("seed", record.seed),
-        ("intervals", f"{100 * record.confidence:g} %, {record.interval}"),
     ]
     if record.compare is not None:
         rows.append(("compared", f"{record.compare[0]}, with {record.compare[1]}"))

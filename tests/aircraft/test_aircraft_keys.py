@@ -13,6 +13,8 @@ from covering import covers
 from wired import Row, chain, decided, rows, run, sensor
 
 import dsa_des
+from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
+from components.formats.csv_file import read_csv
 from components.formats.set_file import read_set
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -74,6 +76,25 @@ def daa_one(craft: dict, folder) -> dict:
     return {**daa_any({}, folder), "aircraft": {"one": craft}}
 
 
+def asterix_any(craft: dict, folder) -> dict:
+    pytest.importorskip("asterix", reason="needs the extra asterix")
+    flights = read_csv(samples(folder / "f.csv", False)).aircraft
+    records = [
+        AsterixRecord(ADS_B, time_s, {
+            "number": number, "name": flight.name.upper(), "simulated": 1, "sac": 0, "sic": 0,
+            "lat_deg": flight.lat_deg[0], "lon_deg": flight.lon_deg[0], "alt_m": flight.alt_m[0],
+        })
+        for number, flight in enumerate(flights)
+        for time_s in flight.sample_times_s.tolist()
+    ]  # fmt: skip
+    (folder / "f.ast").write_bytes(write_records(records))
+    return {"type": "traffic.asterix", "file": str(folder / "f.ast"), "intruder": craft}
+
+
+def asterix_one(craft: dict, folder) -> dict:
+    return {**asterix_any({}, folder), "aircraft": {"ONE": craft}}
+
+
 def in_set(craft: dict, folder) -> dict:
     """The two at rest as tracks of a set: north, east and altitude."""
     lat, lon, alt = crooked.geodetic(
@@ -117,6 +138,8 @@ CARRIERS = {
     "traffic.random.aircraft": random,
     "traffic.csv.intruder": csv_any,
     "traffic.csv.aircraft": csv_one,
+    "traffic.asterix.intruder": asterix_any,
+    "traffic.asterix.aircraft": asterix_one,
     "traffic.daa_file.intruder": daa_any,
     "traffic.daa_file.aircraft": daa_one,
     "traffic.encounters.intruder": in_set,

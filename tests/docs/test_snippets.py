@@ -27,7 +27,11 @@ from tests import warm_process
 
 RUN = [page for page in PAGES if any(not not_run(part) for part in read_snippets(page))]
 #: Pages that show what extras do, and the packages that they install.
-EXTRAS = {"docs/stone-soup.md": ("stonesoup",), "docs/fmu.md": ("fmpy", "pythonfmu3")}
+EXTRAS = {
+    "docs/fmu.md": ("fmpy", "pythonfmu3"),
+    "docs/formats.md": ("asterix",),
+    "docs/stone-soup.md": ("stonesoup",),
+}
 LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
 
 

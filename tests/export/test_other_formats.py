@@ -4,6 +4,7 @@ import io
 import json
 import math
 import shutil
+import sys
 import xml.etree.ElementTree as ElementTree
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,7 +22,7 @@ from scipy.spatial.transform import Rotation
 import dsa_des
 from components.display.recorded_run import RecordedTables
 from components.export.command import export
-from components.export.exported import daa_text
+from components.export.exported import daa_text, xyz_text
 from components.export.globe import czml_text, kml_text
 from components.formats.daa_file import read_daa
 from components.view.command import view
@@ -74,6 +75,106 @@ def test_daa_is_read_again(run):
     assert (state.lon_deg - lon + 180) % 360 - 180 == pytest.approx(np.zeros(3), abs=3e-6)
     assert state.alt_m == pytest.approx(alt, abs=0.5)
     assert np.degrees(own.at(time_s).yaw_rad) % 360 == pytest.approx([217.0] * 3, abs=0.01)
+
+
+def flights_of_xyz(path):
+    """An .xyz file, read at the reference point that it says itself."""
+    head = path.read_text().splitlines()[0]
+    lat, lon, alt = (float(part.split()[1]) for part in head.partition(": ")[2].split(","))
+    return read_daa(
+        path, reference_lat_deg=lat, reference_lon_deg=lon, reference_alt_m=alt
+    ).aircraft
+
+
+@pytest.mark.parametrize("to", ["daa", "xyz"])
+def test_flights_out_and_in_again_agree_within_their_digits(run, to, tmp_path):
+    path = tmp_path / f"run.{to}"
+    assert call(run, "--to", to, "--out", path).exit_code == 0
+    found = read_daa(path).aircraft if to == "daa" else flights_of_xyz(path)
+    truth = pq.read_table(run / "truth.parquet").to_pylist()
+    assert [craft.name for craft in found] == ["ownship", "a<b&c"]
+    for craft, name in zip(found, (None, "a<b&c"), strict=True):
+        rows = [row for row in truth if row["target"] == name]
+        flown = {key: np.array([row[key] for row in rows]) for key in rows[0] if key != "target"}
+        state = craft.at(flown["time_s"])
+        assert state.lat_deg == pytest.approx(flown["lat_deg"], abs=2e-13)
+        lon = (state.lon_deg - flown["lon_deg"] + 180) % 360 - 180
+        assert lon == pytest.approx(0.0 * lon, abs=2e-13)
+        assert state.alt_m == pytest.approx(flown["alt_m"], abs=1e-9)
+        turned = (state.yaw_rad - flown["heading_rad"] + math.pi) % (2 * math.pi) - math.pi
+        assert turned == pytest.approx(0.0 * turned, abs=1e-12)
+        assert not craft.velocity_was_ignored
+
+
+def test_velocities_of_xyz_are_along_the_axes_of_its_reference_point(tmp_path):
+    """Far from the point, where the aircraft's own axes have turned by some degrees."""
+    run, truth, _ = crafted()
+    truth["lon_deg"][1::2] += 5.0
+    far = RecordedTables(run.folder, {"truth": pa.table(truth)})
+    rows = [line.split(", ") for line in xyz_text(far).splitlines()[3:]]
+    for k, row in enumerate(rows):
+        x, y, z = (float(cell) for cell in row[4:7])
+        place = [truth[key][k] for key in ("lat_deg", "lon_deg")]
+        ecef = pymap3d.enu2uvw(
+            truth["velocity_east_m_s"][k], truth["velocity_north_m_s"][k],
+            -truth["velocity_down_m_s"][k], *place,
+        )  # fmt: skip
+        origin = truth["lat_deg"][0], truth["lon_deg"][0]
+        assert pymap3d.enu2uvw(x, y, z, *origin) == pytest.approx(ecef, abs=1e-9)
+        assert float(row[3]) == truth["alt_m"][k]
+
+
+def test_mcap_opens_in_its_own_reader(run, tmp_path):
+    reader = pytest.importorskip("mcap.reader", reason="needs the extra mcap")
+    path = tmp_path / "run.mcap"
+    assert call(run, "--to", "mcap", "--out", path).exit_code == 0
+    with open(path, "rb") as stream:
+        found: dict = {}
+        for schema, channel, message in reader.make_reader(stream).iter_messages():
+            described = json.loads(schema.data)
+            content = json.loads(message.data)
+            assert schema.encoding == "jsonschema" and schema.name == described["title"]
+            assert content.keys() <= described["properties"].keys()
+            when = message.log_time / 1e9 - datetime(2000, 1, 1, tzinfo=UTC).timestamp()
+            found.setdefault((channel.topic, schema.name), []).append((when, content))
+    for name in ("detections", "truth", "scans"):
+        table = pq.read_table(run / f"{name}.parquet").to_pylist()
+        rows = [content for _, content in found[f"/tables/{name}", f"dsa_des.{name}"]]
+        assert rows == [
+            {key: None if value != value else value for key, value in row.items()} for row in table
+        ]
+    truth = [r for r in pq.read_table(run / "truth.parquet").to_pylist() if r["target"] == "a<b&c"]
+    fixes = found["/aircraft/a<b&c/location", "foxglove.LocationFix"]
+    assert [(f["latitude"], f["longitude"], f["altitude"]) for _, f in fixes] == [
+        (r["lat_deg"], r["lon_deg"], r["alt_m"]) for r in truth
+    ]
+    assert [when for when, _ in fixes] == pytest.approx([r["time_s"] for r in truth], abs=1e-6)
+    own = [r for r in pq.read_table(run / "truth.parquet").to_pylist() if r["target"] is None]
+    for (_, pose), row in zip(
+        found["/aircraft/ownship/pose", "foxglove.PoseInFrame"], own, strict=True
+    ):
+        turn = Rotation.from_quat([pose["pose"]["orientation"][axis] for axis in "xyzw"])
+        angles = [row[f"{name}_rad"] for name in ("heading", "pitch", "roll")]
+        # Axes forward, right and down in north, east and down, as the run has them.
+        ned = Rotation.from_euler("ZYX", angles).as_matrix()
+        flip = np.diag([1.0, -1.0, -1.0])
+        enu = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]) @ ned @ flip
+        assert turn.as_matrix() == pytest.approx(enu, abs=1e-9)
+    balls = found["/detections", "foxglove.SceneUpdate"]
+    sphere = balls[0][1]["entities"][0]["spheres"][0]["pose"]["position"]
+    first = pymap3d.geodetic2enu(truth[0]["lat_deg"], truth[0]["lon_deg"], truth[0]["alt_m"],
+                                 own[0]["lat_deg"], own[0]["lon_deg"], own[0]["alt_m"])  # fmt: skip
+    assert [sphere[axis] for axis in "xyz"] == pytest.approx(first, abs=300.0)
+    assert len(balls) == 12
+
+
+@pytest.mark.parametrize(("to", "module"), [("mcap", "mcap.writer"), ("asterix", "asterix.base")])
+def test_a_missing_extra_is_named_and_nothing_written(run, to, module, tmp_path, monkeypatch):
+    for name in (module, "asterix.generated"):
+        monkeypatch.setitem(sys.modules, name, None)
+    done = call(run, "--to", to, "--out", tmp_path / "o")
+    assert done.exit_code == 2 and f"needs an extra: pip install 'dsa-des[{to}]'" in done.output
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_matlab_has_numbers_and_texts(run):
@@ -253,8 +354,10 @@ def test_names_that_matlab_cannot_have_are_said(run, tmp_path, name):
     assert done.exit_code == 2 and f"scans.parquet: {name!r} cannot be the name" in done.output
 
 
-@pytest.mark.parametrize("to", ["csv", "kml", "czml", "daa", "mat"])
+@pytest.mark.parametrize("to", ["csv", "kml", "czml", "daa", "xyz", "asterix", "mcap", "mat"])
 def test_the_same_run_gives_the_same_bytes(run, to, tmp_path):
+    if to in ("asterix", "mcap"):
+        pytest.importorskip(to, reason=f"needs the extra {to}")
     for name in ("one", "two"):
         assert call(run, "--to", to, "--out", tmp_path / name).exit_code == 0
     one, two = tmp_path / "one", tmp_path / "two"
@@ -271,7 +374,10 @@ def test_what_cannot_be_exported_is_refused(run, tmp_path):
     done = call(tmp_path, "--to", "csv")
     assert done.exit_code == 2 and "holds no run" in done.output
     done = call(run, "--to", "xml")
-    assert done.exit_code == 2 and "'csv', 'kml', 'czml', 'daa', 'mat'" in done.output
+    assert (
+        done.exit_code == 2
+        and "'csv', 'kml', 'czml', 'daa', 'xyz', 'asterix', 'mcap', 'mat'" in done.output
+    )
     bare = tmp_path / "bare"
     bare.mkdir()
     for name in ("run.json", "scans.parquet"):

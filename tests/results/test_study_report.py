@@ -47,14 +47,20 @@ def test_the_page_holds_what_was_asked_and_what_came_of_it(folder: Path) -> None
     assert done.exit_code == 0 and "report.html" in done.stdout
     page = (folder / "report.html").read_text(encoding="utf-8")
     for said in (
-        "What was asked", "radar.scan_rate_hz", "blocks.radar.offset_s", "first_light.toml",
+        "The question", "Radar scan rate (Hz)", "blocks.radar.offset_s", "first_light.toml",
         "dsa-des explain", "detected.radar", "Paired differences", "data:image/png;base64,",
+        "shares by Wilson", "Detected, radar",
         "6 done", "SHA-256", "part-000-000000.parquet", "dsa-des run", "numpy",
     ):  # fmt: skip
         assert said in page, said
     # A title is text, and nothing comes from elsewhere.
     assert "Ranges &lt;b&gt;&amp; phases&lt;/b&gt;" in page and "<b>" not in page
-    assert not re.findall(r"""(?:src|href)=["'](?!data:)""", page)
+    assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", page)
+    # The question and the answer come first, and every entry of the contents leads somewhere.
+    places = [page.index(f'<h2 id="{name}"') for name in ("question", "answer", "models")]
+    assert places == sorted(places)
+    for name in re.findall(r'href="#(\w+)"', page):
+        assert page.count(f'id="{name}"') == 1
     again = folder / "report.html"
     first = again.read_bytes()
     call("report", folder)

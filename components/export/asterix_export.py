@@ -1,0 +1,224 @@
+"""A run as ASTERIX: plots of radars (048, with 034), tracks (062), and the ownship (021)."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from components.display.picture import offset_positions
+from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.formats.asterix_records import (
+    ADS_B,
+    NORTH_MARKER,
+    PLOTS,
+    SERVICE,
+    SYSTEM_TRACKS,
+    AsterixRecord,
+    callsign,
+    write_records,
+)
+from components.geometry import body_to_ned, local_axes, spherical_from_enu
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
+
+_POSITION = ("own_lat_deg", "own_lon_deg", "own_alt_m")
+_TURNED = ("own_heading_rad", "own_pitch_rad", "own_roll_rad")
+_STATE = ("north_m", "east_m", "down_m")
+_MOVES = ("north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+#: System area code of everything here: none is assigned to it.
+_SAC = 0
+
+
+def asterix_bytes(run: RecordedTables) -> bytes:
+    """Return a run as ASTERIX; second 0 is midnight.
+
+    Radars and trackers are numbered by their names from SIC 1, in SAC 0; the ownship is SIC 0.
+    What has no range is no plot and no track. Everything says that it is simulated.
+    """
+    blocks = sorted(
+        {
+            name or ""
+            for table in ("scans", "detections", "tracks", "state_tracks")
+            if table in run.tables
+            for name in run.texts(table, "block")
+        }
+    )
+    sic = {name: number for number, name in enumerate(blocks, start=1)}
+    records = [*_plots(run, sic), *_state_tracks(run, sic), *_held_tracks(run, sic), *_own(run)]
+    if not records:
+        raise UsageError(
+            f"{run.folder}: holds nothing that ASTERIX has a record for: detections or tracks with "
+            "a range, or truth"
+        )
+    return write_records(records)
+
+
+def _sight(
+    line: list[FloatArray], pose: list[FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return bearings (rad from north), slant ranges, and ends (3, n) of lines in body axes."""
+    azimuth, elevation, far_m = line
+    level = np.cos(elevation) * far_m
+    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation) * far_m
+    north, east, down = body_to_ned(*body, *pose[3:])
+    bearing, _, _ = spherical_from_enu(north, east, -down)
+    return bearing, far_m, offset_positions(np.stack([north, east, down]), pose[:3])
+
+
+def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+    """Give a north marker with the radar's place for each of its scans, and its plots."""
+    if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
+        return
+    lines = [run.numbers("detections", n) for n in ("azimuth_rad", "elevation_rad", "range_m")]
+    there = np.flatnonzero(np.isfinite(lines).all(axis=0))
+    names = run.texts("detections", "block")
+    radars = {names[row] or "" for row in there.tolist()}
+    yield from _scans(run, sic, radars)
+    if len(there) == 0:
+        return
+    pose = [run.numbers("detections", name)[there] for name in (*_POSITION, *_TURNED)]
+    unknown = ~np.isfinite(pose).all(axis=0)
+    if unknown.any():
+        sensor = names[int(there[np.argmax(unknown)])]
+        raise UsageError(
+            f"{run.folder}: {sensor} does not say where the ownship was: a plot of ASTERIX is "
+            "counted from north and from a place"
+        )
+    lit = run.numbers("detections", "illuminated_s")[there]
+    time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
+    bearing, far_m, ends = _sight([part[there] for part in lines], pose)
+    for k, row in enumerate(there.tolist()):
+        yield AsterixRecord(
+            PLOTS,
+            float(time_s[k]),
+            {
+                "sac": _SAC,
+                "sic": sic[names[row] or ""],
+                "simulated": 1,
+                "range_m": float(far_m[k]),
+                "azimuth_deg": float(np.degrees(bearing[k])),
+                "alt_m": float(ends[2, k]),
+            },
+        )
+
+
+def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
+    if "scans" not in run.tables:
+        return
+    places = zip(*(run.numbers("scans", name).tolist() for name in _POSITION), strict=True)
+    times = run.numbers("scans", "time_s").tolist()
+    for name, time_s, place in zip(run.texts("scans", "block"), times, places, strict=True):
+        if (name or "") in radars:
+            known = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+            values = {"sac": _SAC, "sic": sic[name or ""], "message": NORTH_MARKER}
+            yield AsterixRecord(
+                SERVICE, time_s, values | (known if np.isfinite(place).all() else {})
+            )
+
+
+def _track(
+    sic: int, number: int, name: str | None, time_s: float, place: FloatArray
+) -> tuple[float, dict[str, object]]:
+    lat, lon, alt = place.tolist()
+    return time_s, {
+        "sac": _SAC, "sic": sic, "number": number, "name": name, "simulated": 1, "tentative": 0,
+        "last": 0, "coasted": 0, "lat_deg": lat, "lon_deg": lon, "alt_m": alt,
+    }  # fmt: skip
+
+
+def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+    """Give estimated tracks, at the instants that their states speak of."""
+    if "state_tracks" not in run.tables:
+        return
+    ned = np.stack([run.numbers("state_tracks", name) for name in _STATE])
+    rows = np.flatnonzero(np.isfinite(ned).all(axis=0))
+    if len(rows) == 0:
+        return
+    origin = [run.numbers("state_tracks", name)[rows] for name in _ORIGIN]
+    places = offset_positions(ned[:, rows], origin)
+    # Velocities are along the axes of the frame's origin; the track's own have turned a little.
+    moves = [run.numbers("state_tracks", name)[rows] for name in _MOVES]
+    east, north, up = local_axes(origin[0], origin[1])
+    earth = [
+        moves[0] * n + moves[1] * e - moves[2] * u for n, e, u in zip(north, east, up, strict=True)
+    ]
+    own_axes = local_axes(places[0], places[1])
+    along: list[Any] = [sum(v * a for v, a in zip(earth, axis, strict=True)) for axis in own_axes]
+    blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
+    numbers = run.values("state_tracks", "track")
+    state_s = run.numbers("state_tracks", "state_s")
+    for k, row in enumerate(rows.tolist()):
+        time_s, values = _track(
+            sic[blocks[row] or ""], int(numbers[row]), None, float(state_s[row]), places[:, k]
+        )
+        values |= {
+            "tentative": int(statuses[row] == "tentative"),
+            "coasted": int(statuses[row] == "coasted"),
+            "last": int(statuses[row] == "deleted"),
+            "velocity_east_m_s": float(along[0][k]),
+            "velocity_north_m_s": float(along[1][k]),
+            "velocity_up_m_s": float(along[2][k]),
+        }
+        yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
+
+
+def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+    """Give what trackers hold of each target, once for each measurement, at its instant."""
+    if "tracks" not in run.tables:
+        return
+    lines = [run.numbers("tracks", name) for name in ("azimuth_rad", "elevation_rad", "range_m")]
+    measured_s = run.numbers("tracks", "measured_s")
+    ranged = np.flatnonzero(np.isfinite(lines).all(axis=0))
+    names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
+    number: dict[tuple[str, str], int] = {}
+    told: dict[tuple[str, str], float] = {}
+    rows = []
+    for row in ranged.tolist():
+        key = blocks[row] or "", names[row] or ""
+        number.setdefault(key, len(number) + 1)
+        if told.get(key) != measured_s[row]:
+            told[key] = float(measured_s[row])
+            rows.append(row)
+    if not rows:
+        return
+    pose = _own_pose(run, measured_s[rows], rows)
+    _, _, places = _sight([part[rows] for part in lines], pose)
+    for k, row in enumerate(rows):
+        key = blocks[row] or "", names[row] or ""
+        what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), places[:, k]
+        yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
+
+
+def _own_pose(run: RecordedTables, time_s: FloatArray, rows: list[int]) -> list[FloatArray]:
+    """Return the ownship's pose of tracks: as believed where that is recorded, else the truth."""
+    if _POSITION[0] in run.table("tracks").column_names:
+        return [run.numbers("tracks", name)[rows] for name in (*_POSITION, *_TURNED)]
+    own = run.flights().get(OWNSHIP, {"time_s": np.zeros(0)})
+    at = np.searchsorted(own["time_s"], time_s)
+    if len(own["time_s"]) == 0 or (own["time_s"][np.minimum(at, len(own["time_s"]) - 1)]
+                                   != time_s).any():  # fmt: skip
+        raise UsageError(
+            f"{run.folder}: truth.parquet does not say where the ownship was when tracks were "
+            "measured: record it with truth = true under [record]"
+        )
+    return [own[name.removeprefix("own_")][at] for name in (*_POSITION, *_TURNED)]
+
+
+def _own(run: RecordedTables) -> Iterator[AsterixRecord]:
+    """Give the ownship's flight as it would broadcast it."""
+    if "truth" not in run.tables:
+        return
+    own = run.flights().get(OWNSHIP)
+    if own is None:
+        return
+    north, east = own["velocity_north_m_s"], own["velocity_east_m_s"]
+    columns = {
+        "lat_deg": own["lat_deg"], "lon_deg": own["lon_deg"], "alt_m": own["alt_m"],
+        "speed_m_s": np.hypot(north, east),
+        "track_deg": np.degrees(np.arctan2(east, north)),
+        "velocity_up_m_s": -own["velocity_down_m_s"],
+    }  # fmt: skip
+    fixed = {"sac": _SAC, "sic": 0, "number": 1, "simulated": 1, "name": OWNSHIP.upper()}
+    for k, time_s in enumerate(own["time_s"].tolist()):
+        yield AsterixRecord(ADS_B, time_s, fixed | {n: float(v[k]) for n, v in columns.items()})

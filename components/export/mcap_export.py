@@ -1,0 +1,213 @@
+"""A run as MCAP, in JSON with schemas: its tables, and flights and detections as viewers show them.
+
+Schemas called ``foxglove.…`` are those of https://docs.foxglove.dev/docs/sdk/schemas, with the
+fields that are used of them; viewers know them by their names. Second 0 is that of the globes.
+"""
+
+import io
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from components.display.recorded_run import RecordedTables
+from components.export.globe import START, detected
+from components.geometry import line_of_sight_ned
+from components.sensor.marks import RADAR
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors.extras import library
+
+_NANO = 10**9
+#: The frame of all that is drawn: east, north and up of where the first aircraft begins.
+_FRAME = "map"
+#: How long a detection is shown, and how large.
+_SHOWN_S, _SIZE_M = 4, 60.0
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {"type": "object", "properties": properties}
+
+
+def _several(**properties: Any) -> dict[str, Any]:
+    return {"type": "array", "items": _object(**properties)}
+
+
+_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
+_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
+_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_POSE = _object(position=_VECTOR, orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER))
+_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_FOXGLOVE = {
+    "foxglove.LocationFix": _object(
+        timestamp=_TIME, frame_id=_TEXT, latitude=_NUMBER, longitude=_NUMBER, altitude=_NUMBER
+    ),
+    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
+    "foxglove.SceneUpdate": _object(
+        deletions=_several(timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
+        entities=_several(
+            timestamp=_TIME,
+            frame_id=_TEXT,
+            id=_TEXT,
+            lifetime=_TIME,
+            frame_locked={"type": "boolean"},
+            metadata=_several(key=_TEXT, value=_TEXT),
+            spheres=_several(pose=_POSE, size=_VECTOR, color=_COLOUR),
+        ),
+    ),
+}
+
+
+def mcap_bytes(run: RecordedTables) -> bytes:
+    """Return a run as MCAP: a topic for each table, each aircraft, and what was detected.
+
+    ``/tables/NAME`` has the rows of a table, null where nothing stands; its schema says the units.
+    ``/aircraft/NAME/location`` and ``/pose`` are the true flights, where they are recorded; axes of
+    a pose are forward, left and up. ``/detections`` are drawn where they have a range.
+    """
+    writer_of = library("mcap.writer", "mcap", "MCAP")
+    stream = io.BytesIO()
+    writer = writer_of.Writer(stream, compression=writer_of.CompressionType.NONE)
+    writer.start(library="dsa_des")
+    channels: dict[str, int] = {}
+    schemas: dict[str, int] = {}
+
+    def channel(topic: str, name: str, schema: dict[str, Any]) -> int:
+        if topic not in channels:
+            if name not in schemas:
+                text = json.dumps({"title": name, **schema}, ensure_ascii=False).encode()
+                schemas[name] = writer.register_schema(name, "jsonschema", text)
+            channels[topic] = writer.register_channel(topic, "json", schemas[name])
+        return channels[topic]
+
+    messages: list[tuple[int, int, int, bytes]] = []
+    for topic, name, schema, at_ns, content in (*_tables(run), *_drawn(run)):
+        data = json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
+        messages.append((at_ns, channel(topic, name, schema), len(messages), data))
+    messages.sort(key=lambda one: one[:3])
+    for sequence, (at_ns, number, _, data) in enumerate(messages):
+        writer.add_message(number, at_ns, data, at_ns, sequence)
+    writer.finish()
+    return stream.getvalue()
+
+
+#: Topic, name of the schema, schema, instant (ns) and content.
+_Message = tuple[str, str, dict[str, Any], int, dict[str, Any]]
+
+
+def _tables(run: RecordedTables) -> Iterator[_Message]:
+    for name, table in sorted(run.tables.items()):
+        if "time_s" not in table.column_names:
+            continue
+        schema = _object(**{field.name: _described(field) for field in table.schema})
+        when = run.numbers(name, "time_s")
+        run.refuse_large(name, {"time_s": when})
+        for row, time_s in zip(table.to_pylist(), when.tolist(), strict=True):
+            plain = {
+                key: None if isinstance(value, float) and not math.isfinite(value) else value
+                for key, value in row.items()
+            }
+            yield f"/tables/{name}", f"dsa_des.{name}", schema, _instant(time_s), plain
+
+
+def _described(field: Any) -> dict[str, Any]:
+    """Return the schema of a column: its type, its unit and frame, its meaning."""
+    import pyarrow as pa
+
+    kind = "string"
+    if pa.types.is_boolean(field.type):
+        kind = "boolean"
+    elif pa.types.is_integer(field.type):
+        kind = "integer"
+    elif pa.types.is_floating(field.type):
+        kind = "number"
+    said = {k.decode(): v.decode() for k, v in (field.metadata or {}).items()}
+    words = [said[key] for key in ("unit", "frame", "meaning") if said.get(key)]
+    found: dict[str, Any] = {"type": [kind, "null"]}
+    return found | ({"description": "; ".join(words)} if words else {})
+
+
+def _drawn(run: RecordedTables) -> Iterator[_Message]:
+    """Give flights and detections, around where the ownship begins."""
+    flights = run.flights() if "truth" in run.tables else {}
+    origin: tuple[float, ...] | None = None
+    for name, flight in flights.items():
+        place = [flight[key] for key in ("lat_deg", "lon_deg", "alt_m")]
+        origin = origin or tuple(float(part[0]) for part in place)
+        turned = _orientations(*(flight[f"{a}_rad"] for a in ("heading", "pitch", "roll")))
+        poses = zip(_offsets(origin, *place), turned, strict=True)
+        rows = zip(flight["time_s"].tolist(), *(part.tolist() for part in place), strict=True)
+        for (time_s, lat, lon, alt), (offset, turn) in zip(rows, poses, strict=True):
+            when = _instant(time_s)
+            fix = {
+                "timestamp": _stamp(when), "frame_id": name,
+                "latitude": lat, "longitude": lon, "altitude": alt,
+            }  # fmt: skip
+            yield _message(f"/aircraft/{name}/location", "foxglove.LocationFix", when, fix)
+            pose = {"timestamp": _stamp(when), "frame_id": _FRAME,
+                    "pose": {"position": offset, "orientation": turn}}  # fmt: skip
+            yield _message(f"/aircraft/{name}/pose", "foxglove.PoseInFrame", when, pose)
+    ends = list(detected(run))
+    if not ends:
+        return
+    lon, lat, alt = np.array([end[3:] for end in ends]).T
+    origin = origin or (float(lat[0]), float(lon[0]), float(alt[0]))
+    for number, (end, offset) in enumerate(zip(ends, _offsets(origin, lat, lon, alt), strict=True)):
+        yield _message("/detections", "foxglove.SceneUpdate", *_ball(number, end, offset))
+
+
+def _message(topic: str, name: str, at_ns: int, content: dict[str, Any]) -> _Message:
+    return topic, name, _FOXGLOVE[name], at_ns, content
+
+
+def _ball(number: int, end: Any, offset: dict[str, float]) -> tuple[int, dict[str, Any]]:
+    sensor, target, time_s, *_ = end
+    when = _instant(time_s)
+    colour = [int(RADAR.colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    sphere = {
+        "pose": {"position": offset, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}},
+        "size": dict.fromkeys("xyz", _SIZE_M),
+        "color": dict(zip("rgba", (*colour, 1.0), strict=True)),
+    }
+    entity = {
+        "timestamp": _stamp(when), "frame_id": _FRAME, "id": f"detection/{number}",
+        "lifetime": {"sec": _SHOWN_S, "nsec": 0}, "frame_locked": False,
+        "metadata": [{"key": "sensor", "value": sensor}, {"key": "target", "value": target}],
+        "spheres": [sphere],
+    }  # fmt: skip
+    return when, {"deletions": [], "entities": [entity]}
+
+
+def _offsets(
+    origin: tuple[float, ...], lat: FloatArray, lon: FloatArray, alt: FloatArray
+) -> list[dict[str, float]]:
+    north, east, down = line_of_sight_ned(origin[0], origin[1], origin[2], lat, lon, alt)
+    parts = zip(east.tolist(), north.tolist(), (-down).tolist(), strict=True)
+    return [dict(zip("xyz", part, strict=True)) for part in parts]
+
+
+def _orientations(
+    heading_rad: FloatArray, pitch_rad: FloatArray, roll_rad: FloatArray
+) -> list[dict[str, float]]:
+    """Return quaternions that turn axes forward, left and up into east, north and up."""
+    (cz, sz), (cy, sy), (cx, sx) = (
+        (np.cos(half), np.sin(half))
+        for half in ((0.5 * np.pi - heading_rad) / 2.0, -pitch_rad / 2.0, roll_rad / 2.0)
+    )
+    parts = (
+        cz * cy * sx - sz * sy * cx,
+        cz * sy * cx + sz * cy * sx,
+        sz * cy * cx - cz * sy * sx,
+        cz * cy * cx + sz * sy * sx,
+    )
+    rows = zip(*(part.tolist() for part in parts), strict=True)
+    return [dict(zip("xyzw", row, strict=True)) for row in rows]
+
+
+def _instant(time_s: float) -> int:
+    return int(START.timestamp()) * _NANO + round(time_s * _NANO)
+
+
+def _stamp(at_ns: int) -> dict[str, int]:
+    return dict(zip(("sec", "nsec"), divmod(at_ns, _NANO), strict=True))

@@ -1,0 +1,259 @@
+"""Read ASTERIX: system tracks and ADS-B reports as aircraft, plots of radars as detections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from components.formats.asterix_records import (
+    ADS_B,
+    PLOTS,
+    SERVICE,
+    SYSTEM_TRACKS,
+    AsterixRecord,
+    read_records,
+)
+from components.formats.sample_table import SampleColumn, SampleTable, enu_velocity
+from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
+from components.geometry import radii_of_curvature, wrap_pi
+from components.geometry.angles import FloatArray
+from dsa_des.arrays.types import IntArray
+from dsa_des.files.input_files import InputFileError, read_input_bytes
+
+_PLACE = ("lat", "lon", "alt")
+_MOVES = ("vx", "vy", "vz")
+_NUMBERS = ("time", *_PLACE, *_MOVES)
+
+
+@dataclass(frozen=True)
+class RadarPlots:
+    """What radars reported, scan by scan.
+
+    Parameters
+    ----------
+    radars : list of str
+        System area and identification code of each, ``"0/1"``.
+    start_time_s : float
+        The file's own time of its earliest record. All times count from there.
+    scan_radar, scan_s : (scans,)
+        Which radar, and when; a scan without a plot has one of these as well.
+    own_lat_deg, own_lon_deg, own_alt_m : (scans,)
+        Where the radar was, NaN where the file does not say.
+    scan : (plots,)
+        To which scan a plot belongs.
+    time_s : (plots,)
+    azimuth_rad, elevation_rad, range_m : (plots,)
+        Azimuth from north, (-pi, pi]; elevation NaN where no height was reported, or not from
+        where.
+    notes : list of str
+    """
+
+    radars: list[str]
+    start_time_s: float
+    scan_radar: IntArray
+    scan_s: FloatArray
+    own_lat_deg: FloatArray
+    own_lon_deg: FloatArray
+    own_alt_m: FloatArray
+    scan: IntArray
+    time_s: FloatArray
+    azimuth_rad: FloatArray
+    elevation_rad: FloatArray
+    range_m: FloatArray
+    notes: list[str]
+
+
+def read_asterix(path: str | PathLike[str], ownship: str | None = None) -> TrafficFile:
+    """Read the aircraft of an ASTERIX file: system tracks (062) and ADS-B reports (021).
+
+    Parameters
+    ----------
+    path : path-like
+        Data blocks, one after the other.
+    ownship : str, optional
+        Identification of the ownship, or ``"SAC/SIC/number"`` of one that has none; left out, the
+        aircraft called ``OWNSHIP``, or else the first one.
+
+    Returns
+    -------
+    TrafficFile
+        Times count from the earliest record; they go on over midnight. Heights are geometric ones
+        where a record has one, else flight levels, both taken as heights above the ellipsoid.
+
+    Raises
+    ------
+    TrafficFileError
+        With all problems of the file, by their records.
+    UsageError
+        The extra ``asterix`` is not installed.
+    """
+    records, notes = _records(path)
+    problems = Problems(str(path), of="record")
+    names = _names(records)
+    places = {name: SampleColumn(k + 1, name, 1.0) for k, name in enumerate(_NUMBERS)}
+    table = SampleTable(problems, 0, places, optional=_MOVES)
+    table.notes = notes
+    rows: dict[tuple[object, ...], dict[float, int]] = {}
+    samples: dict[int, list[str]] = {}
+    left_out = 0
+    for k, record in enumerate(records):
+        if record.category not in _AIRCRAFT:
+            continue
+        sample = _sample(record)
+        if sample is None:
+            left_out += 1
+            continue
+        mine = rows.setdefault(_key(record), {})
+        # Two records of one quantum of time are one instant: the later one counts.
+        samples.pop(mine.get(record.time_s, -1), None)
+        mine[record.time_s] = k
+        samples[k] = [names[_key(record)], *(repr(float(value)) for value in sample)]
+    for k, row in samples.items():
+        table.add_row(k + 1, row)
+    if left_out:
+        notes.append(f"{left_out} records without a position or a height were left out")
+    if not names:
+        problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
+    if ownship is None and _OWNSHIP in names.values():
+        ownship = _OWNSHIP
+    return table.finish(ownship, lambda columns: {**columns, **enu_velocity(columns)})
+
+
+_AIRCRAFT = (SYSTEM_TRACKS, ADS_B)
+_OWNSHIP = "OWNSHIP"
+
+
+def read_asterix_plots(path: str | PathLike[str]) -> RadarPlots:
+    """Read the plots of radars (048) in an ASTERIX file, with their north markers (034).
+
+    A plot belongs to its radar's last north marker; where a radar has none, plots of one time are
+    a scan. The elevation is that at which a height is met at the slant range, on the ellipsoid.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    RadarPlots
+
+    Raises
+    ------
+    TrafficFileError
+        It is no ASTERIX, or holds no plots.
+    UsageError
+        The extra ``asterix`` is not installed.
+    """
+    records, notes = _records(path)
+    radars = sorted({_source(r) for r in records if r.category == PLOTS})
+    if not radars:
+        raise TrafficFileError(str(path), ["there are no plots of a radar (048) in it"])
+    start_s = min(record.time_s for record in records)
+    code = {name: k for k, name in enumerate(radars)}
+    marked = {_source(r) for r in records if r.category == SERVICE}
+    scans: list[tuple[int, float, float, float, float]] = []
+    current: dict[str, int] = {}
+    plots: list[tuple[float, ...]] = []
+    for record in records:
+        radar = _source(record)
+        if radar not in code or record.category not in (SERVICE, PLOTS):
+            continue
+        values, now_s = record.values, record.time_s - start_s
+        if record.category == SERVICE and values.get("message") != 1:
+            continue
+        new = radar not in current or (radar not in marked and scans[current[radar]][1] != now_s)
+        if record.category == SERVICE or new:
+            at = (values.get(name, np.nan) for name in ("lat_deg", "lon_deg"))
+            own_alt_m = values.get("alt_m", np.nan) if record.category == SERVICE else np.nan
+            current[radar] = len(scans)
+            scans.append((code[radar], now_s, *at, own_alt_m))
+        if record.category == PLOTS and "range_m" in values:
+            alt_m = values.get("alt_m", values.get("flight_level_m", np.nan))
+            turned = np.radians(values["azimuth_deg"])
+            plots.append((current[radar], now_s, turned, alt_m, values["range_m"]))
+    scan, time_s, azimuth, height, far_m = np.array(plots).reshape(-1, 5).T
+    radar_of, scan_s, lat, lon, alt = np.array(scans).T
+    of = scan.astype(np.int64)
+    return RadarPlots(
+        radars, start_s, radar_of.astype(np.int64), scan_s, lat, lon, alt, of, time_s,
+        wrap_pi(azimuth), _elevations(azimuth, far_m, height, lat[of], alt[of]), far_m, notes,
+    )  # fmt: skip
+
+
+def _elevations(
+    azimuth_rad: FloatArray, far_m: FloatArray, to_m: FloatArray, lat_deg: FloatArray,
+    from_m: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return at which elevation a height is met at a slant range.
+
+    The ellipsoid is taken as the sphere that touches it along the line (Euler's radius).
+    """
+    meridian, across = radii_of_curvature(lat_deg)
+    north, east = np.cos(azimuth_rad) ** 2, np.sin(azimuth_rad) ** 2
+    radius = 1.0 / (north / meridian + east / across) + from_m
+    rise = to_m - from_m
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sine = (rise * (2.0 * radius + rise) - far_m**2) / (2.0 * radius * far_m)
+    return np.arcsin(np.clip(sine, -1.0, 1.0))
+
+
+def _records(path: str | PathLike[str]) -> tuple[list[AsterixRecord], list[str]]:
+    try:
+        data = read_input_bytes(Path(path))
+    except InputFileError as error:
+        raise TrafficFileError(str(path), [str(error)]) from None
+    return read_records(Path(path), data)
+
+
+def _source(record: AsterixRecord) -> str:
+    return f"{record.values.get('sac', 0)}/{record.values.get('sic', 0)}"
+
+
+def _key(record: AsterixRecord) -> tuple[object, ...]:
+    """Return what tells one aircraft of a file from another."""
+    if record.category == ADS_B and "number" in record.values:
+        return ADS_B, record.values["number"]  # an address is one aircraft's, whoever received it
+    return record.category, _source(record), record.values.get("number", 0)
+
+
+def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
+    """Return a name for each aircraft: its identification where no other has the same."""
+    said: dict[tuple[object, ...], str] = {}
+    for record in records:
+        if record.category in _AIRCRAFT and record.values.get("name"):
+            said.setdefault(_key(record), record.values["name"])
+    named = list(said.values())
+    found = {}
+    for record in records:
+        if record.category not in _AIRCRAFT or (key := _key(record)) in found:
+            continue
+        number = f"{key[-1]:06X}" if key[0] == ADS_B else f"{_source(record)}/{key[-1]}"
+        name = said.get(key)
+        found[key] = number if name is None else name if named.count(name) == 1 else (
+            f"{name} {number}"
+        )  # fmt: skip
+    return found
+
+
+def _sample(record: AsterixRecord) -> tuple[float, ...] | None:
+    """Return time, position and velocity of a record, NaN for no velocity."""
+    values = record.values
+    place = [
+        next((values[name] for name in names if name in values), None)
+        for names in (
+            ("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg"),
+            ("alt_m", "barometric_m", "flight_level_m"),
+        )
+    ]  # fmt: skip
+    if None in place:
+        return None
+    east, north = values.get("velocity_east_m_s"), values.get("velocity_north_m_s")
+    if "speed_m_s" in values and "track_deg" in values:
+        track = np.radians(values["track_deg"])
+        east, north = values["speed_m_s"] * np.sin(track), values["speed_m_s"] * np.cos(track)
+    up = values.get("velocity_up_m_s", values.get("barometric_climb_m_s"))
+    moves = (east, north, up) if None not in (east, north, up) else (np.nan,) * 3
+    return record.time_s, *place, *moves

@@ -1,0 +1,316 @@
+"""Records of EUROCONTROL's ASTERIX, categories 021, 034, 048 and 062, out of numbers and back.
+
+One table says where each quantity stands, its least significant bit, how many bits it has and
+whether it has a sign: writing and reading go by it. Latitudes and longitudes are in degrees,
+heights in m, as everywhere here; the time of day is that since the last midnight.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from components.formats.text_rows import TrafficFileError
+from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
+from dsa_des.errors import UsageError
+from dsa_des.errors.extras import library
+
+DAY_S = 86400.0
+#: Reports of a radar's own service, plots, system tracks, and ADS-B reports.
+SERVICE, PLOTS, SYSTEM_TRACKS, ADS_B = 34, 48, 62, 21
+NORTH_MARKER = 1
+
+_TIME_S = 1.0 / 128.0
+_LEVEL_M = 25.0 * FOOT_M
+_HEIGHT_M = 6.25 * FOOT_M
+_TURN_DEG = 360.0 / 2**16
+_CLIMB_MPS = 6.25 * FOOT_M / 60.0
+
+
+class _Field(NamedTuple):
+    """Where a quantity stands (item, part of it), its least bit, how many bits, and its sign."""
+
+    item: str
+    part: str | None
+    step: float
+    bits: int
+    signed: bool = False
+    #: For what goes round, as angles do: all of it.
+    turn: float = math.inf
+
+
+#: EUROCONTROL-SPEC-0149, parts 2b (034), 4 (048), 9 (062) and 12 (021).
+FIELDS: Mapping[int, Mapping[str, _Field]] = {
+    SERVICE: {
+        "sac": _Field("010", "SAC", 1, 8),
+        "sic": _Field("010", "SIC", 1, 8),
+        "message": _Field("000", None, 1, 8),
+        "time_of_day_s": _Field("030", None, _TIME_S, 24, turn=DAY_S),
+        "alt_m": _Field("120", "HGT", 1.0, 16, True),
+        "lat_deg": _Field("120", "LAT", 180.0 / 2**23, 24, True),
+        "lon_deg": _Field("120", "LON", 180.0 / 2**23, 24, True, 360.0),
+    },
+    PLOTS: {
+        "sac": _Field("010", "SAC", 1, 8),
+        "sic": _Field("010", "SIC", 1, 8),
+        "time_of_day_s": _Field("140", None, _TIME_S, 24, turn=DAY_S),
+        "simulated": _Field("020", "SIM", 1, 1),
+        "range_m": _Field("040", "RHO", NAUTICAL_MILE_M / 256.0, 16),
+        "azimuth_deg": _Field("040", "THETA", _TURN_DEG, 16, turn=360.0),
+        "alt_m": _Field("110", "3DH", _LEVEL_M, 14, True),
+        "flight_level_m": _Field("090", "FL", _LEVEL_M, 14, True),
+    },
+    SYSTEM_TRACKS: {
+        "sac": _Field("010", "SAC", 1, 8),
+        "sic": _Field("010", "SIC", 1, 8),
+        "time_of_day_s": _Field("070", None, _TIME_S, 24, turn=DAY_S),
+        "lat_deg": _Field("105", "LAT", 180.0 / 2**25, 32, True),
+        "lon_deg": _Field("105", "LON", 180.0 / 2**25, 32, True, 360.0),
+        "velocity_east_m_s": _Field("185", "VX", 0.25, 16, True),
+        "velocity_north_m_s": _Field("185", "VY", 0.25, 16, True),
+        "velocity_up_m_s": _Field("220", None, _CLIMB_MPS, 16, True),
+        "number": _Field("040", None, 1, 16),
+        "tentative": _Field("080", "CNF", 1, 1),
+        "simulated": _Field("080", "SIM", 1, 1),
+        "last": _Field("080", "TSE", 1, 1),
+        "coasted": _Field("080", "CST", 1, 1),
+        "name": _Field("245", "CHR", 0, 48),
+        "alt_m": _Field("130", None, _HEIGHT_M, 16, True),
+        "flight_level_m": _Field("136", None, _LEVEL_M, 16, True),
+        "barometric_m": _Field("135", "CTB", _LEVEL_M, 15, True),
+    },
+    ADS_B: {
+        "sac": _Field("010", "SAC", 1, 8),
+        "sic": _Field("010", "SIC", 1, 8),
+        "time_of_day_s": _Field("073", None, _TIME_S, 24, turn=DAY_S),
+        "applicable_s": _Field("071", None, _TIME_S, 24, turn=DAY_S),
+        "simulated": _Field("040", "SIM", 1, 1),
+        "number": _Field("080", None, 1, 24),
+        "lat_deg": _Field("131", "LAT", 180.0 / 2**30, 32, True),
+        "lon_deg": _Field("131", "LON", 180.0 / 2**30, 32, True, 360.0),
+        "coarse_lat_deg": _Field("130", "LAT", 180.0 / 2**23, 24, True),
+        "coarse_lon_deg": _Field("130", "LON", 180.0 / 2**23, 24, True, 360.0),
+        "alt_m": _Field("140", None, _HEIGHT_M, 16, True),
+        "flight_level_m": _Field("145", None, _LEVEL_M, 16, True),
+        "speed_m_s": _Field("160", "GS", NAUTICAL_MILE_M / 2**14, 15),
+        "track_deg": _Field("160", "TA", _TURN_DEG, 16, turn=360.0),
+        "velocity_up_m_s": _Field("157", "GVR", _CLIMB_MPS, 15, True),
+        "barometric_climb_m_s": _Field("155", "BVR", _CLIMB_MPS, 15, True),
+        "name": _Field("170", None, 0, 48),
+    },
+}  # fmt: skip
+#: In which order a file holds what is of one instant.
+ORDER = {SERVICE: 0, PLOTS: 1, SYSTEM_TRACKS: 2, ADS_B: 3}
+
+
+class AsterixRecord(NamedTuple):
+    """One record: its category, its time since the file's first midnight, and its quantities."""
+
+    category: int
+    time_s: float
+    values: Mapping[str, Any]
+
+
+def callsign(name: str) -> str | None:
+    """Return the first eight letters and digits of a name, an identification; None without any."""
+    plain = "".join(c for c in name.upper() if c.isascii() and c.isalnum())
+    return plain[:8] or None
+
+
+def write_records(records: Sequence[AsterixRecord]) -> bytes:
+    """Return records as data blocks, in order of time; those of one instant share blocks.
+
+    Raises
+    ------
+    UsageError
+        A quantity does not fit into its bits, or the extra ``asterix`` is not installed.
+    """
+    cats = _categories()
+    blocks: list[tuple[tuple[int, float], list[Any]]] = []
+    for record in sorted(records, key=lambda r: (r.time_s, ORDER[r.category])):
+        kind = cats[record.category]
+        made = kind.cv_uap.cv_record.create(_items(record))
+        key = record.category, record.time_s
+        if not blocks or blocks[-1][0] != key or len(blocks[-1][1]) >= _MOST_OF_A_BLOCK:
+            blocks.append((key, []))
+        blocks[-1][1].append(made)
+    return b"".join(cats[key[0]].create(made).unparse().to_bytes() for key, made in blocks)
+
+
+#: A block holds 65,535 bytes, and no record of ours has more than 60.
+_MOST_OF_A_BLOCK = 1000
+
+
+def _categories() -> dict[int, Any]:
+    """Return the newest edition of each category that we know."""
+    generated = library("asterix.generated", "asterix", "ASTERIX")
+    return {number: generated.manifest["CATS"][number][-1] for number in FIELDS}
+
+
+def _items(record: AsterixRecord) -> dict[str, Any]:
+    """Return a record's items as the library makes them; those without a quantity are left out."""
+    values = {**record.values, "time_of_day_s": record.time_s}
+    raw = {
+        name: _raw(record, name, field, values[name])
+        for name, field in FIELDS[record.category].items()
+        if values.get(name) is not None
+    }
+
+    def group(*parts: tuple[str, str]) -> Any:
+        return tuple((part, raw[name]) for part, name in parts) if parts[0][1] in raw else None
+
+    common = {"010": group(("SAC", "sac"), ("SIC", "sic"))}
+    place = (("LAT", "lat_deg"), ("LON", "lon_deg"))
+    if record.category == SERVICE:
+        return common | {
+            "000": raw["message"],
+            "030": raw["time_of_day_s"],
+            "120": group(("HGT", "alt_m"), *place),
+        }
+    if record.category == PLOTS:
+        height = (0, ("3DH", raw["alt_m"])) if "alt_m" in raw else None
+        return common | {
+            "140": raw["time_of_day_s"],
+            # A single detection by primary radar.
+            "020": ((("TYP", 1), ("SIM", raw["simulated"]), ("RDP", 0), ("SPI", 0), ("RAB", 0),
+                     None),),
+            "040": group(("RHO", "range_m"), ("THETA", "azimuth_deg")),
+            "110": height,
+        }  # fmt: skip
+    if record.category == SYSTEM_TRACKS:
+        first = (("MON", 1), ("SPI", 0), ("MRH", 1), ("SRC", 1), ("CNF", raw["tentative"]), None)
+        second = (("SIM", raw["simulated"]), ("TSE", raw["last"]), ("TSB", 0), ("FPC", 0),
+                  ("AFF", 0), ("STP", 0), ("KOS", 0), None)  # fmt: skip
+        third = (("AMA", 0), ("MD4", 0), ("ME", 0), ("MI", 0), ("MD5", 0), None)
+        fourth = (("CST", raw["coasted"]), ("PSR", 0), ("SSR", 0), ("MDS", 0), ("ADS", 0),
+                  ("SUC", 0), ("AAC", 0), None)  # fmt: skip
+        return common | {
+            "070": raw["time_of_day_s"],
+            "105": group(*place),
+            "185": group(("VX", "velocity_east_m_s"), ("VY", "velocity_north_m_s")),
+            "220": raw.get("velocity_up_m_s"),
+            "040": raw["number"],
+            "080": (first, second, third, fourth),
+            "245": (("STI", 1), 0, ("CHR", raw["name"])) if "name" in raw else None,
+            "130": raw["alt_m"],
+        }
+    return common | {
+        "073": raw["time_of_day_s"],
+        "040": (
+            (("ATP", 0), ("ARC", 0), ("RC", 0), ("RAB", 0), None),
+            (("DCR", 0), ("GBS", 0), ("SIM", raw["simulated"]), ("TST", 0), ("SAA", 0), ("CL", 0),
+             0, None),
+        ),
+        "080": raw["number"],
+        "131": group(*place),
+        "140": raw["alt_m"],
+        "160": (("RE", 0), *group(("GS", "speed_m_s"), ("TA", "track_deg")))
+        if "speed_m_s" in raw
+        else None,
+        "157": (("RE", 0), ("GVR", raw["velocity_up_m_s"])) if "velocity_up_m_s" in raw else None,
+        "170": raw.get("name"),
+        # Version 2 of the link, Mode S extended squitter (DO-260B).
+        "210": (0, ("VNS", 0), ("VN", 2), ("LTT", 2)),
+    }  # fmt: skip
+
+
+def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
+    """Return a quantity as the whole number that its bits hold, or a text as it is."""
+    if name == "name":
+        return value
+    steps = round(value / field.step)
+    if field.turn < math.inf:
+        turn = round(field.turn / field.step)
+        steps = (steps + turn // 2) % turn - turn // 2 if field.signed else steps % turn
+    low = -(2 ** (field.bits - 1)) if field.signed else 0
+    if not low <= steps < low + 2**field.bits:
+        raise UsageError(
+            f"ASTERIX: category {record.category:03d}, time {record.time_s:g} s: {name} = "
+            f"{value:g} does not fit: item {field.item} holds {low * field.step:g} to "
+            f"{(low + 2**field.bits - 1) * field.step:g}"
+        )
+    return steps % 2**field.bits
+
+
+def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
+    """Return the records of the categories that we know, in the order of the file, and notes.
+
+    Raises
+    ------
+    TrafficFileError
+        What is no data block or no record, with the byte at which it begins.
+    UsageError
+        The extra ``asterix`` is not installed.
+    """
+    cats = _categories()
+    records: list[AsterixRecord] = []
+    left_out: dict[int, int] = {}
+    now_s = math.nan
+    timeless = 0
+    for at, category, raw in _blocks(path, data):
+        if category not in cats:
+            left_out[category] = left_out.get(category, 0) + 1
+            continue
+        found = cats[category].cv_uap.parse(raw)
+        if isinstance(found, ValueError):
+            raise _wrong(
+                path, at, f"its records are none of category {category:03d}, edition "
+                f"{'.'.join(map(str, cats[category].cv_edition))} ({found})"
+            )  # fmt: skip
+        for one in found:
+            values = _values(category, one)
+            time_s = values.pop("time_of_day_s", values.get("applicable_s"))
+            if time_s is None:
+                timeless += 1
+                continue
+            if now_s == now_s:  # the day on which it is nearest to the record before
+                time_s += DAY_S * round((now_s - time_s) / DAY_S)
+            now_s = time_s
+            records.append(AsterixRecord(category, time_s, values))
+    notes = [
+        f"{count} data blocks of category {category:03d} were left out"
+        for category, count in sorted(left_out.items())
+    ]
+    if timeless:
+        notes.append(f"{timeless} records without a time of day were left out")
+    return records, notes
+
+
+def _wrong(path: Path, at: int, problem: str) -> TrafficFileError:
+    return TrafficFileError(str(path), [f"the data block at byte {at}: {problem}"])
+
+
+def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, Any]]:
+    """Give the byte at which each data block begins, its category, and its records as bits."""
+    base = library("asterix.base", "asterix", "ASTERIX")
+    at = 0
+    if not data:
+        raise TrafficFileError(str(path), ["the file is empty: data blocks of ASTERIX are needed"])
+    while at < len(data):
+        size = int.from_bytes(data[at + 1 : at + 3], "big")
+        if size < 3 or at + 3 > len(data):
+            raise _wrong(path, at, "says that it has less than 3 bytes: this is no ASTERIX")
+        if at + size > len(data):
+            raise _wrong(path, at, f"has {size} bytes, but the file ends at byte {len(data)}")
+        yield at, data[at], base.Bits.from_bytes(data[at + 3 : at + size])
+        at += size
+
+
+def _values(category: int, record: Any) -> dict[str, Any]:
+    """Return the quantities of a record that are there."""
+    found: dict[str, Any] = {}
+    for name, field in FIELDS[category].items():
+        item = record.get_item(field.item)
+        if item is not None and field.part is not None:
+            item = item.variation.get_item(field.part)
+        if item is None:
+            continue
+        content = item.variation.content
+        if name == "name":
+            found[name] = content.as_string().strip()
+            continue
+        steps = content.as_uint()
+        if field.signed and steps >= 2 ** (field.bits - 1):
+            steps -= 2**field.bits
+        found[name] = steps * field.step
+    return found

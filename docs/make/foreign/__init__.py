@@ -1,0 +1,1 @@
+"""Makers of pages about other people's parts."""
