@@ -38,6 +38,7 @@ ENDS_S = {
     "avoidance/crossing_tracked_late.toml": 105,
     "benchmark/closed_loop_risk.toml": 60,
     "operator/session.toml": 15,
+    "optical/pictures.toml": 10,
     "systems/afrl_tracked.toml": 25,
     "tracking/architectures.toml": 10,
     "tracking/cueing.toml": 20,

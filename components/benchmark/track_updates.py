@@ -50,7 +50,7 @@ class Listening(ExtendedKalman):
         return super().run(wake)
 
 
-def heard(replicas: int, targets: int) -> Listening:
+def listening(replicas: int, targets: int) -> Listening:
     """Return the tracker of a run of some replicas, with all that it was given.
 
     Three sensors see every target at every look.
@@ -65,7 +65,7 @@ def heard(replicas: int, targets: int) -> Listening:
 
 def updates(replicas: int, targets: int) -> Callable[[], object]:
     """Return what tracks all targets of some replicas anew, gating and association included."""
-    known = heard(replicas, targets)
+    known = listening(replicas, targets)
 
     def track() -> None:
         block = ExtendedKalman(known.name, known.p, known.context)
@@ -209,7 +209,7 @@ _FEW = 27
 
 def plainly(targets: int) -> tuple[int, Callable[[], object]]:
     """Return how many updates the plain loop does in one run, and what does them."""
-    block = heard(1, targets)
+    block = listening(1, targets)
     scans, places = _looks(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     first, rest = _started(scans, places, block.p.start_speed_m_s), looks[1:]
@@ -227,7 +227,7 @@ def by_stone_soup(targets: int) -> tuple[int, Callable[[], object]] | None:
         return None
     from components.stone_soup.objects import Poses, detections, instant
 
-    block = heard(1, targets)
+    block = listening(1, targets)
     scans, places = _looks(block)
     poses = Poses(places)
     looks = []

@@ -32,6 +32,7 @@ class CameraSights:
         self._cameras = {n: c for n, c in components.items() if isinstance(c, Camera)}
         self._seen: dict[str, FloatArray] = {}
         self._roster: Roster | None = None
+        self._ticks_per_s = 1
         #: The latest positions and attitudes of all aircraft: what there is to be seen.
         self.states: TrafficStates | None = None
 
@@ -39,7 +40,7 @@ class CameraSights:
         """Take in what a camera detected."""
         if block not in self._cameras or "pixels" not in message.extras:
             return
-        self._roster = message.roster
+        self._roster, self._ticks_per_s = message.roster, ticks_per_s
         real = np.flatnonzero(message.target >= 0)
         if len(real) == 0:
             return
@@ -94,13 +95,19 @@ class CameraSights:
         line = horizon(own_attitude, (azimuth, elevation), _dip_rad(own.alt_m), pixel_rad)
         strength = camera.p.static_weight * pixels
         contrast = (margin + camera.detector.threshold) / strength if strength > 0.0 else 0.0
+        # A camera that renders what it sees shows just that.
+        patches = getattr(camera, "patches", {})
+        patch = patches.get((target, round(seen_s * self._ticks_per_s)))
+        if patch is not None:  # how far a spot stands out is no measure of its contrast
+            contrast = math.nan
         return {
+            **({} if patch is None else {"patch": patch.tolist()}),
             "target": contact,
             "sensor": printable(name),
             "infrared": camera.areas == "ir",
             "age": round(max(time_s - seen_s, 0.0), 2),
             "pixels": round(pixels, 1),
-            "contrast": round(contrast, 3),
+            "contrast": None if math.isnan(contrast) else round(contrast, 3),
             "background": "sky" if line.height <= 0.0 else "ground",
             "horizon": round(line.height, 1),
             "tilt": round(math.degrees(line.tilt_rad), 2),

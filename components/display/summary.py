@@ -14,8 +14,8 @@ from components.messages.alerts import AlertLevels
 from components.messages.detections import Detections
 from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
 from components.messages.steering import Manoeuvres
+from components.metrics.censored import END, START, in_scan
 from components.metrics.true_states import TargetsInFrame
-from components.sensor.censored import END, START, in_scan
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.record.sinks import Observer

@@ -1,4 +1,4 @@
-"""A run as ASTERIX: plots of radars (048, with 034), tracks (062), and the ownship (021)."""
+"""A run as ASTERIX: plots (048, with 034), tracks (062), ADS-B received and the ownship's (021)."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -18,7 +18,7 @@ from components.formats.asterix_records import (
     write_records,
 )
 from components.geometry import body_to_ned, local_axes, spherical_from_enu
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.errors import UsageError
 
 _POSITION = ("own_lat_deg", "own_lon_deg", "own_alt_m")
@@ -45,7 +45,10 @@ def asterix_bytes(run: RecordedTables) -> bytes:
         }
     )
     sic = {name: number for number, name in enumerate(blocks, start=1)}
-    records = [*_plots(run, sic), *_state_tracks(run, sic), *_held_tracks(run, sic), *_own(run)]
+    records = [
+        *_plots(run, sic), *_received(run, sic), *_state_tracks(run, sic), *_held_tracks(run, sic),
+        *_own(run),
+    ]  # fmt: skip
     if not records:
         raise UsageError(
             f"{run.folder}: holds nothing that ASTERIX has a record for: detections or tracks with "
@@ -71,7 +74,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = [run.numbers("detections", n) for n in ("azimuth_rad", "elevation_rad", "range_m")]
-    there = np.flatnonzero(np.isfinite(lines).all(axis=0))
+    there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_says_where(run))
     names = run.texts("detections", "block")
     radars = {names[row] or "" for row in there.tolist()}
     yield from _scans(run, sic, radars)
@@ -101,6 +104,46 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
                 "alt_m": float(ends[2, k]),
             },
         )
+
+
+def _says_where(run: RecordedTables) -> BoolArray:
+    """Return which detections are reports of an aircraft that says where it is."""
+    if "reported_lat_deg" not in run.table("detections").column_names:
+        return np.zeros(run.tables["detections"].num_rows, dtype=bool)
+    return np.isfinite(run.numbers("detections", "reported_lat_deg"))
+
+
+def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+    """Give what aircraft say of themselves, once for each position that was received.
+
+    Heights are pressure altitudes.
+    """
+    if "detections" not in run.tables or not _says_where(run).any():
+        return
+    names = ("lat_deg", "lon_deg", "alt_m", "north_m_s", "east_m_s", "climb_m_s", "s")
+    reported = {name: run.numbers("detections", f"reported_{name}") for name in names}
+    address = run.values("detections", "address")
+    blocks, targets = (run.texts("detections", name) for name in ("block", "target"))
+    told: set[tuple[str, int, float]] = set()
+    for row in np.flatnonzero(_says_where(run)).tolist():
+        say = {name: float(values[row]) for name, values in reported.items()}
+        key = blocks[row] or "", int(address[row]), say["s"]
+        if key in told or not np.isfinite(say["s"]):
+            continue
+        told.add(key)
+        values = {
+            "sac": _SAC, "sic": sic[key[0]], "number": key[1] % 2**24, "simulated": 1,
+            "name": callsign(targets[row] or ""), "lat_deg": say["lat_deg"],
+            "lon_deg": say["lon_deg"],
+        }  # fmt: skip
+        if np.isfinite(say["alt_m"]):
+            values["flight_level_m"] = say["alt_m"]
+        if np.isfinite(say["north_m_s"]):
+            values["speed_m_s"] = float(np.hypot(say["north_m_s"], say["east_m_s"]))
+            values["track_deg"] = float(np.degrees(np.arctan2(say["east_m_s"], say["north_m_s"])))
+        if np.isfinite(say["climb_m_s"]):
+            values["barometric_climb_m_s"] = say["climb_m_s"]
+        yield AsterixRecord(ADS_B, say["s"], values)
 
 
 def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:

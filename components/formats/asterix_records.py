@@ -203,7 +203,11 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
         ),
         "080": raw["number"],
         "131": group(*place),
-        "140": raw["alt_m"],
+        "140": raw.get("alt_m"),
+        "145": raw.get("flight_level_m"),
+        "155": (("RE", 0), ("BVR", raw["barometric_climb_m_s"]))
+        if "barometric_climb_m_s" in raw
+        else None,
         "160": (("RE", 0), *group(("GS", "speed_m_s"), ("TA", "track_deg")))
         if "speed_m_s" in raw
         else None,

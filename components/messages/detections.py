@@ -133,7 +133,7 @@ class SensorOffer:
         chance; None where nobody says.
     unforeseen : bool
         Whether they may come later still, as they queue.
-    untold_across_m2 : float
+    unstated_across_m2 : float
         Variance of the ownship's own place across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
     """
@@ -152,7 +152,7 @@ class SensorOffer:
     latest_s: Fraction | None = None
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
-    untold_across_m2: float = 0.0
+    unstated_across_m2: float = 0.0
 
 
 def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Manoeuvre(NamedTuple):
 
 @dataclass(eq=False)
 class Manoeuvres(Message):
-    """Turns, climbs and changes of speed that the ownship is told to fly, one per row.
+    """Turns, climbs and changes of speed that the ownship is to fly, one per row.
 
     Parameters
     ----------
@@ -98,19 +98,20 @@ class Manoeuvres(Message):
                 setattr(self, name, np.zeros(len(self.tick)))
 
     @classmethod
-    def of(cls, ticks: Sequence[int], told: Sequence[Manoeuvre]) -> Self:
-        """Return the message of manoeuvres, each told at an instant."""
-        parts = np.array(told, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
+    def of(cls, ticks: Sequence[int], manoeuvres: Sequence[Manoeuvre]) -> Self:
+        """Return the message of manoeuvres, each at an instant of its own."""
+        parts = np.array(manoeuvres, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
         return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
 
     @classmethod
-    def at_rows(cls, ticks: IntArray, told: Mapping[int, Manoeuvre]) -> Self | None:
-        """Return the message of manoeuvres told at some of the instants `ticks`, by their places.
+    def at_rows(cls, ticks: IntArray, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
+        """Return the message of manoeuvres at some of the instants `ticks`, by their places.
 
         None without any.
         """
-        rows = sorted(told)
-        return cls.of(ticks[rows].tolist(), [told[row] for row in rows]) if told else None
+        rows = sorted(manoeuvres)
+        each = [manoeuvres[row] for row in rows]
+        return cls.of(ticks[rows].tolist(), each) if rows else None
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.metrics.censored import END, START, in_scan, said
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.flown_flights import Read, RecordedManoeuvres, each_alone, read_flights
 from components.metrics.losses import closest, losses_s
@@ -23,7 +24,6 @@ from components.metrics.rows import (
     sensors_of,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
-from components.sensor.censored import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Parameters

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.sensor.censored import START, in_scan, said
+from components.metrics.censored import START, in_scan, said
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters

@@ -115,14 +115,14 @@ class Cells:
         )
         self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
-        #: Which lie in a cone that a cue told of; None where none does.
+        #: Which lie in a cone of a cue; None where none does.
         self.cued: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.target)
 
     def is_cued(self) -> BoolArray:
-        """Return which cells lie in a cone that a cue told of."""
+        """Return which cells lie in a cone of a cue."""
         if self.cued is None:
             return np.zeros(len(self), dtype=bool)
         return self.cued
@@ -202,13 +202,13 @@ class Cells:
 
     @cached_property
     def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not told."""
-        told = self._targets.own_attitude
-        if told is None:
+        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not known."""
+        attitude = self._targets.own_attitude
+        if attitude is None:
             nothing = np.zeros(len(self))
             return nothing, nothing, nothing
         row = self._flat // self._width
-        yaw, pitch, roll = (told[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
+        yaw, pitch, roll = (attitude[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
         return yaw, pitch, roll
 
     def of_target(self, column: FloatArray) -> AnyArray:

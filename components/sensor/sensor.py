@@ -174,15 +174,15 @@ class Sensor(Measuring):
                 parts = tuple(dict.fromkeys(part for one in angles for part in one.parts))
                 worst = LastingError(max(one.step for one in angles), parts)
                 lasting |= {"azimuth": worst, "elevation": worst}
-        untold_m2 = 0.0
+        unstated_m2 = 0.0
         noise = navigation_noise(self.context)
         if any(map(any, noise)):  # differs with the pose
-            untold_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
+            unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
             lasting = with_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
-            lasting=lasting, clock=self.p.clock_spec, untold_across_m2=untold_m2, **constant,
+            lasting=lasting, clock=self.p.clock_spec, unstated_across_m2=unstated_m2, **constant,
         )  # fmt: skip
 
     @cached_property

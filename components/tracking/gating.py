@@ -145,21 +145,21 @@ class _PairVariance:
     def __init__(
         self, rules: TrackerRules, part: TrackStore, pose: SensorPose, scans: Scans
     ) -> None:
-        self._scans, self._untold = scans, rules.untold_across_m2
+        self._scans, self._unstated = scans, rules.unstated_across_m2
         #: What is added at most to each track's azimuth and elevation.
         self.most: FloatArray | None = None
-        if self._untold is not None:
+        if self._unstated is not None:
             _, elevation, range_m = expected(Kind(True), part.state0, pose)
             range2 = np.maximum(range_m, 1.0) ** 2
             level2 = np.maximum(np.cos(elevation), _LEAST_COS) ** 2
             self._by_m2 = np.stack([1.0 / (range2 * level2), 1.0 / range2])
-            self.most = self._untold.max() * self._by_m2
+            self.most = self._unstated.max() * self._by_m2
 
     def __call__(self, track: IntArray, cells: IntArray, rows: list[int]) -> FloatArray:
         variance = _picked(self._scans.variance, rows, cells)
-        if self._untold is not None:
+        if self._unstated is not None:
             source = self._scans.source[:2][:, cells]
-            across_m2 = np.where(source < 0, 0.0, self._untold[source])
+            across_m2 = np.where(source < 0, 0.0, self._unstated[source])
             variance[:2] += across_m2 * selected(self._by_m2, track)
         return variance
 

@@ -225,7 +225,7 @@ class TrackerRules:
     start_range_m: tuple[float, float]  # mean and deviation assumed of what is seen angle-only
     rates_of: int  # mask of the sensors whose range rates are used
     lasting: LastingErrors | None  # what of the sensors' errors is not new at every look
-    untold_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
+    unstated_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
 
     @classmethod
     def of(
@@ -244,12 +244,12 @@ class TrackerRules:
             default=_FARTHEST_M,
         )
         assumed = p.assumed_range_m or 0.25 * farthest
-        untold = [o.untold_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
+        unstated = [o.unstated_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
         used = [not why_no_range_rates(p, offer) for offer in known]
         return cls(
             p, estimator, ticks_per_s, fields, log_densities(fields, p.false_alarms_per_scan),
             (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
-            LastingErrors.of(offers, sensors), np.array(untold) if any(untold) else None,
+            LastingErrors.of(offers, sensors), np.array(unstated) if any(unstated) else None,
         )  # fmt: skip
 
     @property

@@ -99,10 +99,10 @@ def _describe_table(
 
 
 def _print_rows(
-    console: Any, heads: typing.Sequence[str], rows: typing.Iterable[typing.Sequence[Any]]
+    console: Any, headings: typing.Sequence[str], rows: typing.Iterable[typing.Sequence[Any]]
 ) -> None:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in heads:
+    for heading in headings:
         table.add_column(heading, no_wrap=heading.startswith("  "))
     for row in rows:
         table.add_row(*row)

@@ -257,7 +257,7 @@ def _compare(
     kinds = {result.name: result.kind for result in other.results if result.is_number}
     own, known = ({result.name for result in side.results} for side in (one, other))
     metrics = [name for name in _shown(one, only) if name in kinds]
-    heads = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
+    headings = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
              "unpaired interval", "narrower"]  # fmt: skip
     lines: list[list[str]] = []
     theirs = dict(other.rows.each_place())
@@ -286,14 +286,14 @@ def _compare(
                  times(d.narrower)]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
-    told = [r for r in one.results if r.name in known and (not only or r.name in only)]
-    say_what_changed(names, places, told)
+    shown = [r for r in one.results if r.name in known and (not only or r.name in only)]
+    say_what_changed(names, places, shown)
     for who, there, others in ((names[0], one, known), (names[1], other, own)):
         alone = [r.name for r in there.results if r.name not in others]
         if alone:
             say(f"only {shortened(who)} has {shortened(', '.join(alone), 300)}")
     title = f"{names[1]} less {names[0]}, pair by pair"
-    print_table(console(160), title, heads, lines, group=len(one.rows.axes))
+    print_table(console(160), title, headings, lines, group=len(one.rows.axes))
     for _, sides in places:
         for metric in metrics:
             _farthest_apart(metric, sides, names)

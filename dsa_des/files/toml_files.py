@@ -30,9 +30,9 @@ def toml_reason(error: Exception) -> str:
     """
     found = _PLACE.fullmatch(str(error))
     what, place = (found[1], f" ({found[2]})") if found else (str(error), "")
-    for start, told in _WITH_CONTENT:
+    for start, meaning in _WITH_CONTENT:
         if what.startswith(start):
-            return told + place
+            return meaning + place
     return (what if _WITHOUT.fullmatch(what) else "something else stands there") + place
 
 

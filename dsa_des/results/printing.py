@@ -25,8 +25,8 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     level = f"{100 * study.confidence:g} %"
     unit = "encounters" if study.over else "replicas"
     expected = any(line.expected is not None for line in lines)
-    heads = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
-    heads += ["without"]
+    headings = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
+    headings += ["without"]
     rows = []
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
@@ -37,10 +37,10 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         if expected:
             row.append("" if line.expected is None else short(line.expected))
         rows.append(row)
-    heads += ["analytic"] if expected else []
+    headings += ["analytic"] if expected else []
     notes = {result.name: result.meaning for result in tables.results}
     group = len(tables.rows.axes)
-    print_table(console, shortened(study.title), heads, rows, group=group, notes=notes)
+    print_table(console, shortened(study.title), headings, rows, group=group, notes=notes)
     if study.over:
         console.print(
             "intervals are over encounters like these, of which each counts once, whatever its "
@@ -145,8 +145,8 @@ def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
     """Print of what each ratio is made, and both of its intervals."""
     rows = [[*map(short, line.at), *ratio_cells(line)] for line in lines[:_MOST_SHOWN]]
     level = f"{100 * tables.record.confidence:g} %"
-    heads = [*tables.rows.axes, *RATIO_HEADS]
-    print_table(console, f"parts of the ratios, {level} intervals", heads, rows,
+    headings = [*tables.rows.axes, *RATIO_HEADS]
+    print_table(console, f"parts of the ratios, {level} intervals", headings, rows,
                 group=len(tables.rows.axes))  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
     assert tables.baseline is not None
     axis, baseline = tables.baseline
     others = [name for name in tables.rows.axes if name != axis]
-    heads = [axis, *others, "result", "difference", "paired interval", "pairs",
+    headings = [axis, *others, "result", "difference", "paired interval", "pairs",
              "only one has it", "unpaired interval", "narrower"]  # fmt: skip
     rows = []
     shown = [item for item in tables.compared if item.result.name in names]
@@ -183,7 +183,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
              interval_text(d.unpaired).rstrip(" *"), times(d.narrower)]
         )  # fmt: skip
     title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
-    print_table(console, title, heads, rows, group=1 + len(others))
+    print_table(console, title, headings, rows, group=1 + len(others))
     if tables.record.compare_weight is not None:
         _show_event_ratios(console, tables, shown)
 
@@ -204,9 +204,9 @@ def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) 
     if rows:
         console.print()
         title = f"events by those at {shortened(axis)} = {short(baseline)}, weighted by "
-        heads = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
+        headings = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
                  "effective size", ""]  # fmt: skip
-        print_table(console, title + str(tables.record.compare_weight), heads, rows,
+        print_table(console, title + str(tables.record.compare_weight), headings, rows,
                     group=1 + len(others))  # fmt: skip
 
 

@@ -141,7 +141,7 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
         if line.result.name == requirement.metric:
             others = (*line.at[:place], *line.at[place + 1 :])
             found.setdefault(others, []).append(line)
-    told = []
+    sentences = []
     for at, some in found.items():
         dearest_first = some if requirement.cheap_last else some[::-1]
         sure = [
@@ -152,7 +152,7 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
             requirement.met(line.estimate.value, line.estimate.value) for line in dearest_first
         ]
         last, guess = _run(sure), _run(likely)
-        told.append(
+        sentences.append(
             Answer(
                 requirement, at,
                 dearest_first[last - 1].at[place] if last else None,
@@ -161,7 +161,7 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
                 any(sure[last:]),
             )
         )  # fmt: skip
-    return told
+    return sentences
 
 
 def _run(good: Sequence[bool]) -> int:

@@ -108,13 +108,13 @@ class Tables:
             name: [line.at[k] for line in lines] for k, name in enumerate(self.rows.axes)
         }
         columns["result"] = [line.result.name for line in lines]
-        told = [line.ratio for line in lines if line.ratio is not None]
+        known = [line.ratio for line in lines if line.ratio is not None]
         for name in (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
             "mitigated_probability", "few", "reason",
         ):  # fmt: skip
-            columns[name] = [getattr(one, name) for one in told]
+            columns[name] = [getattr(one, name) for one in known]
         for method in ("gamma", "bootstrap"):
             both = [{r.method: r for r in (line.ratio, line.other) if r is not None}
                     for line in lines]  # fmt: skip

@@ -239,8 +239,8 @@ def _other_meaning(
         return None
     if parameter not in fields or parameter not in cls.Parameters.model_fields:
         return None
-    told = [of[parameter].description or "" for of in (fields, cls.Parameters.model_fields)]
-    begin = [re.split(r"[,;:(]", text)[0].strip().rstrip(".") for text in told]
+    descriptions = [of[parameter].description or "" for of in (fields, cls.Parameters.model_fields)]
+    begin = [re.split(r"[,;:(]", text)[0].strip().rstrip(".") for text in descriptions]
     return None if begin[0] == begin[1] or not all(begin) else (begin[0], begin[1])
 
 

@@ -97,8 +97,15 @@ def read_scene_file(path: Path | str) -> SceneFile:
     data = reader.file(path, (), ())
     if problems:
         raise SceneError(problems)
-    told = reader.inheritance
-    return SceneFile(path, data, reader.sources, told.of_other_type, told.beside, told.replaced)
+    inheritance = reader.inheritance
+    return SceneFile(
+        path,
+        data,
+        reader.sources,
+        inheritance.of_other_type,
+        inheritance.beside,
+        inheritance.replaced,
+    )
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
@@ -123,8 +130,15 @@ def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
     if problems:
         raise SceneError(replace(p, source=name) if p.source == str(place) else p for p in problems)
     sources = {k: name if file == str(place) else file for k, file in reader.sources.items()}
-    told = reader.inheritance
-    return SceneFile(Path(name), data, sources, told.of_other_type, told.beside, told.replaced)
+    inheritance = reader.inheritance
+    return SceneFile(
+        Path(name),
+        data,
+        sources,
+        inheritance.of_other_type,
+        inheritance.beside,
+        inheritance.replaced,
+    )
 
 
 class _Reader:

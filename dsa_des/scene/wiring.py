@@ -134,21 +134,21 @@ def read_wires(
             if unsure is not None:
                 unsure.update(classes)  # whom it meant to feed cannot be told
             continue
-        told: list[Problem] = []  # of this wire: one block may be missing at several of its hops
+        of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
             try:
                 wire = _connect(source, target, options, classes)
             except _WireError as error:
                 problem = scene.problem(key, str(error), *error.value)
-                if problem not in told:
-                    told.append(problem)
+                if problem not in of_wire:
+                    of_wire.append(problem)
                 wire = None
             if wire is not None:
                 wires.append(wire)
             elif unsure is not None:
                 name = target.partition(".")[0]
                 unsure.add(name if name in classes else nearest(name, classes) or name)
-        problems += told
+        problems += of_wire
     _two_writers(scene, wires, classes, problems)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 

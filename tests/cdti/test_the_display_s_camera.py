@@ -125,3 +125,27 @@ def test_an_old_picture_is_of_a_target_and_of_no_track(seen):
     for name, number in contact.items():
         later = scope.camera(scope.picture(DURATION_S + 3.0), DURATION_S + 3.0, number)
         assert (later is None) is (number >= 1_000_000), name
+
+
+def test_a_camera_that_renders_shows_the_patch_that_it_searched():
+    pytest.importorskip("cv2", reason="needs the extra image")
+    eye = {**SEES_ALL, "type": "optical.image", "azimuth_deg": [-110, -30],
+           "elevation_deg": [0, 45], "azimuth_pixels": 4000, "elevation_pixels": 1000,
+           "noise_equivalent_contrast": 0.01, "false_alarms_per_frame": 1e-4,
+           "false_alarms": False}  # fmt: skip
+    scene = chain(
+        {"radar": RADAR, "eye": {k: v for k, v in eye.items() if k != "threshold"}},
+        targets=[{**TURNING, "contrast": 1.0}], duration_s=1.0, tracker={"type": "tracking.stub"},
+        fusion={"type": "fusion.pick_best"},
+    )  # fmt: skip
+    scope, recorded = displayed(scene)
+    picture = scope.picture(1.0)
+    shown = scope.camera(picture, 1.0, picture["contacts"][0][0])
+    patch = np.array(shown["patch"])
+    assert shown["contrast"] is None
+    middle = len(patch) // 2
+    assert patch.shape == (2 * middle, 2 * middle) and 16 <= middle <= 24
+    # Dark in the middle, where the target is, and bright round it.
+    assert patch[middle - 2 : middle + 2, middle - 2 : middle + 2].min() < 40
+    assert 110 < np.median(patch[:4]) < 145
+    assert recorded["detections"]

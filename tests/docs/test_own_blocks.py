@@ -169,7 +169,7 @@ def test_the_policy_lets_two_wait_and_loses_the_next(configs: Path, tmp_path: Pa
     scene = tmp_path / "busy.toml"
     text = scene.read_text(encoding="utf-8").replace("configs/first", f"{configs}/first")
     scene.write_text(text.replace("mymodule", MODULE), encoding="utf-8")
-    rows = recorded(scene, sets=SHORT)["processing"]
+    rows = recorded(scene, sets=["duration_s=8", SHORT[1]])["processing"]
     outcomes = np.array(rows["outcome"])
     assert set(outcomes) == {"done", "dropped"}
     assert rows["queue_length"].max() == 2

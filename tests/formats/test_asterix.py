@@ -19,6 +19,7 @@ from components.display.recorded_run import RecordedTables
 from components.export.asterix_export import asterix_bytes
 from components.export.command import export
 from components.formats.asterix_file import read_asterix, read_asterix_plots
+from components.formats.asterix_records import ADS_B, PLOTS, SYSTEM_TRACKS, read_records
 from components.formats.text_rows import TrafficFileError
 from components.radar.swerling import SwerlingRadar
 from dsa_des.errors import UsageError
@@ -171,8 +172,6 @@ def test_tracks_come_back_as_traffic(tmp_path):
 
 
 def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
-    from components.formats.asterix_records import SYSTEM_TRACKS, read_records
-
     run, _, _ = tracked_run()
     records, notes = read_records(tmp_path, asterix_bytes(run))
     tracks = [r.values for r in records if r.category == SYSTEM_TRACKS]
@@ -186,6 +185,40 @@ def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
     assert [t["tentative"] for t in tracks[:2]] == [0, 1]
     assert [(t["last"], t["coasted"]) for t in tracks[-2:]] == [(1, 0), (0, 1)]
     assert all(t["simulated"] for t in tracks)
+
+
+def test_what_aircraft_say_of_themselves_is_ads_b_and_no_plot(tmp_path):
+    """Each position once, however often it is looked at; a reply without one stays a plot."""
+    run, nan = plots_of(4), np.nan
+    says = {
+        "address": [0x4CA7B3, 0x4CA7B3, 0x4CA7B3, -1], "target": ["Cargo-7"] * 4,
+        "reported_lat_deg": [-16.91234567, -16.91234567, -16.913, nan],
+        "reported_lon_deg": [-179.9998, -179.9998, 179.9999, nan],
+        "reported_alt_m": [-60.96, -60.96, -53.34, nan],
+        "reported_s": [86399.9, 86399.9, 86400.9, nan],
+        "reported_north_m_s": [-30.0, -30.0, nan, nan], "reported_east_m_s": [40.0, 40.0, nan, nan],
+        "reported_climb_m_s": [-2.5, -2.5, nan, nan],
+    }  # fmt: skip
+    table = run.tables["detections"]
+    table = table.set_column(table.column_names.index("range_m"), "range_m", pa.array([9e3] * 4))
+    for name, values in says.items():
+        table = table.append_column(name, pa.array(values))
+    path = tmp_path / "run.ast"
+    path.write_bytes(asterix_bytes(RecordedTables(run.folder, {**run.tables, "detections": table})))
+    records, _ = read_records(path, path.read_bytes())
+    first, second = (r for r in records if r.category == ADS_B)
+    assert [r.category for r in records].count(PLOTS) == 1
+    assert first.time_s == pytest.approx(86399.9, abs=TIME_S) and second.time_s > 86400.0
+    values = first.values
+    assert (values["number"], values["name"]) == (0x4CA7B3, "CARGO7")
+    assert values["lat_deg"] == pytest.approx(-16.91234567, abs=180 / 2**31 * 1.01)
+    assert second.values["lon_deg"] == pytest.approx(179.9999, abs=180 / 2**31 * 1.01)
+    assert values["flight_level_m"] == pytest.approx(-60.96, abs=LEVEL_M / 50)
+    assert values["speed_m_s"] == pytest.approx(50.0, abs=NMI_M / 2**15)
+    south_east = 180.0 - math.degrees(math.atan2(40, 30))
+    assert values["track_deg"] == pytest.approx(south_east, abs=180 / 2**16 * 1.01)
+    assert values["barometric_climb_m_s"] == pytest.approx(-2.5, abs=6.25 * FOOT_M / 120)
+    assert "speed_m_s" not in second.values
 
 
 class Played(SwerlingRadar):

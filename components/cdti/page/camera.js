@@ -23,6 +23,16 @@ const Camera = (() => {
     c.closePath();
     c.fill();
   }
+  // What the camera rendered and searched, as it is, in the middle of its background.
+  function show(s, patch, wide, high) {
+    const side = patch.length, left = Math.floor((wide - side) / 2);
+    s.fillStyle = grey(patch[0][0]);
+    s.fillRect(0, 0, wide, high);
+    patch.forEach((row, y) => row.forEach((level, x) => {
+      s.fillStyle = grey(level);
+      s.fillRect(left + x, y, 1, 1);
+    }));
+  }
   function draw(picture, scene) {
     const width = Math.max(canvas.clientWidth, 1), height = Math.max(canvas.clientHeight, 1);
     if (canvas.width !== width || canvas.height !== height) {
@@ -36,11 +46,24 @@ const Camera = (() => {
       return null;
     }
     // So many of the camera's pixels as make the target a third of what is shown.
-    const high = Math.min(Math.max(Math.ceil(6 * extent(picture)), 16), 160);
+    const high = picture.patch ? picture.patch.length :
+      Math.min(Math.max(Math.ceil(6 * extent(picture)), 16), 160);
     const wide = Math.ceil((high * width) / height);
     small.width = wide;
     small.height = high;
     const s = small.getContext("2d");
+    if (picture.patch) show(s, picture.patch, wide, high);
+    else outline(s, picture, wide, high);
+    c.imageSmoothingEnabled = false;
+    c.drawImage(small, 0, 0, width, height);
+    say(`${scene.name(picture.target)} by ${picture.sensor}, ${picture.age.toFixed(1)} s ago: ` +
+      `${picture.pixels} pixels, ${contrast(picture)}against the ${picture.background}`);
+    return { target: picture.target, pixels: picture.pixels, wide, high };
+  }
+  function contrast(picture) {
+    return picture.contrast === null ? "" : `contrast ${picture.contrast}, `;
+  }
+  function outline(s, picture, wide, high) {
     const below = picture.background === "ground";
     const around = picture.infrared ? COLD : below ? GROUND : SKY;
     s.fillStyle = grey(picture.infrared ? COLD : SKY);
@@ -57,11 +80,6 @@ const Camera = (() => {
     s.fillStyle = grey(picture.infrared ? around + change * (255 - around) : around * (1 - change));
     fill(s, picture.wing, wide / 2, high / 2);
     fill(s, picture.fuselage, wide / 2, high / 2);
-    c.imageSmoothingEnabled = false;
-    c.drawImage(small, 0, 0, width, height);
-    say(`${scene.name(picture.target)} by ${picture.sensor}, ${picture.age.toFixed(1)} s ago: ` +
-      `${picture.pixels} pixels, contrast ${picture.contrast}, against the ${picture.background}`);
-    return { target: picture.target, pixels: picture.pixels, wide, high };
   }
   function say(text) {
     if (words.textContent !== text) words.textContent = text;

@@ -1,0 +1,404 @@
+"""The camera that sees pictures: a patch round every target, rendered and then searched."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.geometry import angle_between_vectors, body_to_ned, ned_to_body, unit_vector
+from components.geometry import body_angles as angles_of
+from components.messages.detections import EXTRAS, Detections
+from components.optical.detection import noise_equivalent_pixels
+from components.optical.flow import find_spot, opencv, spot_flow
+from components.optical.picture import (
+    Pinhole,
+    background,
+    target_outlines,
+    union_coverage,
+)
+from components.optical.sensors import ElectroOptical, ElectroOpticalParameters
+from components.optical.silhouette import union_area
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells, Look
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.message import Column, columns
+from dsa_des.block.wake import Wake
+
+PICTURE = {
+    "column_px": Column("pixels", "frame", "measured column, from the left edge of the frame"),
+    "row_px": Column("pixels", "frame", "measured row, from its upper edge"),
+    "true_column_px": Column("pixels", "frame", "column of the target's middle"),
+    "true_row_px": Column("pixels", "frame", "its row"),
+    "flow_column_px": Column("pixels", "frame", "moved so far to the right between two frames"),
+    "flow_row_px": Column("pixels", "frame", "moved so far down"),
+    "flow_rate_rad_s": Column("rad/s", "", "turn of the line of sight by the flow, in NED"),
+    "snr": Column("", "", "how far it stands out, in standard deviations of the background"),
+}
+
+
+@dataclass(eq=False)
+class PictureDetections(Detections):
+    """Detections of a camera that sees pictures, with their places and flow in pixels."""
+
+    extras: dict[str, AnyArray] = columns({**EXTRAS, **PICTURE}, value=lambda m: m.extra_columns())
+
+
+class ImageParameters(ElectroOpticalParameters):
+    """Parameters of a camera that sees pictures."""
+
+    silhouette: Literal[
+        "exact", "thesis", "convex_hull", "aspect_table", "sampled_table", "mesh"
+    ] = Field(
+        default="convex_hull",
+        description="Model of the area that shows, as of optical.eo; the outline is that of the "
+        "bodies, drawn in that size.",
+    )
+    frame_interval_s: float = Field(
+        default=0.04, gt=0, le=1, description="Time between the two frames of a look, s."
+    )
+    exposure_s: float = Field(
+        default=0.002, ge=0, le=1, description="Exposure of a frame, s: what moves, blurs."
+    )
+    texture_contrast: float = Field(
+        default=0.0, ge=0, description="Standard deviation of the background, as a contrast."
+    )
+    texture_pixels: float = Field(
+        default=6.0, ge=1, le=1e4, description="Grain of the background's texture, pixels."
+    )
+
+    @model_validator(mode="after")
+    def _has_noise(self) -> Self:
+        if self.noise_equivalent_contrast == 0:
+            raise ValueError("noise_equivalent_contrast is 0: a picture has noise; leave it out, "
+                             "or use optical.eo")  # fmt: skip
+        if self.errors == "signal":
+            raise ValueError("errors is 'signal': the picture has its own errors; leave it out")
+        if self.exposure_s > self.frame_interval_s:
+            raise ValueError(
+                f"exposure_s is {self.exposure_s:g}: at most frame_interval_s, "
+                f"{self.frame_interval_s:g}"
+            )
+        return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a texture that there is not."""
+        said = super().without_effect()
+        if not self.texture_contrast:
+            said += self.idle("texture_pixels", because="texture_contrast is 0")
+        return said
+
+
+# A patch shows at least so many pixels on each side of the target, and its side is at most that.
+_BESIDE, _LARGEST = 12, 128
+_CURRENT, _EARLIER = 0, 1
+# Multiplies pixel numbers into keys far apart (Knuth's multiplicative hash).
+_APART = np.uint64(0x9E3779B97F4A7C15)
+_KEPT = 1024
+#: Side of the patch that is kept to be shown, pixels.
+SHOWN = 48
+
+
+class _View(NamedTuple):
+    """What a camera's frames are drawn from, of all cells at one instant."""
+
+    column: FloatArray  # of the target's middle
+    row: FloatArray
+    attitude: tuple[FloatArray, FloatArray, FloatArray]  # of the ownship
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return how far every target stands above the threshold in a look, in the threshold's unit."""
+    camera: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {"confidence": camera.look(cells).confidence}
+
+    return dict(over_cells(camera, wake, values))
+
+
+_LADDER = Ladder(
+    "picture",
+    (
+        Rung("range_boundary", "all inside 3 km (TECVOL, section 2.3.1)",
+             "optical.range_boundary", {"range_km": 3.0}),
+        Rung("projection", "a line: size, range, colour (section 2.2.2)", "optical.projection"),
+        Rung("thesis", "signature of the thesis's areas", "optical.eo", {"silhouette": "thesis"}),
+        Rung("signature", "signature of the union of the bodies", "optical.eo",
+             {"silhouette": "convex_hull"}),
+        Rung("image", "rendered, searched, its flow measured", "optical.image"),
+    ),
+    "image",
+    (Quantity("confidence", "signature"),),
+    measure,
+    clears=("model",),
+)  # fmt: skip
+
+
+class ImageCamera(ElectroOptical):
+    """An electro-optical camera that renders the picture round each target and searches it.
+
+    Two frames are rendered for every look, `frame_interval_s` apart: the target's outline with
+    exact coverage of pixels, its smear over the exposure, the blur, a background that stands still
+    in NED, and noise. The strongest spot at the target is measured by filters of several sizes
+    (`components.optical.flow`); it is a detection where it reaches the threshold, in as many
+    standard deviations as `optical.eo` asks of a point. Its place is what is reported, with the
+    flow of the target in pixels between the frames; NaN below three pixels, where the target was
+    not there before, and where it leaves the patch. Needs the extra ``image``.
+    """
+
+    Parameters = ImageParameters
+    lockstep = True
+    ladders = (_LADDER,)
+    _message = PictureDetections
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        opencv()
+        azimuth, elevation = self.reach.azimuth_rad, self.reach.elevation_rad
+        width = self.pixel_azimuth_rad * parameters.azimuth_pixels
+        self.pinhole = Pinhole(
+            width, elevation, parameters.azimuth_pixels, parameters.elevation_pixels,
+            azimuth[0] + 0.5 * width,
+        )  # fmt: skip
+        self._pixels, self._texture = self.stream("pixel noise"), self.stream("background")
+        #: Patches of the last looks by (target, tick), eight bits a pixel: what a display shows.
+        self.patches: dict[tuple[int, int], AnyArray] = {}
+
+    def request(self, port: str) -> Any:
+        """Ask for the flights too: the earlier frame is of an instant of its own."""
+        return replace(super().request(port), lasts_s=self.p.frame_interval_s)
+
+    def look(self, cells: Cells) -> Look:
+        """Render every target twice, and look for it."""
+        count, found = len(cells), self.detector
+        fields = {name: np.full(count, np.nan) for name in PICTURE}
+        confidence, pixels = np.full(count, -found.threshold), np.zeros(count)
+        if count:
+            now, before, there = self._views(cells)
+            outlines = self._outlines(cells, now)
+            contrast = self.contrast(cells)
+            for factor in self._contrast_factors:
+                contrast = contrast * factor(cells)
+            fields["true_column_px"], fields["true_row_px"] = now.column, now.row
+            keys = cells.roster.keys_of(cells.target)
+            in_frame = self.pinhole.holds(now.column, now.row)
+            for cell in np.flatnonzero(in_frame).tolist():
+                seen = self._seen(
+                    cells, cell, now, before, bool(there[cell]), [o[cell] for o in outlines],
+                    float(contrast[cell]), keys[cell : cell + 1],
+                )  # fmt: skip
+                confidence[cell] = seen.pop("confidence")
+                pixels[cell] = seen.pop("pixels")
+                for name, value in seen.items():
+                    fields[name][cell] = value
+        return Look(confidence >= 0.0, confidence, {"pixels": pixels, **fields}, {})
+
+    def _views(self, cells: Cells) -> tuple[_View, _View, Any]:
+        """Return the frames' views of all cells, now and earlier, and who was there then."""
+        now = self._view(cells.body_azimuth_rad, cells.body_elevation_rad, cells.own_attitude)
+        count = len(cells)
+        seen = cells.seen_at(np.arange(count), np.full(count, -self.p.frame_interval_s))
+        then = tuple(seen[f"own_{name}_rad"] for name in ("yaw", "pitch", "roll"))
+        before = self._view(seen["body_azimuth_rad"], seen["body_elevation_rad"], then)
+        return now, before, seen["present"]
+
+    def _view(self, azimuth: FloatArray, elevation: FloatArray, attitude: Any) -> _View:
+        return _View(*self.pinhole.pixel(*self.axes(azimuth, elevation)), attitude)
+
+    def _outlines(self, cells: Cells, now: _View) -> list[FloatArray]:
+        """Return outlines (cells, points, 2) in pixels about each target's middle."""
+        columns = (cells.roster.column(f"eo.{n}_m2") for n in ("front", "side", "horizontal"))
+        front, side, flat = (cells.of_target(column) for column in columns)
+        yaw = cells.relative_heading_rad + cells.azimuth_rad
+        attitude = yaw, cells.target_pitch_rad, cells.target_roll_rad
+        drawn = target_outlines(
+            cells.azimuth_rad, cells.elevation_rad, cells.range_m, attitude, (front, side, flat)
+        )
+        own = [angle[:, np.newaxis] for angle in now.attitude]
+
+        def place(directions: FloatArray) -> FloatArray:
+            body = ned_to_body(*np.moveaxis(directions, -1, 0), *own)
+            return np.stack(self.pinhole.pixel(*self.axes(*angles_of(*body))), axis=-1)
+
+        ahead = unit_vector(cells.azimuth_rad, cells.elevation_rad)
+        middle = place(np.stack(ahead, axis=-1)[:, np.newaxis])
+        # As large as the scene's model of the area says, in the shape of the bodies.
+        union = union_area(
+            cells.relative_heading_rad, cells.target_pitch_rad, cells.target_roll_rad,
+            cells.elevation_rad, front, side, flat, None,
+        )  # fmt: skip
+        size = np.sqrt(self.shown_area(cells) / np.where(union > 0.0, union, np.inf))
+        return [size[:, np.newaxis, np.newaxis] * (place(one) - middle) for one in drawn]
+
+    def _seen(
+        self,
+        cells: Cells,
+        cell: int,
+        now: _View,
+        before: _View,
+        there: bool,
+        outlines: list[FloatArray],
+        contrast: float,
+        key: Any,
+    ) -> dict[str, float]:
+        """Return what the two frames of a cell say."""
+        middle = np.array([now.column[cell], now.row[cell]])
+        points = np.concatenate(outlines)
+        extent = float(np.nanmax(np.abs(points), initial=0.0))
+        if not np.isfinite(points).all():  # it reaches behind the picture
+            return {"confidence": self.all_pixels, "pixels": self.all_pixels}
+        # A target that is larger than a patch is seen in a coarser picture.
+        binned = max(1, math.ceil((extent + _BESIDE) / (0.5 * _LARGEST)))
+        half = max(16, math.ceil(extent / binned) + _BESIDE)
+        attitude = [float(angle[cell]) for angle in now.attitude]
+        corner = np.floor(middle / binned).astype(np.int64) - half
+        moved, earlier = np.zeros(2), np.zeros(2)
+        then = [float(angle[cell]) for angle in before.attitude]
+        if there:
+            earlier = np.array([before.column[cell], before.row[cell]])
+            moved = middle - earlier
+            there = bool(np.isfinite(moved).all())
+        smear = moved * (self.p.exposure_s / self.p.frame_interval_s) if there else np.zeros(2)
+        scene = _Scene(cells, cell, key, half, binned, contrast, outlines, smear / binned)
+        later = self._frame(scene, corner, middle, attitude, _CURRENT)
+        pixels_y, pixels_x = np.mgrid[: 2 * half, : 2 * half] + 0.5
+        at = middle / binned - corner
+        reach = max(2.0, extent / binned + 1.0)
+        sought = np.hypot(pixels_x - at[0], pixels_y - at[1]) <= reach
+        spread = math.sqrt((self.p.blur_pixels / binned) ** 2 + 1.0 / 12.0)
+        spot = find_spot(later, sought, spread, self.pixel_noise / binned)
+        self._keep(cells, cell, later)
+        place = (np.array([spot.x, spot.y]) + corner) * binned
+        answer = {
+            "confidence": spot.snr * self.detector.noise - self.detector.threshold,
+            "pixels": float(spot.pixels * binned**2),
+            "column_px": place[0], "row_px": place[1], "snr": spot.snr,
+        }  # fmt: skip
+        if answer["confidence"] < 0.0 or not there or spot.pixels < 3:
+            return answer
+        # The earlier patch is where the same part of the sky was, by the platform's own turn.
+        where = self._pixel_of(self._direction(place, attitude), then)
+        if not np.isfinite(where).all():
+            return answer
+        before_corner = np.floor(where / binned).astype(np.int64) - half
+        first = self._frame(scene, before_corner, earlier, then, _EARLIER)
+        flow = np.array(spot_flow(first, later, spot, sought, half))
+        moved_px = (flow + corner - before_corner) * binned
+        answer["flow_column_px"], answer["flow_row_px"] = moved_px
+        if np.isfinite(moved_px).all():
+            lines = np.array(
+                [self._direction(place, attitude), self._direction(place - moved_px, then)]
+            )
+            turn = float(angle_between_vectors(lines[0], lines[1]))
+            answer["flow_rate_rad_s"] = turn / self.p.frame_interval_s
+        return answer
+
+    @property
+    def pixel_noise(self) -> float:
+        """Standard deviation of a pixel's noise, as a contrast."""
+        spot = noise_equivalent_pixels(self.p.blur_pixels)
+        return float(self.detector.noise / (self._weight * math.sqrt(spot)))
+
+    def _frame(
+        self, scene: "_Scene", corner: IntArray, middle: FloatArray, attitude: Any, which: int
+    ) -> FloatArray:
+        """Return a patch of a frame; its corner counts binned pixels."""
+        cv2, side = opencv(), 2 * scene.half
+        at = middle / scene.binned - corner
+        covered = union_coverage(
+            [at + outline / scene.binned for outline in scene.outlines], side, side, scene.smear
+        )
+        # Blurred by the optics; that of a pixel is in the coverage.
+        covered = cv2.GaussianBlur(
+            covered, (0, 0), self.p.blur_pixels / scene.binned, borderType=cv2.BORDER_REPLICATE
+        )
+        picture = scene.contrast * covered
+        if self.p.texture_contrast:
+            behind = self.p.texture_contrast * self._background(scene, corner, attitude)
+            picture = picture + (1.0 - covered) * behind
+        number = np.arange(side * side, dtype=np.uint64) * _APART
+        scans = np.full(side * side, scene.cells.scan[scene.cell])
+        noise = self._pixels.normal(scene.key ^ number, scans, which).reshape(side, side)
+        return np.asarray(picture + (self.pixel_noise / scene.binned) * noise)
+
+    def _background(self, scene: "_Scene", corner: IntArray, attitude: Any) -> FloatArray:
+        """Return the texture under a patch, as directions over it are linear in its pixels."""
+        side = 2 * scene.half
+        at = (corner + scene.half) * scene.binned
+        ahead, right, down = (
+            self._ned_angles(at + np.array(step) * side, attitude)
+            for step in ((0, 0), (1, 0), (0, 1))
+        )
+        turn = np.array([right - ahead, down - ahead])
+        turn[:, 0] = np.remainder(turn[:, 0] + np.pi, 2.0 * np.pi) - np.pi
+        offset = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
+        azimuth, elevation = (
+            ahead[i] + offset * turn[0, i] + offset[:, np.newaxis] * turn[1, i] for i in (0, 1)
+        )
+        replica = int(scene.cells.replica[scene.cell])
+
+        def normal(one: IntArray, other: IntArray) -> FloatArray:
+            draws = self._texture.of_rows(np.full(len(one), replica))
+            return draws.normal(one.astype(np.uint64), other)
+
+        grain = self.p.texture_pixels * self.pixel_azimuth_rad
+        return background(normal, azimuth, elevation, grain)
+
+    def _ned_angles(self, pixel: AnyArray, attitude: Any) -> FloatArray:
+        x, y, z = self._direction(pixel, attitude)
+        return np.array([math.atan2(y, x), math.atan2(-z, math.hypot(x, y))])
+
+    def _direction(self, pixel: AnyArray, attitude: Any) -> FloatArray:
+        """Return the direction in NED of a place in the frame."""
+        seen = self.axes.pointing(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
+        return np.array(body_to_ned(*unit_vector(*seen), *attitude))[:, 0]
+
+    def _pixel_of(self, direction: FloatArray, attitude: Any) -> FloatArray:
+        """Return the place in the frame of a direction in NED."""
+        body = ned_to_body(*(np.atleast_1d(one) for one in direction), *attitude)
+        return np.array(self.pinhole.pixel(*self.axes(*angles_of(*body))))[:, 0]
+
+    def _keep(self, cells: Cells, cell: int, picture: FloatArray) -> None:
+        """Keep the middle of a patch to be shown."""
+        most = max(float(np.abs(picture).max()), 1e-12)
+        grey = np.clip(128.0 - 120.0 * picture / most, 0.0, 255.0).astype(np.uint8)
+        step = max(1, math.ceil(len(grey) / SHOWN))
+        tick = int(cells.scan_ticks[cells.row[cell]])
+        self.patches[int(cells.target[cell]), tick] = grey[::step, ::step]
+        while len(self.patches) > _KEPT:
+            del self.patches[next(iter(self.patches))]
+
+    def _measured(
+        self, cells: Cells, found: IntArray, look: Look, azimuth_rad: FloatArray,
+        elevation_rad: FloatArray, range_m: FloatArray,
+    ) -> Any:  # fmt: skip
+        """Report the spot's place in the picture, with what errors the scene adds to it."""
+        column, row = (look.extras[name][found] for name in ("column_px", "row_px"))
+        seen = self.axes.pointing(*self.pinhole.direction(column, row))
+        known = np.isfinite(column)
+        azimuth_rad = np.where(known, seen[0], azimuth_rad)
+        elevation_rad = np.where(known, seen[1], elevation_rad)
+        return super()._measured(cells, found, look, azimuth_rad, elevation_rad, range_m)
+
+    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+        """Return what the picture says of each cell."""
+        cued = {"cued": cells.is_cued()} if self._cueing else {}
+        return {**look.extras, **cued}
+
+
+class _Scene(NamedTuple):
+    """What both frames of a cell show."""
+
+    cells: Cells
+    cell: int
+    key: Any
+    half: int
+    binned: int
+    contrast: float
+    outlines: list[FloatArray]
+    smear: FloatArray

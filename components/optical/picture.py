@@ -1,0 +1,271 @@
+"""Pictures of targets, pixel by pixel: outlines, exact coverage of pixels, a drawn background.
+
+Pixels are counted from the upper left corner of the frame: pixel (row, column) covers
+[column, column + 1] x [row, row + 1]. Pure functions; they know neither cameras nor OpenCV.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.arguments.checks import finite
+from components.geometry import body_to_ned, unit_vector_unchecked
+from components.optical.silhouette import PLATE_ASPECT_RATIO
+from dsa_des.arrays.types import FloatArray, IntArray
+
+_SIDES = 32
+# Edges that are steeper than this across a row are taken at their middle: wrong by less than 1e-7.
+_STEEP = 1e-6
+#: A picture that turns farther from the optical axis than this has no plane to be drawn on.
+WIDEST_RAD = math.radians(170.0)
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """A plane picture: straight lines stay straight, and pixels off the axis see less.
+
+    Parameters
+    ----------
+    width_rad : float
+        Field of view across; its middle is the optical axis.
+    elevation_rad : (low, high)
+        Of the picture's lower and upper edge, at its middle column.
+    columns, rows : int
+    azimuth_rad : float
+        Of the optical axis in the sensor's axes.
+    """
+
+    width_rad: float
+    elevation_rad: tuple[float, float]
+    columns: int
+    rows: int
+    azimuth_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high = self.elevation_rad
+        if not (0.0 < self.width_rad <= WIDEST_RAD and -1.5 < low < high < 1.5):
+            raise ValueError(
+                f"the field of view is {math.degrees(self.width_rad):g} deg wide and reaches from "
+                f"{math.degrees(low):g} to {math.degrees(high):g} deg: a plane picture needs at "
+                f"most {math.degrees(WIDEST_RAD):g} deg across, within 85 deg up and down; use "
+                "several cameras, each with a mounting"
+            )
+
+    @property
+    def focal(self) -> tuple[float, float]:
+        """Focal length in columns and rows."""
+        low, high = self.elevation_rad
+        across = 2.0 * math.tan(0.5 * self.width_rad)
+        return self.columns / across, self.rows / (math.tan(high) - math.tan(low))
+
+    def pixel(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> tuple[Any, Any]:
+        """Return column and row of directions in the sensor's axes; NaN behind the picture."""
+        turned = np.asarray(azimuth_rad) - self.azimuth_rad
+        ahead = np.cos(turned)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            across = np.where(ahead > 1e-9, np.tan(turned), np.nan)
+            upward = np.where(ahead > 1e-9, np.tan(elevation_rad) / ahead, np.nan)
+        focal_x, focal_y = self.focal
+        return 0.5 * self.columns + focal_x * across, (
+            focal_y * (math.tan(self.elevation_rad[1]) - upward)
+        )
+
+    def direction(self, column: ArrayLike, row: ArrayLike) -> tuple[Any, Any]:
+        """Return azimuth and elevation in the sensor's axes of what is seen at a place."""
+        focal_x, focal_y = self.focal
+        across = (np.asarray(column) - 0.5 * self.columns) / focal_x
+        upward = math.tan(self.elevation_rad[1]) - np.asarray(row) / focal_y
+        return self.azimuth_rad + np.arctan(across), np.arctan2(upward, np.hypot(1.0, across))
+
+    def holds(self, column: FloatArray, row: FloatArray) -> Any:
+        """Return which places lie in the frame."""
+        return (column >= 0) & (column <= self.columns) & (row >= 0) & (row <= self.rows)
+
+
+def target_outlines(
+    azimuth_rad: FloatArray,
+    elevation_rad: FloatArray,
+    range_m: FloatArray,
+    attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
+    bodies_m2: tuple[FloatArray, FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Return the outlines of targets' capsules and plates as unit vectors in NED.
+
+    Shapes (n, points, 3); the bodies are those of `components.optical.silhouette.union_area`, with
+    front, side and horizontal areas. A circle is drawn as a polygon of its area. The outline lies
+    in the plane across the line of sight through the target's middle: what perspective adds is the
+    ratio of the target's size to its range, of a picture point's distance from the middle.
+    """
+    front, side, flat = bodies_m2
+    along = np.stack(unit_vector_unchecked(azimuth_rad, elevation_rad), axis=-1)
+    right = np.stack([-np.sin(azimuth_rad), np.cos(azimuth_rad), 0.0 * azimuth_rad], axis=-1)
+    down = np.cross(along, right)
+    nose, wing = (
+        np.stack(body_to_ned(*axis, *attitude_rad), axis=-1)
+        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )
+
+    def seen(axis: FloatArray) -> FloatArray:
+        return np.stack([(axis * right).sum(axis=-1), (axis * down).sum(axis=-1)], axis=-1)
+
+    nose_2, wing_2 = seen(nose), seen(wing)
+    radius = np.sqrt(front / math.pi)
+    half = 0.25 * side / np.where(radius > 0.0, radius, np.inf)
+    wider = radius * math.sqrt((math.pi / _SIDES) / math.sin(math.pi / _SIDES))
+    wider *= 1.0 / math.sqrt(math.cos(math.pi / _SIDES))
+    # Half a circle at either end of the capsule, beginning across its axis.
+    turn = np.arctan2(nose_2[:, 1], nose_2[:, 0])[:, np.newaxis]
+    around = np.linspace(-0.5 * math.pi, 0.5 * math.pi, _SIDES // 2 + 1)
+    around = np.concatenate([around, around + math.pi]) + turn
+    end = np.repeat([1.0, -1.0], _SIDES // 2 + 1)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    capsule = circle * wider[:, np.newaxis, np.newaxis]
+    capsule += (end[:, np.newaxis] * half[:, np.newaxis, np.newaxis]) * nose_2[:, np.newaxis]
+    span = np.sqrt(flat * PLATE_ASPECT_RATIO)
+    chord = flat / np.where(span > 0.0, span, np.inf)
+    signs = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+    plate = (
+        signs[:, :1] * (0.5 * chord[:, np.newaxis] * nose_2)[:, np.newaxis]
+        + signs[:, 1:] * (0.5 * span[:, np.newaxis] * wing_2)[:, np.newaxis]
+    )
+    found = []
+    for outline in (capsule, plate):
+        at = outline[..., :1] * right[:, np.newaxis] + outline[..., 1:] * down[:, np.newaxis]
+        at = at + (range_m[:, np.newaxis] * along)[:, np.newaxis]
+        found.append(at / np.linalg.norm(at, axis=-1, keepdims=True))
+    return found[0], found[1]
+
+
+def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the polygon that two convex ones have in common (Sutherland and Hodgman)."""
+    sense = np.sign(_cross(other[1] - other[0], other[2] - other[0])) if len(other) > 2 else 0.0
+    if sense == 0.0:
+        return np.empty((0, 2))
+    kept = one
+    for start, end in zip(other, np.roll(other, -1, axis=0), strict=True):
+        if len(kept) == 0:
+            break
+        inside = sense * _cross(end - start, kept - start)
+        following, after = np.roll(kept, -1, axis=0), np.roll(inside, -1)
+        crosses = (inside >= 0.0) != (after >= 0.0)
+        share = inside / np.where(crosses, inside - after, 1.0)
+        met = kept + share[:, np.newaxis] * (following - kept)
+        both = np.stack([kept, met], axis=1).reshape(-1, 2)
+        kept = both[np.stack([inside >= 0.0, crosses], axis=1).reshape(-1)]
+    return kept
+
+
+def _cross(a: FloatArray, b: FloatArray) -> Any:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def coverage(corners: FloatArray, rows: int, columns: int) -> FloatArray:
+    """Return the share of each pixel that a polygon covers, exact to 1e-7.
+
+    Each edge's part of a row hides what lies to the right of it: the mean, over that part, of the
+    share of the pixel right of the edge is that of a clipped line, in closed form (Green's theorem,
+    pixel by pixel).
+
+    Parameters
+    ----------
+    corners : (n, 2) array
+        x to the right and y down, in pixels; any simple polygon, in either sense.
+    rows, columns : int
+
+    Returns
+    -------
+    (rows, columns) array, from 0 to 1
+    """
+    picture: FloatArray = np.zeros((rows, columns))
+    corners = np.asarray(finite("corners", corners))
+    if len(corners) < 3:
+        return picture
+    low = np.clip(np.floor(corners.min(axis=0)), 0, (columns, rows)).astype(np.int64)
+    high = np.clip(np.ceil(corners.max(axis=0)), 0, (columns, rows)).astype(np.int64)
+    if (low >= high).any():
+        return picture
+    x0, y0 = (corners - low).T
+    x1, y1 = np.roll(x0, -1), np.roll(y0, -1)
+    row = np.arange(high[1] - low[1])[:, np.newaxis]
+    top, bottom = np.clip(y0, row, row + 1.0), np.clip(y1, row, row + 1.0)
+    rise = y1 - y0
+    slope = (x1 - x0) / np.where(rise == 0.0, 1.0, rise)
+    edge = np.arange(1.0, high[0] - low[0] + 1.0)[:, np.newaxis, np.newaxis]
+    begin, end = edge - (x0 + slope * (top - y0)), edge - (x0 + slope * (bottom - y0))
+    wide = end - begin
+    steep = np.abs(wide) < _STEEP
+    mean = np.where(
+        steep,
+        np.clip(0.5 * (begin + end), 0.0, 1.0),
+        (_ramp(end) - _ramp(begin)) / np.where(steep, 1.0, wide),
+    )
+    share = np.abs((mean * (bottom - top)).sum(axis=-1)).T
+    picture[low[1] : high[1], low[0] : high[0]] = np.clip(share, 0.0, 1.0)
+    return picture
+
+
+def _ramp(u: FloatArray) -> FloatArray:
+    """Return the integral from 0 to u of a line clipped to [0, 1]."""
+    inner = np.clip(u, 0.0, 1.0)
+    result: FloatArray = 0.5 * inner * inner + np.maximum(u - 1.0, 0.0)
+    return result
+
+
+def union_coverage(
+    outlines: Sequence[FloatArray], rows: int, columns: int, smear: FloatArray
+) -> FloatArray:
+    """Return the share of each pixel that two convex outlines cover together, over an exposure.
+
+    `smear` is how far they move meanwhile (x, y), pixels, half before and half after; the mean of
+    so many exact pictures that the outline moves at most a quarter of a pixel between them.
+    """
+    one, other = outlines
+    parts = ((1.0, one), (1.0, other), (-1.0, common_part(one, other)))
+    steps = min(64, 1 + math.ceil(4.0 * float(np.hypot(*smear))))
+    total: FloatArray = np.zeros((rows, columns))
+    for share in (np.arange(steps) + 0.5) / steps - 0.5:
+        for sign, part in parts:
+            if len(part) > 2:
+                total += sign * coverage(part + share * smear, rows, columns)
+    return np.clip(total / steps, 0.0, 1.0)
+
+
+def background(
+    normal: Callable[[IntArray, IntArray], FloatArray],
+    azimuth_rad: FloatArray,
+    elevation_rad: FloatArray,
+    grain_rad: float,
+) -> FloatArray:
+    """Return a drawn background of mean 0 and standard deviation 1 that stands still in NED.
+
+    Normal draws on a lattice of azimuth and elevation, smoothly interpolated (value noise) and
+    scaled to the same variance everywhere. `normal` gives the draw of a lattice point by its two
+    whole numbers, of azimuth and elevation, 0 or more; neighbours across north meet.
+    """
+    around = max(4, round(2.0 * math.pi / grain_rad))
+    at = np.stack([
+        np.mod(azimuth_rad, 2.0 * math.pi) * (around / (2.0 * math.pi)),
+        (elevation_rad + math.pi) / grain_rad,
+    ])  # fmt: skip
+    first = np.floor(at).astype(np.int64)
+    fine = at - first
+    weight = fine * fine * (3.0 - 2.0 * fine)
+    total, square = np.zeros(at.shape[1:]), np.zeros(at.shape[1:])
+    # Few lattice points lie under a patch: each is drawn once.
+    points = np.stack([
+        np.stack([(first[0] + i) % around, first[1] + j]) for i in (0, 1) for j in (0, 1)
+    ])  # fmt: skip
+    code = points[:, 0] * 2**31 + points[:, 1]
+    known, place = np.unique(code, return_inverse=True)
+    drawn = normal(known // 2**31, known % 2**31)[place.reshape(code.shape)]
+    for number, (i, j) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+        share = (weight[0] if i else 1.0 - weight[0]) * (weight[1] if j else 1.0 - weight[1])
+        total += share * drawn[number]
+        square += share * share
+    return np.asarray(total / np.sqrt(square))

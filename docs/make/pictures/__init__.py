@@ -1,0 +1,1 @@
+"""The page of the camera that sees pictures, docs/pictures.md."""
