@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_validator
 
+from components.aircraft.equipage import AdsBEquipage, Equipage
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import InputFileError, status_of
@@ -170,6 +171,20 @@ class Aircraft(Parameters):
     engine: Literal["propeller", "turbofan", "turbojet"] = Field(
         default="propeller", description="Propulsion type (Table 4.5)."
     )
+    mode_s: bool = Field(default=False, description="Whether it has a Mode S transponder.")
+    mode_c: bool = Field(
+        default=False,
+        description="Whether a Mode C one, which gives no identity; Mode S counts first.",
+    )
+    ads_b: AdsBEquipage | None = Field(
+        default=None, description="What it broadcasts; nothing if left out."
+    )
+    icao_address: str | None = Field(
+        default=None,
+        pattern="^[0-9A-Fa-f]{6}$",
+        description="24-bit address of Mode S and ADS-B, six hexadecimal digits; by default one "
+        "that follows from its name.",
+    )
 
 
 # A target without areas is a point, of a centimetre.
@@ -259,6 +274,12 @@ class Roster:
         return np.column_stack([side / height + height, span, height])
 
     @cached_property
+    def equipage(self) -> Equipage:
+        """What all aircraft carry for others to know them by."""
+        keys = np.tile(self.keys, len(self.aircraft) // max(1, len(self.names)))
+        return Equipage.of(self.aircraft, keys)
+
+    @cached_property
     def engines(self) -> AnyArray:
         """Propulsion type of each target, shape (targets,) of text."""
         return np.array([craft.engine for craft in self.aircraft], dtype=np.str_)
@@ -329,11 +350,15 @@ class ReplicaRoster(Roster):
         return replica * len(self.names) + target
 
 
+#: What other aircraft of replicas may have of their own; see `joint_roster`.
+_MAY_DIFFER = ("rcs_dbsm", "mode_s", "mode_c", "ads_b", "icao_address")
+
+
 def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Roster | None:
     """Return the roster of all replicas, or None where they cannot have one.
 
-    Radar cross-sections may differ: how far a radar looks, and which physics it has, does not rest
-    on how large they are. Whatever else differs may decide how far a sensor looks.
+    Radar cross-sections and equipage may differ: how far a sensor looks, and which physics it has,
+    does not rest on them. Whatever else differs may decide how far a sensor looks.
     """
     width = len(first)
     if width == 0:
@@ -352,7 +377,7 @@ def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Ros
         if any(
             getattr(craft, field) != getattr(other, field)
             for field in Aircraft.model_fields
-            if field != "rcs_dbsm"
+            if field not in _MAY_DIFFER
         ):
             return None
     if same:

@@ -65,6 +65,8 @@ class Scope:
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
+        #: Altitude and rate of climb that targets report themselves, m and m/s, and when.
+        self._reported: dict[int, tuple[float, float, float]] = {}
         self._bands: tuple[float, GuidanceBands] | None = None
         #: What was made of the latest alerts, for as long as they are the latest.
         self._looked: tuple[_Alerts, Any, Any, Any] | None = None
@@ -98,6 +100,7 @@ class Scope:
             self._name(message.roster.names)
         elif isinstance(message, Detections):
             self._sights.take(block, message, self._per_s)
+            self._take_reports(message)
         elif isinstance(message, AlertLevels):
             self._take_alerts(message)
         elif isinstance(message, GuidanceBands):
@@ -105,6 +108,16 @@ class Scope:
             self._bands = int(last.tick[0]) / self._per_s, last
         elif self._believed is not None and isinstance(message, self._believed):
             self._take_contacts(message)
+
+    def _take_reports(self, message: Detections) -> None:
+        """Take in what aircraft say of themselves, if they do."""
+        if "reported_alt_m" not in message.extras:
+            return
+        altitude, climb = (message.extras[f"reported_{name}"] for name in ("alt_m", "climb_m_s"))
+        seen_s = message.measured_ticks() / self._per_s
+        rows = zip(message.target, altitude, climb, seen_s, strict=True)
+        new = {int(target): (float(a), float(c), float(s)) for target, a, c, s in rows}
+        self._reported = {**self._reported, **new}
 
     def _take_contacts(self, message: Message) -> None:
         count = len(message)
@@ -170,7 +183,12 @@ class Scope:
             _, flights, said, area = self._looked
         level = {one["target"]: one["level"] for one in said}
         for one in shown:
-            one += flights.get(one[0], _UNKNOWN)
+            flight = [*flights.get(one[0], _UNKNOWN)]
+            alt_m, climb, seen_s = self._reported.get(one[0], (math.nan, math.nan, -math.inf))
+            if time_s - seen_s < FORGOTTEN_S and one[3] is not None:
+                one[3] = round(alt_m - own.alt_m, 2)
+                flight[2] = round(climb, 2) if math.isfinite(climb) else flight[2]
+            one += flight
             one.append(level.get(one[0], 0))
         return {
             "own": {

@@ -279,9 +279,14 @@ class Transform(Component):
         return fields
 
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
-        """Return the fields of the rows at other instants, and where the ownship is then."""
+        """Return the fields of the rows at other instants, and where all aircraft are then."""
         seen = self._as_seen(own, other, own.present & other.present)
-        return {**seen, "own": {name: getattr(own, name) for name in (*_PLACE, "present")}}
+        places = {"target": {name: getattr(other, name) for name in _PLACE[:3]}}
+        return {
+            **seen,
+            **places,
+            "own": {name: getattr(own, name) for name in (*_PLACE, "present")},
+        }
 
     def _believed(self, states: TrafficStates) -> dict[str, FloatArray]:
         """Return what the ownship believes of itself."""

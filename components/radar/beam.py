@@ -277,6 +277,7 @@ class Sweep:
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
             found.update(revisit(columns, start_s + offset_s))
             found.pop("own")
+            found.pop("target")
             azimuth, _ = block.axes(found["body_azimuth_rad"], found["body_elevation_rad"])
             return azimuth
 

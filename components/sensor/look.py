@@ -158,6 +158,13 @@ class Cells:
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
 
+    @cached_property
+    def state_ns(self) -> IntArray:
+        """When the aircraft were where each cell has them, in ns of its run; see `instant_ns`."""
+        if self._targets.state_tick is None:
+            return self.instant_ns
+        return nanosecond_of(self._own(self.of_row("state_tick")), self._ticks_per_s)
+
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
         """Return what is seen of some cells a little before or after they are looked at.
 
@@ -170,8 +177,9 @@ class Cells:
         Returns
         -------
         dict of (n,) arrays
-            Fields of `RelativeTargets` by name, and the ownship's pose as ``own_lat_deg`` and so
-            on. ``present`` says whether both aircraft are there then.
+            Fields of `RelativeTargets` by name, the ownship's pose as ``own_lat_deg`` and so on,
+            and the target's place as ``target_lat_deg`` and so on. ``present`` says whether both
+            aircraft are there then.
 
         Raises
         ------
@@ -199,6 +207,13 @@ class Cells:
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""
         return getattr(self._targets, name).take(self._flat // self._width)
+
+    def own_belief(self, name: str) -> FloatArray:
+        """Return what the ownship believes of itself, for each cell; see `RelativeTargets`."""
+        believed = self._targets.believed
+        if believed is None:
+            raise ValueError("a block on the way does not say what the ownship believes of itself")
+        return np.asarray(believed[name].take(self._flat // self._width))
 
     @cached_property
     def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -145,7 +145,8 @@ def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def _elevations(value: tuple[float, float]) -> tuple[float, float]:
+def rising_elevations(value: tuple[float, float]) -> tuple[float, float]:
+    """Return a field of view in elevation, deg; refuse one that is none."""
     if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
     return value
@@ -165,7 +166,7 @@ class SensorParameters(ErrorParameters):
         default=(-180.0, 180.0),
         description="Field of view in azimuth, clockwise from the first to the second, deg.",
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
         default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
     )
     range_km: float | None = Field(

@@ -176,6 +176,7 @@ SYSTEMS = {
     "tecvol": "TECVOL: Swerling radar, range boundary",
     "afrl": "AFRL: EO sensors",
     "afrl_low_threshold": "AFRL: EO sensors, low threshold",
+    "afrl_tracked": "AFRL: EO sensors and TCAS",
     "midas": "AFRL(2): MIDAS sensor model",
     "oasys": "Amphitech: OASys, flight test",
     "oasys_specification": "Amphitech: OASys, link budget analysis",

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft
+from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.fleet import SampledFleet
 from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
@@ -153,6 +154,9 @@ class FileParameters(SourceParameters):
     aircraft: dict[str, Aircraft] = Field(
         default={}, description="What single intruders are, by their names in the file."
     )
+    equipage_shares: EquipageShares = Field(
+        default=EquipageShares(), description="Shares of intruders that carry their equipage."
+    )
 
 
 class DaaFileParameters(FileParameters):
@@ -194,6 +198,10 @@ class RecordedTraffic(TrafficSource):
             parameters.aircraft,
             str(parameters.file),
         )
+        if parameters.equipage_shares != EquipageShares():
+            names, stream = self.roster.names, self.stream("equipage")
+            shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
+            self.roster = Roster.of(list(zip(names, shared, strict=True)))
 
     def _in_wind(self, content: TrafficFile) -> TrafficFile:
         """Return the flights with noses turned into the scene's wind, where there is one."""

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.fleet import ScriptedFleet
 from components.flights.sample_times import RegularTimes, SampleTimes
 from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
@@ -35,6 +36,9 @@ class RandomTrafficParameters(SourceParameters):
     speed_min_mps: float = Field(default=40.0, ge=0, description="Slowest ground speed, m/s.")
     speed_max_mps: float = Field(default=120.0, ge=0, description="Fastest ground speed, m/s.")
     aircraft: Aircraft = Field(default=Aircraft(), description="What all of them are.")
+    equipage_shares: EquipageShares = Field(
+        default=EquipageShares(), description="Shares of them that carry the aircraft's equipage."
+    )
     sample_interval_s: float = Field(
         default=1.0,
         ge=0.001,
@@ -85,7 +89,10 @@ class RandomTraffic(TrafficSource):
         flights = flights_of(Starts(names, lat, lon, altitude, 360.0 * heading, speed))
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
-        self.roster = Roster.of([(name, p.aircraft) for name in names])
+        aircraft = [p.aircraft] * len(names)
+        if p.equipage_shares != EquipageShares():
+            aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))
+        self.roster = Roster.of(list(zip(names, aircraft, strict=True)))
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

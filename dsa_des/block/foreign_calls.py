@@ -35,6 +35,19 @@ def raised_in(trace: TracebackType | None) -> str:
     return name
 
 
+def error_at(error: BaseException, cls: type) -> str:
+    """Return what an exception says, and the line of a class's own package where it came from."""
+    package = cls.__module__.partition(".")[0]
+    trace, place = error.__traceback__, None
+    while trace is not None:
+        frame = trace.tb_frame
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] == package or place is None:
+            code = frame.f_code
+            place = f"{code.co_filename}, line {trace.tb_lineno}, in {code.co_name}"
+        trace = trace.tb_next
+    return error_text(error) + ("" if place is None else f" ({place})")
+
+
 def error_text(error: BaseException) -> str:
     """Return what an exception says, with its kind: ``SystemExit: 0``."""
     try:

@@ -14,7 +14,7 @@ from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
-from dsa_des.running.reports import load_reports
+from dsa_des.running.reports import load_reports, notes_of_loading, say_notes
 from dsa_des.scene.examples import chosen_file
 from dsa_des.terminal.terminal import say, say_json
 
@@ -50,8 +50,8 @@ def cost_of_accuracy(
     variants = Variants(
         chosen_file(scene, "scene"), sets=sets, swaps=swaps, seed=seed, duration_s=duration
     )
-    for key in variants.dropped:
-        say(f"note: the swap dropped {key}", err=True)
+    variants.scene.dropped = variants.dropped
+    say_notes(notes_of_loading(variants.scene))
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
     target = OutputFolder.chosen(out, Path("runs"), f"{variants.scene.path.stem}-cost")
@@ -113,8 +113,10 @@ def ladders_to_climb(
         for ladder in blocks[name].cls.ladders_for(blocks[name].parameters)
     ]
     if not declared:
-        who = "no block of this scene declares" if block is None else f"{block} declares no"
-        raise UsageError(f"{who} ladder; dsa-des components TYPE shows them")
+        who = "no block of this scene declares a ladder"
+        if block is not None:
+            who = f"{block}: {blocks[block].type_name} declares no ladder"
+        raise UsageError(f"{who}; dsa-des components TYPE shows those of a type")
     if against is not None:
         rungs = {rung.name for _, ladder in declared for rung in ladder.rungs}
         if against not in rungs:

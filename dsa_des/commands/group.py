@@ -8,6 +8,7 @@ called. Every error that a user can cause is one message and an exit code.
 import functools
 import os
 import sys
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -36,6 +37,9 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             say_lines(f"error: {error}", err=True)
             sys.exit(2)
         except (BlockFailure, OutputError) as error:
+            context = click.get_current_context(silent=True)
+            if context is not None and context.meta.get(_TRACEBACK) and error.__cause__ is not None:
+                say_lines("".join(traceback.format_exception(error.__cause__)).rstrip(), err=True)
             say_lines(f"error: {error}", err=True)
             sys.exit(getattr(error, "exit_code", 1))
         except SystemExit as error:
@@ -97,6 +101,7 @@ def scene_options(required: bool = True) -> Callable[[Callable[..., None]], Call
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
         for option in (
+            traceback_option,
             click.option("--duration", metavar="S", help="Length of the run in seconds."),
             seed_option,
             swap_option,
@@ -123,6 +128,18 @@ def completing(what: str) -> Callable[[click.Context, click.Parameter, str], lis
     return complete
 
 
+def _note_traceback(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    ctx.meta[_TRACEBACK] = value
+
+
+_TRACEBACK = "dsa_des.traceback"
+traceback_option = click.option(
+    "--traceback",
+    is_flag=True,
+    expose_value=False,
+    callback=_note_traceback,
+    help="Where a block fails, show the calls that led there.",
+)
 seed_option = click.option("--seed", type=int, metavar="N", help="Seed of all random draws.")
 set_option = click.option(
     "--set",

@@ -20,7 +20,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, ends_its_run
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
-from dsa_des.block.foreign_calls import error_text, must_pass
+from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.running.channel import Inputs
@@ -303,7 +303,7 @@ class HostDriven:
         return step
 
     def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
-        reason = error_text(error)
+        reason = error_at(error, type(runner.component))
         path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
         return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
 

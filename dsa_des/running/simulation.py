@@ -17,7 +17,7 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, ends_its_run
-from dsa_des.block.foreign_calls import error_text, must_pass
+from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
@@ -321,4 +321,4 @@ class Simulation:
 def _failure(
     name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
 ) -> BlockFailure:
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, error_text(error))
+    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, error_at(error, cls))

@@ -1,5 +1,7 @@
 """An exception inside a block says which block, when, and at which scan."""
 
+from pathlib import Path
+
 import engine_blocks as blocks
 import pytest
 
@@ -17,10 +19,16 @@ def failure(lab, cells, wires, **options):
 def test_failing_in_run_names_the_block_the_time_and_the_scan(lab, kind, window):
     cells = {"radar": f"{kind}; scan_rate_hz = 10", "end": "Relay"}
     error = failure(lab, cells, ['"radar -> end"'], window=window)
-    assert str(error) == (
+    said, _, place = str(error).partition(" (/")
+    assert said == (
         f"radar (engine_blocks:{kind}) failed at t = 1.200 s, scan 12: "
         "ValueError: the antenna fell off"
     )
+    line, _, name = place.removesuffix(")").rpartition(", in ")
+    file, _, number = line.rpartition(", line ")
+    assert Path(blocks.__file__) == Path(f"/{file}") and name == "_raise"
+    text = Path(blocks.__file__).read_text(encoding="utf-8").splitlines()[int(number) - 1]
+    assert "raise ValueError" in text
     assert isinstance(error.__cause__, ValueError)
     assert (error.block, error.scan, error.time_s) == ("radar", 12, 1.2)
 
@@ -42,7 +50,7 @@ def test_an_exception_with_keyword_arguments_survives(lab):
     for kind in ("Faulty", "FaultyWindowed"):
         cells = {"radar": f"{kind}; scan_rate_hz = 10; how = 'keyword'", "end": "Relay"}
         error = failure(lab, cells, ['"radar -> end"'])
-        assert str(error).endswith("failed at t = 1.200 s, scan 12: KeywordOnly: code 7")
+        assert "failed at t = 1.200 s, scan 12: KeywordOnly: code 7 (/" in str(error)
         assert isinstance(error.__cause__, blocks.KeywordOnly)
         assert error.__cause__.code == 7
 

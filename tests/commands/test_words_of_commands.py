@@ -135,3 +135,61 @@ def test_what_a_scene_acknowledges_is_not_said(tmp_path):
         assert done.exit_code == 0 and len(done.stderr.splitlines()) == lines
         assert all(line.startswith("note: blocks.radar: ") for line in done.stderr.splitlines())
     assert call("run", "first_light", "--duration", "1", "--no-figures").stderr == ""
+
+
+OWN = """
+import numpy as np
+from components.sensor import Look, Sensor, SensorParameters
+
+def helper(x):
+    return x["nothing"]
+
+class Counting(Sensor):
+    Parameters = SensorParameters
+    measures_range = True
+    calls = 0
+    def look(self, cells):
+        self.calls += 1
+        return Look(np.full(cells.range_m.shape, self.calls % 2 == 0), cells.range_m)
+
+class Honest(Counting):
+    def look(self, cells):
+        return Look(cells.draws(self.stream("x")) < 0.5, cells.range_m)
+
+class Broken(Counting):
+    def look(self, cells):
+        helper({})
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    name = f"own_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(OWN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return name
+
+
+def test_a_block_that_counts_its_calls_is_found_by_check(own):
+    done = call("check", "first_light", "--swap", f"radar={own}:Counting")
+    assert done.exit_code == 2
+    (line,) = [text for text in done.stderr.splitlines() if text.startswith("error: ")]
+    assert "blocks.radar.type: gives other results" in line and "table detections" in line
+    assert call("check", "first_light", "--swap", f"radar={own}:Honest").exit_code == 0
+
+
+@pytest.mark.parametrize("command", ["run", "cost", "check"])
+def test_a_mistake_in_ones_own_block_names_file_line_and_function(own, command, tmp_path):
+    words = (command, "first_light", "--swap", f"radar={own}:Broken", "--duration", "2")
+    done = call(*words)
+    assert done.exit_code == 1
+    where = f"KeyError: 'nothing' ({tmp_path / own}.py, line 6, in helper)"
+    assert done.stderr.splitlines()[-1].endswith(where) and "Traceback" not in done.stderr
+    more = call(*words, "--traceback")
+    assert more.stderr.splitlines()[-1].endswith(where)
+    assert "Traceback" in more.stderr and "in look" in more.stderr
+
+
+def test_a_type_without_a_ladder_is_named(own):
+    done = call("cost", "first_light", "--swap", f"radar={own}:Honest", "--block", "radar")
+    assert f"error: radar: {own}:Honest declares no ladder" in done.stderr

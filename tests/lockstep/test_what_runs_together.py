@@ -46,6 +46,7 @@ SCENES = {
         "blocks.radar.beam_sweep=true", "blocks.radar.measures_range_rate=true",
         "blocks.avoidance.pause_s=2",
     ], "manoeuvres"),
+    "what aircraft broadcast": ("surveillance/ads_b.toml", "8", [], "detections"),
     "a camera that weighs motion": ("first_light.toml", "5", [
         "blocks.eo.dynamic_weight=20", "blocks.traffic.intruders[0].north_m=3000",
     ], "detections"),

@@ -1,0 +1,1 @@
+"""Cooperative surveillance: what transponders broadcast, and what they answer."""

@@ -1,0 +1,321 @@
+"""Active surveillance, as TCAS has it: transponders are asked, and answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from components.geometry.angles import wrap_pi_unchecked
+from components.messages.detections import LastingError, LastingPart, SensorOffer
+from components.messages.reach import Reach
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells, Look
+from components.sensor.parameters import rising_elevations
+from components.surveillance.altimetry import altimetry_variance_ft2
+from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
+from components.surveillance.broadcast import Altimeters, Who
+from components.surveillance.cooperative import (
+    STEP_S,
+    CooperativeParameters,
+    CooperativeSensor,
+)
+from components.surveillance.interrogation import (
+    CUT,
+    IN_1_S,
+    MODE_C_REACH_M,
+    MODE_S_REACH_M,
+    RANGE_BIAS_M,
+    RANGE_CORRELATION_S,
+    RANGE_ERROR_M,
+    ROUND_S,
+    ROUNDS,
+    answered_in_round,
+    bearing_deviation_rad,
+    is_near,
+    reach_m,
+    sine_of_elevation,
+)
+from components.surveillance.reports import unreported
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.wake import Wake
+from dsa_des.time.clock import NANOSECONDS
+from dsa_des.time.gauss_markov import GaussMarkov
+from dsa_des.time.timeline import first_scan, own_scans
+
+#: A rate of climb is that of the reported altitude over so long.
+CLIMB_OVER_S = 5.0
+_FARTHEST_M = max(MODE_S_REACH_M, *MODE_C_REACH_M)
+_LEAST_M2 = 1e-4
+
+
+class ActiveParameters(CooperativeParameters):
+    """Parameters of active surveillance."""
+
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+        default=(-15.0, 20.0), description="Elevations at which answers come, deg."
+    )
+    replies: Literal["certain", "rounds"] = Field(
+        default="rounds",
+        description="Whether all that are asked answer, or each with a probability in ten rounds "
+        "of 0.1 s.",
+    )
+    mode_s_in_1_s: float = Field(
+        default=IN_1_S[0], gt=0, lt=1, description="Probability of a Mode S answer within 1 s."
+    )
+    mode_c_in_1_s: float = Field(
+        default=IN_1_S[1], gt=0, lt=1, description="Probability of a Mode C answer within 1 s."
+    )
+    measurement: Literal["exact", "do_365"] = Field(
+        default="do_365",
+        description="Errors of range, bearing and reported altitude: none, or those of DO-365.",
+    )
+    mode_s_step_ft: Literal[25, 100] = Field(
+        default=25, description="Step of altitudes that Mode S reports, ft; Mode C has 100."
+    )
+    near_s: float = Field(
+        default=60.0,
+        ge=0,
+        description="Who would be met within this time is asked at every scan, s.",
+    )
+    far_every: int = Field(
+        default=5, ge=1, le=1000, description="Of others, one scan in so many asks each."
+    )
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> Self:
+        if self.range_km is not None and self.range_km * 1000.0 > _FARTHEST_M:
+            raise ValueError(
+                f"range_km is {self.range_km:g}: no transponder answers beyond "
+                f"{_FARTHEST_M / 1000.0:.1f} km; it must be at most that"
+            )
+        return self
+
+    def reach(self) -> Reach:
+        """Return the reach: as far as anybody answers, where none is given."""
+        reach = super().reach()
+        return reach if self.range_km is not None else replace(reach, range_max_m=_FARTHEST_M)
+
+
+def measure_replies(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability of an answer at each (scan, target) if it is asked."""
+    active: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {"answers": active.answer_probability(cells)}
+
+    return dict(over_cells(active, wake, values))
+
+
+def measure_ranges(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return what is measured of each (scan, target): range, and height above the ownship."""
+    active: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        everybody = np.arange(len(cells))
+        return {
+            "range": active.measured_range_m(cells, everybody),
+            "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
+        }
+
+    return dict(over_cells(active, wake, values))
+
+
+REPLIES = Ladder(
+    "replies",
+    (
+        Rung("certain", "whoever is asked answers", parameters={"replies": "certain"}),
+        Rung("rounds", "ten rounds of 0.1 s (DO-365)", parameters={"replies": "rounds"}),
+    ),
+    "rounds",
+    (Quantity("answers", ""),),
+    measure_replies,
+)
+MEASUREMENT = Ladder(
+    "active measurement",
+    (
+        Rung("exact", "the truth", parameters={"measurement": "exact"}),
+        Rung("do_365", "errors of DO-365", parameters={"measurement": "do_365"}),
+    ),
+    "do_365",
+    (Quantity("range", "m"), Quantity("altitude", "m")),
+    measure_ranges,
+)
+
+
+class Active(CooperativeSensor):
+    """Asks transponders at its scans: range, coarse bearing, reported altitude, identity.
+
+    Who may be met soon is asked at every scan, others at one in five, each at its own. Mode S
+    answers with its address, Mode C without; how far, by sector. An answer counts if any of the
+    last ten rounds of 0.1 s got one. The elevation is that of the reported altitude above the
+    ownship's own. The confidence is the probability of an answer.
+
+    Notes
+    -----
+    Numbers: RTCA DO-365, appendix Q. The stated variance of a range holds the delay of
+    transponders, which is not known of any one of them.
+    """
+
+    Parameters = ActiveParameters
+    lockstep = True
+    ladders = (REPLIES, MEASUREMENT)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self._answers, self._bearings = self.stream("answers"), self.stream("bearing")
+        self._ranges = GaussMarkov(self.stream("range"), RANGE_CORRELATION_S)
+        self._altimeters = Altimeters(context.streams)
+        self._errs = parameters.measurement != "exact"
+
+    def offer(self, port: str) -> Any:
+        """Say that variances differ from answer to answer, and what of the range's lasts."""
+        offer: SensorOffer = super().offer(port)
+        lasting = {
+            "range": LastingError(parts=(LastingPart(RANGE_ERROR_M**2, RANGE_CORRELATION_S),))
+        }
+        return replace(
+            offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
+            range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
+        )  # fmt: skip
+
+    def answer_probability(self, cells: Cells) -> FloatArray:
+        """Return the probability that each cell's aircraft answers if it is asked."""
+        equipage = cells.roster.equipage
+        mode_s, mode_c = equipage.mode_s[cells.craft], equipage.mode_c[cells.craft]
+        within = cells.range_m <= reach_m(cells.body_azimuth_rad, mode_s)
+        in_1_s = np.where(mode_s, self.p.mode_s_in_1_s, self.p.mode_c_in_1_s)
+        if self.p.replies == "certain":
+            in_1_s = np.ones(len(cells))
+        return np.where(within & (mode_s | mode_c), in_1_s, 0.0)
+
+    def look(self, cells: Cells) -> Look:
+        """Ask, and take what is answered."""
+        probability = self.answer_probability(cells)
+        detected = probability > 0.0
+        asked = np.flatnonzero(detected)
+        detected[asked] = self._is_asked(cells, asked)
+        asked = np.flatnonzero(detected)
+        if self.p.replies == "rounds":
+            detected[asked] = self._answer(cells, asked, probability[asked])
+        found = np.flatnonzero(detected)
+        extras = unreported(len(cells))
+        equipage, craft = cells.roster.equipage, cells.craft[found]
+        extras["address"][found] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
+        now = self.reported_altitude_m(cells, found, cells.alt_m[found])
+        extras["reported_alt_m"][found] = now
+        extras["reported_s"][found] = cells.state_ns[found] / NANOSECONDS
+        if len(found):
+            extras["reported_climb_m_s"][found] = self._climb(cells, found, now)
+        return Look(detected, probability, extras)
+
+    def _is_asked(self, cells: Cells, which: AnyArray) -> BoolArray:
+        """Return who is asked at this scan: who is near, and of others each at its own scans."""
+        if self.p.far_every == 1 or not len(which):
+            return np.ones(len(which), dtype=bool)
+        every = self.p.far_every
+        turn = (cells.roster.keys_of(cells.target[which]) % np.uint64(every)).astype(np.int64)
+        due = (own_scans(cells.scan[which]) + turn) % every == 0
+        rest = which[~due]
+        if len(rest):
+            at = [cells.seen_at(rest, np.full(len(rest), s)) for s in (-STEP_S, STEP_S)]
+            there = at[0]["present"] & at[1]["present"]
+            rate = np.where(there, (at[1]["range_m"] - at[0]["range_m"]) / (2.0 * STEP_S), 0.0)
+            due[~due] = is_near(cells.range_m[rest], rate, self.p.near_s)
+        return np.asarray(due)
+
+    def _answer(self, cells: Cells, which: AnyArray, in_1_s: FloatArray) -> BoolArray:
+        """Return who answered in any of the last ten rounds; a run begins with one that is full."""
+        last = cells.state_ns[which] // round(ROUND_S * NANOSECONDS)
+        rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
+        begin = first_scan(1) * cells.replica[which]
+        keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
+        drawn = self._answers.uniform(keys, (begin[:, np.newaxis] + rounds).reshape(-1))
+        p = answered_in_round(in_1_s)[:, np.newaxis]
+        return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
+
+    def _who(self, cells: Cells, which: AnyArray) -> Who:
+        keys = cells.roster.keys_of(cells.target[which])
+        return Who(keys, cells.replica[which], cells.craft[which])
+
+    def reported_altitude_m(
+        self, cells: Cells, which: AnyArray, altitude_m: FloatArray
+    ) -> FloatArray:
+        """Return what some cells' transponders report of true altitudes, m."""
+        who = self._who(cells, which)
+        mode_s = cells.roster.equipage.mode_s[who.craft]
+        step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0) if self._errs else 0.0
+        return self._altimeters.reported_ft(who, altitude_m, step, self._errs) * FOOT_M
+
+    def _climb(self, cells: Cells, found: AnyArray, now_m: FloatArray) -> FloatArray:
+        """Return how fast reported altitudes changed in the last 5 s; NaN where none was then."""
+        then = cells.seen_at(found, np.full(len(found), -CLIMB_OVER_S))
+        before_m = self.reported_altitude_m(cells, found, then["alt_m"])
+        known = then["present"] & (cells.state_ns[found] >= CLIMB_OVER_S * NANOSECONDS)
+        return np.where(known, (now_m - before_m) / CLIMB_OVER_S, np.nan)
+
+    def measured_range_m(self, cells: Cells, which: AnyArray) -> FloatArray:
+        """Return the ranges that the answers of some cells come from, m."""
+        range_m: FloatArray = cells.range_m[which]
+        if not self._errs:
+            return range_m
+        who = self._who(cells, which)
+        drawn = self._ranges(who.keys, cells.state_ns[which], replica=who.replica)
+        bias = np.where(cells.roster.equipage.mode_s[who.craft], *RANGE_BIAS_M)
+        return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
+
+    def _measured(
+        self,
+        cells: Cells,
+        found: AnyArray,
+        look: Look,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        range_m: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return measured lines of sight in body axes, and their variances."""
+        own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
+        distance = self.measured_range_m(cells, found)
+        deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
+        drawn = self._bearings.normal(cells.roster.keys_of(cells.target[found]), cells.scan[found])
+        # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
+        turned = own.yaw_rad - cells.own_attitude[0][found]
+        bearing = cells.azimuth_rad[found] + turned + deviation * np.clip(drawn, -CUT, CUT)
+        altitude = look.extras["reported_alt_m"][found]
+        rise = sine_of_elevation(altitude - own.alt_m, distance)
+        ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
+        ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
+        azimuth, elevation, _ = in_body(own, ned)
+        variances = variances_in_body(
+            own, ned, self._variances(cells, found, ned, altitude, deviation)
+        )
+        beside = {
+            "azimuth_variance_rad2": variances[0],
+            "elevation_variance_rad2": variances[1],
+            "range_variance_m2": variances[2],
+        }
+        return wrap_pi_unchecked(azimuth), elevation, distance, beside
+
+    def _variances(
+        self,
+        cells: Cells,
+        found: AnyArray,
+        ned: FloatArray,
+        altitude_m: FloatArray,
+        deviation: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return variances of the place across, along and vertical, m²."""
+        if not self._errs:
+            least = np.full(len(found), _LEAST_M2)
+            return least, least, least
+        mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
+        step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
+        across = (np.hypot(ned[0], ned[1]) * deviation) ** 2
+        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2
+        high = (altimetry_variance_ft2(altitude_m / FOOT_M) + step**2 / 12.0) * FOOT_M**2
+        return np.maximum(across, _LEAST_M2), along, high

@@ -1,0 +1,404 @@
+"""A receiver of ADS-B: the squitters that come through, put together into reports."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.messages.columns import OWN_VELOCITY
+from components.messages.detections import Detections, SensorOffer
+from components.messages.reach import Reach
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells, Look
+from components.surveillance.altimetry import altimetry_variance_ft2
+from components.surveillance.believed_line import (
+    OwnBelief,
+    carried_on,
+    in_body,
+    towards,
+    variances_in_body,
+)
+from components.surveillance.broadcast import Broadcasts, Sent, Who
+from components.surveillance.cooperative import (
+    PLACE,
+    STEP_S,
+    CooperativeParameters,
+    CooperativeSensor,
+    velocity_of,
+)
+from components.surveillance.extended_squitter import KNOT_M_S
+from components.surveillance.reception import LAWS
+from components.surveillance.reports import unreported
+from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.wake import Wake
+from dsa_des.time.clock import NANOSECONDS
+from dsa_des.time.timeline import first_scan
+
+#: Longest time that a message counts for: nobody is reported by older ones.
+LONGEST_S = 5.0
+
+
+class AdsBParameters(CooperativeParameters):
+    """Parameters of a receiver of ADS-B."""
+
+    reception: Literal["certain", "do_365", "fitted"] = Field(
+        default="fitted",
+        description="Probability over range that a squitter is received: 1; the steps of DO-365 to "
+        "20 nmi; the law fitted to 23 receivers, to 290 nmi.",
+    )
+    position_errors: Literal["none", "white", "gauss_markov"] = Field(
+        default="gauss_markov",
+        description="Errors of what aircraft send, by their NACp and NACv and of their altimeters: "
+        "none, new with each message, or lasting 300 s (DO-365).",
+    )
+    compact: bool = Field(
+        default=True,
+        description="Whether what is sent is rounded as in the messages: compact positions, 25 ft, "
+        "whole knots, 64 ft/min.",
+    )
+    velocity_age_s: float = Field(
+        default=3.0,
+        ge=0.5,
+        le=LONGEST_S,
+        description="Oldest velocity message that goes with a position, s.",
+    )
+
+    @model_validator(mode="after")
+    def _within_reception(self) -> Self:
+        ends_km = LAWS[self.reception][1] / 1000.0
+        if self.range_km is not None and self.range_km > ends_km:
+            raise ValueError(
+                f"range_km is {self.range_km:g}: nothing is received beyond {ends_km:.1f} km with "
+                f"reception '{self.reception}'; it must be at most that"
+            )
+        return self
+
+    def reach(self) -> Reach:
+        """Return the reach: that of the law of reception, where none is given."""
+        reach = super().reach()
+        if self.range_km is not None:
+            return reach
+        return replace(reach, range_max_m=LAWS[self.reception][1])
+
+
+def measure_reception(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability that a squitter sent at each (scan, target) is received."""
+    receiver: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {"reception": receiver.law(cells.range_m)}
+
+    return dict(over_cells(receiver, wake, values))
+
+
+def measure_position(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return how far reports lie off what the aircraft are, north and east, m, at every look."""
+    receiver: Any = block
+    receiver.law = LAWS["certain"][0]
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        look = receiver.look(cells)
+        here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
+        said = [look.extras[f"reported_{name}"] for name in PLACE]
+        away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
+        return {"north": away[0], "east": away[1]}
+
+    return dict(over_cells(receiver, wake, values))
+
+
+RECEPTION = Ladder(
+    "reception",
+    (
+        Rung("certain", "all squitters in reach", parameters={"reception": "certain"}),
+        Rung("do_365", "two steps to 20 nmi (DO-365)", parameters={"reception": "do_365"}),
+        Rung("fitted", "the law fitted to 23 receivers", parameters={"reception": "fitted"}),
+    ),
+    "fitted",
+    (Quantity("reception", ""),),
+    measure_reception,
+    clears=("range_km",),
+)
+ERRORS = Ladder(
+    "broadcast errors",
+    (
+        Rung("none", "what the aircraft truly do",
+             parameters={"position_errors": "none", "compact": False}),
+        Rung("compact", "rounded as in the messages",
+             parameters={"position_errors": "none", "compact": True}),
+        Rung("white", "errors new with each message",
+             parameters={"position_errors": "white", "compact": True}),
+        Rung("gauss_markov", "errors that last 300 s",
+             parameters={"position_errors": "gauss_markov", "compact": True}),
+    ),
+    "gauss_markov",
+    (Quantity("north", "m"), Quantity("east", "m")),
+    measure_position,
+)  # fmt: skip
+
+
+class AdsB(CooperativeSensor):
+    """Reports equipped aircraft by the last position and velocity messages received of each.
+
+    Aircraft send positions and velocities at random intervals of 0.4 to 0.6 s, each by a clock of
+    its own; a message comes through with a probability by range. At each scan an aircraft is
+    reported of which a position was received since the last one (in the last 5 s at most), as
+    decoded from a single message, carried on to the scan by the last velocity. The confidence is
+    the NACp.
+
+    Notes
+    -----
+    Errors: RTCA DO-365, appendix Q; messages: DO-260B. A message is judged at its own instant:
+    where both aircraft then are, by what is known of their flights at the scan.
+    """
+
+    Parameters = AdsBParameters
+    lockstep = True
+    ladders = (RECEPTION, ERRORS)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.law = LAWS[parameters.reception][0]
+        #: Scan of each cell of the last look, and the ownship's velocity then.
+        self._rows: tuple[IntArray, FloatArray] | None = None
+        streams = context.streams
+        self._clocks = {
+            kind: SquitterClocks(streams.stream("[equipage]", f"{kind} messages"))
+            for kind in ("position", "velocity")
+        }
+        self._received = {kind: self.stream(f"{kind} received") for kind in self._clocks}
+        self._broadcasts = Broadcasts(streams, parameters.position_errors, parameters.compact)
+        self._age_s = {
+            "position": min(1.0 / float(parameters.scan_rate_hz), LONGEST_S),
+            "velocity": parameters.velocity_age_s,
+        }
+
+    def offer(self, port: str) -> Any:
+        """Say that all variances differ from report to report."""
+        offer: SensorOffer = super().offer(port)
+        return replace(
+            offer, measures_range_rate=True, azimuth_variance_rad2=None,
+            elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
+            lasting=None, unstated_across_m2=0.0,
+        )  # fmt: skip
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """No quantity has a grid in the line of sight."""
+        return {**super().steps, "range_rate": 0.0}
+
+    def look(self, cells: Cells) -> Look:
+        """Receive what was sent up to each scan, and decode the last of it."""
+        equipage = cells.roster.equipage
+        who = Who(cells.roster.keys_of(cells.target), cells.replica, cells.craft)
+        here_ns = cells.state_ns
+        extras = unreported(len(cells))
+        own_velocity = np.full((3, len(cells)), np.nan)
+        sends = np.flatnonzero(equipage.ads_b[who.craft])
+        told = self._last_received("position", cells, sends, who, here_ns, equipage)
+        found, position, sent_ns = told
+        detected = np.zeros(len(cells), dtype=bool)
+        detected[found] = True
+        if len(found):
+            self._report(cells, found, position, sent_ns, who, here_ns, equipage, extras)
+            own_velocity[:, found] = self._own_velocity(cells, found)
+        moves = {f"own_{axis}": own_velocity[i] for i, axis in enumerate(("north", "east", "down"))}
+        self._rows = cells.row, own_velocity
+        confidence = np.where(detected, equipage.nacp[who.craft], 0.0)
+        return Look(detected, confidence, extras, signal=moves)
+
+    def _last_received(
+        self,
+        kind: str,
+        cells: Cells,
+        asked: IntArray,
+        who: Who,
+        here_ns: IntArray,
+        equipage: Any,
+    ) -> tuple[IntArray, IntArray, IntArray]:
+        """Return the cells of which a message was received, its number and when it was sent."""
+        none = np.zeros(0, dtype=np.int64)
+        if not len(asked):
+            return none, none, none
+        age_s = self._age_s[kind]
+        count = math.ceil(age_s / SHORTEST_S) + 1
+        those = who.take(asked)
+        number, sent_ns, counts = self._clocks[kind].latest(
+            those.keys, those.replica, here_ns[asked], count
+        )
+        counts &= sent_ns > (here_ns[asked] - round(age_s * NANOSECONDS))[:, np.newaxis]
+        counts &= sent_ns < (equipage.silent_after_s[those.craft] * NANOSECONDS)[:, np.newaxis]
+        row, place = np.nonzero(counts)
+        if not len(row):
+            return none, none, none
+        each = asked[row]
+        ahead_s = (sent_ns[row, place] - here_ns[each]) / NANOSECONDS
+        then = cells.seen_at(each, ahead_s)
+        drawn = self._received[kind].uniform(
+            those.keys[row], first_scan(1) * those.replica[row] + number[row, place]
+        )
+        came = then["present"] & (drawn < self.law(then["range_m"]))
+        if "hidden" in then:
+            came &= ~then["hidden"]
+        came &= self._known_then(cells, each, ahead_s, equipage.latency_s[those.craft[row]])
+        counts[row, place] = came
+        some = np.flatnonzero(counts.any(axis=1))
+        newest = counts[some].argmax(axis=1)
+        return asked[some], number[some, newest], sent_ns[some, newest]
+
+    def _known_then(
+        self, cells: Cells, each: IntArray, ahead_s: FloatArray, latency_s: FloatArray
+    ) -> BoolArray:
+        """Return whether aircraft were there when what they send was measured."""
+        known = np.ones(len(each), dtype=bool)
+        late = np.flatnonzero(latency_s > 0.0)
+        if len(late):
+            known[late] = cells.seen_at(each[late], ahead_s[late] - latency_s[late])["present"]
+        return known
+
+    def _report(
+        self,
+        cells: Cells,
+        found: IntArray,
+        number: IntArray,
+        sent_ns: IntArray,
+        who: Who,
+        here_ns: IntArray,
+        equipage: Any,
+        extras: dict[str, AnyArray],
+    ) -> None:
+        """Fill in what was decoded of some cells."""
+        those = who.take(found)
+        sent = self._sent(cells, found, number, sent_ns, those, here_ns, equipage)
+        said = self._broadcasts.position(
+            equipage, those, sent,
+            lambda: self._broadcasts.velocity(equipage, those, sent),
+        )  # fmt: skip
+        for name, values in zip(PLACE, said, strict=True):
+            extras[f"reported_{name}"][found] = values
+        extras["reported_s"][found] = sent_ns / NANOSECONDS
+        for name in ("address", "nacp", "nic"):
+            extras[name][found] = getattr(equipage, name)[those.craft]
+        moving, number, sent_ns = self._last_received(
+            "velocity", cells, found, who, here_ns, equipage
+        )
+        if not len(moving):
+            return
+        those = who.take(moving)
+        sent = self._sent(cells, moving, number, sent_ns, those, here_ns, equipage)
+        velocity = self._broadcasts.velocity(equipage, those, sent)
+        for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
+            extras[f"reported_{axis}_m_s"][moving] = values
+        extras["velocity_s"][moving] = sent_ns / NANOSECONDS
+        extras["nacv"][moving] = equipage.nacv[those.craft]
+
+    def _sent(
+        self,
+        cells: Cells,
+        which: IntArray,
+        number: IntArray,
+        sent_ns: IntArray,
+        who: Who,
+        here_ns: IntArray,
+        equipage: Any,
+    ) -> Sent:
+        """Return what was true when what messages say was measured."""
+        latency_s = equipage.latency_s[who.craft]
+        instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
+        ahead_s = (instant_ns - here_ns[which]) / NANOSECONDS
+        then = cells.seen_at(which, ahead_s)
+        velocity = velocity_of(cells, which, ahead_s, then, "target")
+        velocity[2] = -velocity[2]
+        lat, lon, alt = (then[f"target_{name}"] for name in PLACE)
+        return Sent(lat, lon, alt, velocity, number, instant_ns)
+
+    def _own_velocity(self, cells: Cells, found: IntArray) -> FloatArray:
+        now = np.zeros(len(found))
+        return velocity_of(cells, found, now, cells.seen_at(found, now), "own")
+
+    def _measured(
+        self,
+        cells: Cells,
+        found: IntArray,
+        look: Look,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        range_m: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return lines of sight to what is reported, at the scan, and their variances."""
+        said = {name: values[found] for name, values in look.extras.items()}
+        own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
+        velocity = np.stack([
+            said["reported_north_m_s"], said["reported_east_m_s"], -said["reported_climb_m_s"]
+        ])  # fmt: skip
+        age_s = cells.state_ns[found] / NANOSECONDS - said["reported_s"]
+        place = [said[f"reported_{name}"] for name in PLACE]
+        ned = towards(own, *carried_on(place, np.nan_to_num(velocity) * age_s))
+        # Its velocity is in its own axes, which are turned against ours.
+        ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + STEP_S)))
+        moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
+        azimuth, elevation, distance = in_body(own, ned)
+        variances, rate_variance = self._variances(own, ned, said, age_s, cells, found)
+        moves = np.stack([look.signal[f"own_{axis}"][found] for axis in ("north", "east", "down")])
+        rate = ((moving - moves) * ned).sum(axis=0) / distance
+        beside = {
+            "azimuth_variance_rad2": variances[0],
+            "elevation_variance_rad2": variances[1],
+            "range_variance_m2": variances[2],
+            "range_rate_m_s": rate,
+            "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
+        }
+        return azimuth, elevation, distance, beside
+
+    def _variances(
+        self,
+        own: OwnBelief,
+        ned: FloatArray,
+        said: dict[str, AnyArray],
+        age_s: FloatArray,
+        cells: Cells,
+        found: IntArray,
+    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """Return the variances of lines of sight and of range rates that the categories state."""
+        equipage, craft = cells.roster.equipage, cells.craft[found]
+        errs, rounds = self.p.position_errors != "none", self.p.compact
+        moving = ~np.isnan(said["reported_north_m_s"])
+        place = np.where(errs, equipage.position_deviation_m[craft] ** 2, _LEAST_M2)
+        speed = np.where(errs, equipage.velocity_deviation_m_s[craft] ** 2, _LEAST_M2)
+        feet = said["reported_alt_m"] / FOOT_M
+        high = np.where(errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
+        if rounds:
+            place, speed = place + _COMPACT_M2, speed + KNOT_M_S**2 / 12.0
+            high = high + (25.0 * FOOT_M) ** 2 / 12.0
+        # Without a velocity an aircraft may have gone anywhere at the speed of one.
+        unknown_m2 = np.where(moving, speed, _UNKNOWN_M_S**2) * age_s**2
+        level = place + unknown_m2
+        return variances_in_body(own, ned, (level, level, high)), speed
+
+    def run(self, wake: Wake) -> Detections | None:
+        """Report what was received, with the ownship's velocity beside."""
+        self._rows = None
+        report = super().run(wake)
+        if report is None:
+            return None
+        moves = np.full((3, len(report)), np.nan)
+        if self._rows is not None:
+            row, velocity = self._rows
+            some = np.flatnonzero(np.isfinite(velocity[0]))
+            moves[:, row[some]] = velocity[:, some]
+        return replace(report, own_velocity=dict(zip(OWN_VELOCITY, moves, strict=True)))
+
+
+#: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
+_COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
+_UNKNOWN_M_S = 100.0
+#: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
+_LEAST_M2 = 1e-4

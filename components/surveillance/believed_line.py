@@ -1,0 +1,98 @@
+"""The line of sight to where an aircraft says it is, as the ownship believes it, and its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.geometry.attitude import body_angles_unchecked, ned_to_body_unchecked
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.navigation.errors import position_with_error
+from dsa_des.arrays.types import FloatArray
+
+# Nearer to the vertical of the body an azimuth says nothing; nearer than this a range is none.
+_LEAST_COS, _NEAREST_M = 1e-3, 1e-3
+
+
+@dataclass(frozen=True)
+class OwnBelief:
+    """The ownship's position and attitude as it believes them, (n,) each."""
+
+    lat_deg: FloatArray
+    lon_deg: FloatArray
+    alt_m: FloatArray
+    yaw_rad: FloatArray
+    pitch_rad: FloatArray
+    roll_rad: FloatArray
+
+    @property
+    def attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Yaw, pitch and roll."""
+        return self.yaw_rad, self.pitch_rad, self.roll_rad
+
+
+def towards(
+    own: OwnBelief, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
+) -> FloatArray:
+    """Return north, east and down of places from where the ownship believes to be, (3, n), m."""
+    return np.stack(
+        line_of_sight_ned(
+            own.lat_deg, own.lon_deg, own.alt_m, lat_deg, lon_deg, alt_m, validate=False
+        )
+    )
+
+
+def carried_on(
+    place: Sequence[FloatArray], north_east_down_m: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return places (latitude, longitude, altitude) moved by (3, n) m in their own axes."""
+    north, east, down = north_east_down_m
+    lat, lon, alt = place
+    return position_with_error(
+        lat, lon, alt, sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, down)
+    )
+
+
+def in_body(own: OwnBelief, ned: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return azimuth, elevation in body axes and range of north, east and down."""
+    body = ned_to_body_unchecked(ned[0], ned[1], ned[2], *own.attitude)
+    azimuth, elevation = body_angles_unchecked(*body)
+    range_m = np.maximum(np.sqrt((ned**2).sum(axis=0)), _NEAREST_M)
+    return np.asarray(azimuth), np.asarray(elevation), range_m
+
+
+def variances_in_body(
+    own: OwnBelief, ned: FloatArray, variance: tuple[FloatArray, FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return variances of azimuth and elevation (rad²) and range (m²).
+
+    `variance` holds those of the place along three directions at right angles, m²: across the
+    line of sight in the horizontal, along it in the horizontal, and vertical.
+    """
+    ground = np.maximum(np.hypot(ned[0], ned[1]), _NEAREST_M)
+    range_m = np.maximum(np.hypot(ground, ned[2]), _NEAREST_M)
+    zero, one = np.zeros_like(ground), np.ones_like(ground)
+    side = np.stack([-ned[1] / ground, ned[0] / ground, zero])
+    ahead = np.stack([ned[0] / ground, ned[1] / ground, zero])
+    body = [
+        np.stack(ned_to_body_unchecked(axis[0], axis[1], axis[2], *own.attitude))
+        for axis in (side, ahead, np.stack([zero, zero, one]))
+    ]
+    azimuth, elevation, _ = in_body(own, ned)
+    level = np.maximum(np.cos(elevation), _LEAST_COS)
+    along = np.stack(
+        [
+            np.cos(azimuth) * np.cos(elevation),
+            np.sin(azimuth) * np.cos(elevation),
+            -np.sin(elevation),
+        ]
+    )
+    across = np.stack([-np.sin(azimuth), np.cos(azimuth), zero])
+    upward = np.cross(across, along, axis=0)
+    found = [zero, zero, zero]
+    for axis, square in zip(body, variance, strict=True):
+        for number, direction in enumerate((across, upward, along)):
+            found[number] = found[number] + (axis * direction).sum(axis=0) ** 2 * square
+    return found[0] / (range_m * level) ** 2, found[1] / range_m**2, found[2]

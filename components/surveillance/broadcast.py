@@ -1,0 +1,178 @@
+"""What aircraft know and say of themselves: position, velocity and altitude with their errors.
+
+The errors belong to the aircraft: all that receive it have the same, and so have its replies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from components.aircraft.equipage import Equipage
+from components.navigation.errors import position_with_error
+from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
+from components.surveillance.compact_position import decode_near, encode
+from components.surveillance.extended_squitter import (
+    FOOT_PER_MINUTE_M_S,
+    HIGHEST_FT,
+    KNOT_M_S,
+    LOWEST_FT,
+    quantised_altitude_ft,
+    quantised_climb_ft_min,
+    quantised_speed_kt,
+)
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.time.gauss_markov import GaussMarkov
+from dsa_des.time.randomness import Streams
+from dsa_des.time.timeline import first_scan
+
+#: Correlation time of horizontal position and velocity errors, s (RTCA DO-365, appendix Q).
+CORRELATION_TIME_S = 300.0
+#: Scale of the Laplace distribution of vertical rates, new with each message (the same source).
+CLIMB_SCALE_M_S = 2.02 * FOOT_M
+#: Whose draws they are: those of aircraft, not of the block that looks.
+_OWNER = "[equipage]"
+
+Keys = npt.NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Who:
+    """Aircraft, (n,): their draw keys, replicas and places among the roster's aircraft."""
+
+    keys: Keys
+    replica: IntArray
+    craft: IntArray
+
+    def take(self, which: IntArray) -> Who:
+        """Return some of them."""
+        return Who(self.keys[which], self.replica[which], self.craft[which])
+
+
+class Altimeters:
+    """The altimeters of all aircraft."""
+
+    def __init__(self, streams: Streams) -> None:
+        self._stream = streams.stream(_OWNER, "altimetry")
+
+    def reported_ft(
+        self, who: Who, altitude_m: FloatArray, step_ft: npt.ArrayLike, errs: bool = True
+    ) -> FloatArray:
+        """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing."""
+        altitude = altitude_m / FOOT_M
+        if errs:
+            begin = first_scan(1) * who.replica
+            laplace, kind = (self._stream.uniform(who.keys, begin, draw) for draw in (0, 1))
+            altitude = altitude + altimetry_error_ft(altitude, standard_laplace(laplace), kind)
+        step = np.broadcast_to(np.asarray(step_ft, np.float64), altitude.shape)
+        rounded = quantised_altitude_ft(altitude, np.where(step > 0.0, step, 1.0))
+        return np.where(step > 0.0, rounded, altitude)
+
+
+class OwnErrors:
+    """Errors of position and velocity of all aircraft, in two axes each.
+
+    Parameters
+    ----------
+    streams : Streams
+    errors : {"none", "white", "gauss_markov"}
+        None at all, new ones with every message, or ones that last `CORRELATION_TIME_S`.
+    """
+
+    def __init__(self, streams: Streams, errors: str) -> None:
+        self._errors = errors
+        self._streams = {name: streams.stream(_OWNER, name) for name in ("position", "velocity")}
+        self._climbs = streams.stream(_OWNER, "climb")
+        self._lasting = {
+            name: GaussMarkov(stream, CORRELATION_TIME_S) for name, stream in self._streams.items()
+        }
+
+    def of(
+        self, name: str, deviation: FloatArray, who: Who, message: IntArray, instant_ns: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the errors north and east of the position or the velocity at instants (n,)."""
+        if self._errors == "none":
+            return np.zeros(len(deviation)), np.zeros(len(deviation))
+        if self._errors == "white":
+            number = first_scan(1) * who.replica + message
+            draws = [self._streams[name].normal(who.keys, number, axis + 60_000) for axis in (0, 1)]
+        else:
+            # What is sent before the run begins is of instants before 0.
+            draws = [
+                self._lasting[name](who.keys, instant_ns, axis, who.replica) for axis in (0, 1)
+            ]
+        return deviation * draws[0], deviation * draws[1]
+
+    def of_climb(self, who: Who, message: IntArray) -> FloatArray:
+        """Return the errors of vertical rates, m/s, of messages (n,)."""
+        if self._errors == "none":
+            return np.zeros(len(message))
+        uniform = self._climbs.uniform(who.keys, first_scan(1) * who.replica + message)
+        return CLIMB_SCALE_M_S * standard_laplace(uniform)
+
+
+@dataclass(frozen=True)
+class Sent:
+    """True states at the instants that messages are of, (n,): position, and velocity (3, n)."""
+
+    lat_deg: FloatArray
+    lon_deg: FloatArray
+    alt_m: FloatArray
+    north_east_up_m_s: FloatArray
+    message: IntArray
+    instant_ns: IntArray
+
+
+class Broadcasts:
+    """What aircraft send of what they are."""
+
+    def __init__(self, streams: Streams, errors: str, quantised: bool) -> None:
+        self._own, self._altimeters = OwnErrors(streams, errors), Altimeters(streams)
+        self._errs, self._quantised = errors != "none", quantised
+
+    def velocity(self, equipage: Equipage, who: Who, sent: Sent) -> FloatArray:
+        """Return velocities north, east and up as decoded, (3, n), m/s."""
+        deviation = equipage.velocity_deviation_m_s[who.craft]
+        north, east = self._own.of("velocity", deviation, who, sent.message, sent.instant_ns)
+        found = sent.north_east_up_m_s + np.stack(
+            [north, east, self._own.of_climb(who, sent.message)]
+        )
+        if not self._quantised:
+            return np.asarray(found)
+        return np.stack([
+            quantised_speed_kt(found[0] / KNOT_M_S) * KNOT_M_S,
+            quantised_speed_kt(found[1] / KNOT_M_S) * KNOT_M_S,
+            quantised_climb_ft_min(found[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S,
+        ])  # fmt: skip
+
+    def position(
+        self, equipage: Equipage, who: Who, sent: Sent, velocity: Callable[[], FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return latitudes, longitudes and altitudes as decoded (deg, deg, m).
+
+        `velocity` gives the aircraft's own velocity (3, n), by which it compensates latency.
+        """
+        craft = who.craft
+        deviation = equipage.position_deviation_m[craft]
+        errors = self._own.of("position", deviation, who, sent.message, sent.instant_ns)
+        spoofed, ahead_s = equipage.spoofed_m[:, craft], equipage.compensated_s[craft]
+        north, east, up = errors[0] + spoofed[0], errors[1] + spoofed[1], spoofed[2]
+        if ahead_s.any():
+            moved = velocity() * ahead_s
+            north, east, up = north + moved[0], east + moved[1], up + moved[2]
+        lat, lon, _ = position_with_error(
+            sent.lat_deg, sent.lon_deg, sent.alt_m,
+            sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, np.zeros_like(north)),
+        )  # fmt: skip
+        step_ft = 25.0 if self._quantised else 0.0
+        feet = self._altimeters.reported_ft(who, sent.alt_m + up, step_ft, self._errs)
+        if not self._quantised:
+            return lat, lon, feet * FOOT_M
+        odd: BoolArray = sent.message % 2 == 1
+        y, x = encode(lat, lon, odd)
+        lat, lon = decode_near(y, x, odd, lat, lon)
+        return lat, lon, np.clip(feet, LOWEST_FT, HIGHEST_FT) * FOOT_M

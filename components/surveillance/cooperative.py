@@ -1,0 +1,88 @@
+"""What cooperative sensors have in common: their parameters, and instants between scans."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.messages.reach import Reach
+from components.sensor.look import Cells
+from components.sensor.parameters import SensorParameters
+from components.sensor.sensor import Sensor
+from components.surveillance.reports import CooperativeReports
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Output
+from dsa_des.block.mark import Mark
+
+#: Half of the time between positions that a velocity is of; a power of two.
+STEP_S = 1.0 / 64.0
+PLACE = ("lat_deg", "lon_deg", "alt_m")
+_MARK = Mark("#56B4E9", "P", 5.5)
+
+#: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
+_MEASURED_KEYS = (
+    "errors", "azimuth_error_deg", "azimuth_bias_deg", "azimuth_correlation_time_s",
+    "elevation_error_deg", "elevation_bias_deg", "elevation_correlation_time_s",
+    "azimuth_resolution_deg", "elevation_resolution_deg", "mount_azimuth_deg",
+    "mount_elevation_deg", "mount_roll_deg", "misalignment_deg",
+)  # fmt: skip
+
+
+class CooperativeParameters(SensorParameters):
+    """Parameters of what cooperative sensors share."""
+
+    @model_validator(mode="after")
+    def _measures_no_angles(self) -> Self:
+        fields = SensorParameters.model_fields
+        for key in _MEASURED_KEYS:
+            if getattr(self, key) != fields[key].default:
+                raise ValueError(
+                    f"{key} is {getattr(self, key)}: a cooperative sensor has no axes and no grid "
+                    "of its own; leave it out"
+                )
+        return self
+
+    def without_effect(self) -> list[str]:
+        """Say nothing of the keys that may not be given."""
+        quiet = (*_MEASURED_KEYS, "quantised", "biases")
+        return [said for said in super().without_effect() if not said.startswith(quiet)]
+
+
+class CooperativeSensor(Sensor):
+    """A sensor of aircraft that say where they are, or answer; axes are the ownship's."""
+
+    mark = _MARK
+    measures_range = True
+    outputs: ClassVar[Any] = {"detections": Output(CooperativeReports, "What was received.")}
+    Parameters: ClassVar[Any] = CooperativeParameters
+
+    def request(self, port: str) -> Any:
+        """Ask for the flights too: messages are sent at instants of their own."""
+        reach = super().request(port)
+        return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
+
+    @cached_property
+    def _reach_from_body(self) -> Reach:
+        return self.reach
+
+
+def velocity_of(
+    cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
+) -> FloatArray:
+    """Return velocities north, east and down (3, n), from positions 1/64 s before and after."""
+    places = [here[f"{whose}_{name}"] for name in PLACE]
+    moved, span_s = [], np.zeros(len(which))
+    for step_s in (-STEP_S, STEP_S):
+        then = cells.seen_at(which, ahead_s + step_s)
+        there = then["present"]
+        way = line_of_sight_ned(
+            *places, *(then[f"{whose}_{name}"] for name in PLACE), validate=False
+        )
+        moved.append(np.where(there, np.stack(way), 0.0))
+        span_s = span_s + np.where(there, STEP_S, 0.0)
+    return np.asarray((moved[1] - moved[0]) / np.maximum(span_s, STEP_S))

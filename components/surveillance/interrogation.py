@@ -1,0 +1,56 @@
+"""Interrogations of transponders: who answers how often, how far, and how coarse bearings are.
+
+Numbers of RTCA DO-365, appendix Q: active surveillance of Mode S and Mode C.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, FloatArray
+
+_NMI_M = 1852.0
+#: Farthest answers: Mode S all round, Mode C ahead (within 45°), at the side (135°) and behind.
+MODE_S_REACH_M = 15.6 * _NMI_M
+MODE_C_REACH_M = (20.6 * _NMI_M, 14.3 * _NMI_M, 8.0 * _NMI_M)
+AHEAD_RAD, SIDE_RAD = np.radians(45.0), np.radians(135.0)
+#: Rounds of interrogations are 0.1 s apart; an answer counts if any of the last ten came.
+ROUND_S, ROUNDS = 0.1, 10
+#: Probability of an answer in 1 s, to Mode S and to Mode C.
+IN_1_S = (0.95, 0.90)
+#: Standard deviation of bearings within 10° of the antenna's plane and beyond; cut at three.
+BEARING_RAD = np.radians(np.array([9.0, 15.0]))
+LEVEL_RAD, CUT = np.radians(10.0), 3.0
+#: From fixed distances of transponders' delays: to Mode S and to Mode C.
+RANGE_BIAS_M = (125.0 * 0.3048, 250.0 * 0.3048)
+RANGE_ERROR_M, RANGE_CORRELATION_S = 50.0 * 0.3048, 1.0
+
+
+def reach_m(bearing_rad: FloatArray, mode_s: BoolArray) -> FloatArray:
+    """Return how far transponders answer that lie at bearings (from the nose, in [-pi, pi]), m."""
+    off = np.abs(bearing_rad)
+    ahead, side, behind = MODE_C_REACH_M
+    mode_c = np.where(off <= AHEAD_RAD, ahead, np.where(off <= SIDE_RAD, side, behind))
+    return np.where(mode_s, MODE_S_REACH_M, mode_c)
+
+
+def answered_in_round(in_1_s: FloatArray) -> FloatArray:
+    """Return the probability of an answer in one round, of that in the ten rounds of 1 s."""
+    return np.asarray(1.0 - (1.0 - in_1_s) ** (1.0 / ROUNDS))
+
+
+def bearing_deviation_rad(elevation_rad: FloatArray) -> FloatArray:
+    """Return standard deviations of bearings by the elevation above the antenna's plane."""
+    return np.where(np.abs(elevation_rad) <= LEVEL_RAD, *BEARING_RAD)
+
+
+def is_near(range_m: FloatArray, range_rate_m_s: FloatArray, within_s: float) -> BoolArray:
+    """Return which aircraft would, by range over its rate, be met within a time."""
+    return np.asarray((range_rate_m_s < 0.0) & (range_m <= -range_rate_m_s * within_s))
+
+
+def sine_of_elevation(above_m: FloatArray, range_m: FloatArray) -> FloatArray:
+    """Return the sine of the elevation of aircraft so far above and away, over a round Earth."""
+    share = np.clip(above_m / range_m, -1.0, 1.0)
+    sagging = range_m / (2.0 * 6_371_000.0) * (1.0 - share**2)
+    return np.asarray(np.clip(share - sagging, -1.0, 1.0))

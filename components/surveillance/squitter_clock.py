@@ -1,0 +1,130 @@
+"""When an aircraft sends: at random intervals, each aircraft by a clock of its own.
+
+Every interval between two messages is uniform in 0.4 to 0.6 s (RTCA DO-260B, 2.2.3.3.2), drawn by
+the aircraft and the message's number; the first message comes as if the aircraft had been sending
+for ever. When message n is sent is a sum of n draws: a function of the key alone, whatever was
+asked before. The sums are kept for every 16th message, so that an instant late in a run of days
+costs no more than the messages sent since the last one that was asked for.
+"""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_right
+
+import numpy as np
+import numpy.typing as npt
+
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.time.clock import NANOSECONDS
+from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import first_scan
+
+SHORTEST_S, LONGEST_S = 0.4, 0.6
+_CHUNK = 16
+_MOST_CHUNKS = 4096
+_LONGEST_NS = 0.6 * NANOSECONDS
+_SHORTEST_NS, _SPREAD_NS = 0.4 * NANOSECONDS, 0.2 * NANOSECONDS
+
+
+def interval_ns(uniform: FloatArray) -> IntArray:
+    """Return intervals of uniform draws, whole nanoseconds."""
+    return np.asarray(np.rint(_SHORTEST_NS + _SPREAD_NS * uniform), dtype=np.int64)
+
+
+def first_message_ns(uniform: FloatArray, share: FloatArray) -> IntArray:
+    """Return when the first message is sent of clocks that have run for ever.
+
+    The interval that a given instant lies in is longer than others, by its length; the instant lies
+    anywhere in it.
+    """
+    low, high = SHORTEST_S**2, LONGEST_S**2
+    length_s = np.sqrt(low + (high - low) * uniform)
+    return np.asarray(np.rint(share * length_s * NANOSECONDS), dtype=np.int64)
+
+
+class SquitterClocks:
+    """The clocks of one kind of message of all aircraft.
+
+    Parameters
+    ----------
+    stream : Stream
+        Used by nothing else.
+    """
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        #: When the first message of each chunk is sent, by draw key and replica, ns.
+        self._starts: dict[tuple[int, int], array[int]] = {}
+
+    def latest(
+        self, keys: npt.NDArray[np.uint64], replica: IntArray, until_ns: IntArray, count: int
+    ) -> tuple[IntArray, IntArray, BoolArray]:
+        """Return the last messages that each aircraft sent up to an instant.
+
+        Parameters
+        ----------
+        keys, replica, until_ns : (n,)
+            Draw keys of the aircraft, their replicas, and instants of the run in ns, which count.
+        count : int
+            How many, at most 16.
+
+        Returns
+        -------
+        number, instant_ns : (n, count) of int
+            Newest first.
+        sent : (n, count) of bool
+            False where there was none since the start of the run.
+        """
+        n = len(keys)
+        first, start_ns = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        cells = zip(keys.tolist(), replica.tolist(), until_ns.tolist(), strict=True)
+        for cell, (key, run, until) in enumerate(cells):
+            starts = self._known(key, run, until)
+            # The chunk before the one that the instant lies in.
+            chunk = max(bisect_right(starts, until) - 2, 0)
+            first[cell], start_ns[cell] = chunk * _CHUNK, starts[chunk]
+        numbers = first[:, np.newaxis] + np.arange(2 * _CHUNK)
+        instants = self._instants(keys, replica, start_ns, numbers)
+        newest = (instants <= until_ns[:, np.newaxis]).sum(axis=1) - 1
+        place = newest[:, np.newaxis] - np.arange(count)
+        sent: BoolArray = place >= 0
+        place = np.maximum(place, 0)
+        return (
+            np.take_along_axis(numbers, place, 1),
+            np.take_along_axis(instants, place, 1),
+            sent,
+        )
+
+    def _instants(
+        self,
+        keys: npt.NDArray[np.uint64],
+        replica: IntArray,
+        start_ns: IntArray,
+        numbers: IntArray,
+    ) -> IntArray:
+        """Return when messages (n, m) in a row are sent, of which the first is at `start_ns`."""
+        later = numbers[:, 1:]
+        drawn = self._stream.uniform(
+            np.repeat(keys, later.shape[1]),
+            (first_scan(1) * replica[:, np.newaxis] + later).reshape(-1),
+        )
+        steps = interval_ns(drawn).reshape(later.shape)
+        return np.cumsum(np.concatenate([start_ns[:, np.newaxis], steps], axis=1), axis=1)
+
+    def _known(self, key: int, replica: int, until_ns: int) -> array[int]:
+        """Return the starts of an aircraft's chunks, the last one after an instant."""
+        who, runs = np.array([key], dtype=np.uint64), np.array([replica])
+        starts = self._starts.get((key, replica))
+        if starts is None:
+            begin = first_scan(1) * runs
+            length, share = (self._stream.uniform(who, begin, draw) for draw in (1, 2))
+            starts = array("q", first_message_ns(length, share).tolist())
+            self._starts[key, replica] = starts
+        while starts[-1] <= until_ns:
+            chunks = int((until_ns - starts[-1]) / (_LONGEST_NS * _CHUNK)) + 1
+            count = min(chunks, _MOST_CHUNKS) * _CHUNK
+            numbers = (len(starts) - 1) * _CHUNK + np.arange(count + 1)[np.newaxis]
+            found = self._instants(who, runs, np.array(starts[-1:]), numbers)
+            starts.extend(found[0, _CHUNK::_CHUNK].tolist())
+        return starts

@@ -1,0 +1,186 @@
+"""A receiver of ADS-B in a scene: who is seen, where, by the quality that is sent."""
+
+from math import sqrt
+from statistics import NormalDist
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+
+import dsa_des
+from components.surveillance.reception import fitted
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+
+SCENE = """\
+duration_s = 60
+seed = 3
+wires = ["traffic -> transform -> gate -> ether -> fusion -> tracker"]
+[blocks.traffic]
+type = "traffic.scripted"
+ownship = {{ lat_deg = -42.0, lon_deg = 179.99, alt_m = 1200, heading_deg = 217, speed_mps = 55, roll_deg = 25 }}
+[[blocks.traffic.intruders]]
+name = "kea"
+east_m = {east}
+north_m = 4000
+up_m = 90
+heading_deg = 20
+speed_mps = 70
+{kea}
+[[blocks.traffic.intruders]]
+name = "moa"
+east_m = -3000
+north_m = -6000
+heading_deg = 100
+speed_mps = 90
+{moa}
+[blocks.transform]
+type = "geometry.ellipsoid"
+[blocks.gate]
+type = "gate"
+[blocks.ether]
+type = "surveillance.ads_b"
+scan_rate_hz = 1
+{ether}
+[blocks.fusion]
+type = "fusion.pass_through"
+[blocks.tracker]
+type = "tracking.ekf"
+"""  # noqa: E501
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def load(kea="", moa="", ether="", east=2500, **options):
+        path = tmp_path / "scene.toml"
+        path.write_text(SCENE.format(kea=kea, moa=moa, ether=ether, east=east), encoding="utf-8")
+        return load_scene(path, **options)
+
+    return load
+
+
+def recorded(scene, **options):
+    sink = MemorySink()
+    Simulation(scene, recorder=Recorder([sink]), **options).run()
+    return sink.tables()
+
+
+def reports(tables, target):
+    table = tables["detections"]
+    return table.filter(pc.equal(table["target"], target))
+
+
+def column(table, name):
+    return table[name].to_numpy(zero_copy_only=False).astype(float)
+
+
+def test_only_who_broadcasts_is_seen(scene):
+    tables = recorded(scene(kea="ads_b = {}", moa="mode_s = true\nmode_c = true"))
+    assert reports(tables, "kea").num_rows > 20 and reports(tables, "moa").num_rows == 0
+    silent = recorded(scene(kea="ads_b = { silent_after_s = 20 }"))
+    assert 19.0 <= column(reports(silent, "kea"), "time_s").max() <= 20.0
+
+
+@pytest.mark.parametrize("nav", [0.0, 4.0])
+def test_exact_broadcasts_give_the_true_line_of_sight(scene, nav):
+    ether = 'position_errors = "none"\ncompact = false\nreception = "certain"'
+    sets = [f"navigation.attitude_bias_deg=[{nav}, -{nav}, 1.0]"] if nav else []
+    seen = reports(recorded(scene(kea="ads_b = {}", ether=ether, sets=sets)), "kea")
+    assert seen.num_rows == 59  # all but that at 0 s
+    assert np.abs(column(seen, "range_m") - column(seen, "true_range_m")).max() < 0.01
+    if nav:  # where it says that it is, however the ownship believes to be turned
+        assert np.abs(column(seen, "azimuth_rad") - column(seen, "true_azimuth_rad")).max() > 0.01
+        return
+    for angle in ("azimuth", "elevation"):
+        off = column(seen, f"{angle}_rad") - column(seen, f"true_{angle}_rad")
+        assert np.abs(off).max() < 2e-6
+    rate = np.gradient(column(seen, "true_range_m"), 1.0)
+    assert np.abs(column(seen, "range_rate_m_s") - rate)[1:-1].max() < 0.05
+
+
+def test_latency_that_is_not_compensated_lags(scene):
+    ether = 'position_errors = "none"\ncompact = false\nreception = "certain"'
+    lags = {}
+    for said in (0.0, 0.4):
+        kea = f"ads_b = {{ latency_s = 0.6, compensated_s = {said} }}"
+        seen = reports(recorded(scene(kea=kea, ether=ether)), "kea")
+        lat = np.radians(column(seen, "reported_lat_deg"))
+        way_m = 6.357e6 * lat / np.cos(np.radians(20.0))
+        start = (way_m - 70.0 * column(seen, "reported_s")).mean()
+        lags[said] = start
+    assert lags[0.4] - lags[0.0] == pytest.approx(0.4 * 70.0, abs=0.3)
+
+
+def test_spoofed_aircraft_are_where_they_say(scene):
+    ether = 'position_errors = "none"\nreception = "certain"'
+    said = [
+        column(reports(recorded(scene(kea=f"ads_b = {{ {key} }}", ether=ether)), "kea"), name)
+        for key in ("", "spoofed_north_m = 3000, spoofed_up_m = 300")
+        for name in ("reported_lat_deg", "reported_alt_m")
+    ]
+    assert np.radians(said[2] - said[0]) * 6.37e6 == pytest.approx(3000.0, abs=15.0)
+    assert said[3] - said[1] == pytest.approx(300.0, abs=7.7)
+
+
+def test_stated_variances_are_those_of_the_errors(scene):
+    quality = "ads_b = {{ nacp = {}, nacv = 2 }}"
+    off = {"azimuth": [], "elevation": [], "range": []}
+    for seed in range(30):
+        loaded = scene(kea=quality.format(7), moa=quality.format(9), seed=seed, duration_s="6")
+        for name in ("kea", "moa"):
+            seen = reports(recorded(loaded), name)[-1:]
+            for quantity, unit in (("azimuth", "rad"), ("elevation", "rad"), ("range", "m")):
+                apart = column(seen, f"{quantity}_{unit}") - column(seen, f"true_{quantity}_{unit}")
+                square = column(seen, f"{quantity}_variance_{unit}2")
+                off[quantity] += (apart**2 / square).tolist()
+    for quantity, ratios in off.items():
+        # Of a normal error's square the variance is 2; a Laplacian's, in the elevation, 5.
+        spread = (5.0 if quantity == "elevation" else 2.0) / len(ratios)
+        assert abs(np.mean(ratios) - 1.0) < NormalDist().inv_cdf(0.9995) * sqrt(spread), quantity
+
+
+def test_shares_received_are_those_of_the_law(scene):
+    """Every position message comes through or not, by itself."""
+    east = 300_000
+    loaded = scene(kea="ads_b = {}", east=east, duration_s="600", sets=[
+        "blocks.ether.scan_rate_hz=10", "blocks.traffic.intruders[0].speed_mps=0",
+        "blocks.traffic.ownship.speed_mps=0",
+    ])  # fmt: skip
+    seen = reports(recorded(loaded), "kea")
+    share = len(np.unique(column(seen, "reported_s"))) / 1200.0
+    p = float(fitted(column(seen, "true_range_m")[:1])[0])
+    assert abs(share - p) < NormalDist().inv_cdf(0.9995) * sqrt(p * (1.0 - p) / 1200.0)
+
+
+def test_the_tracker_follows_and_two_runs_are_the_same(scene):
+    loaded = scene(kea="ads_b = { nacp = 9 }", moa="ads_b = { nacp = 10 }")
+    tables = recorded(loaded)
+    tracks = tables["state_tracks"]
+    assert len(set(tracks["track"].to_pylist())) == 2
+    for options in ({"window": 1}, {"window": 7}, {}):
+        again = recorded(loaded, **options)
+        assert all(again[name].equals(table) for name, table in tables.items())
+
+
+@pytest.mark.parametrize(
+    ("where", "wrong", "said"),
+    [
+        ("ether", "range_km = 600", "range_km = 600: nothing is received beyond 537.1 km"),
+        ("ether", 'range_km = 40\nreception = "do_365"', "nothing is received beyond 37.0 km"),
+        ("ether", "azimuth_resolution_deg = 1", "azimuth_resolution_deg = 1: a cooperative"),
+        ("kea", "ads_b = { nacp = 12 }", "nacp"),
+        (
+            "kea",
+            "ads_b = { compensated_s = 1 }",
+            "compensated_s = 1: it must be at most latency_s, 0",
+        ),
+        ("kea", 'icao_address = "xyz"', "icao_address"),
+        ("kea", "ads_b = { nacpp = 3 }", "nacp"),
+    ],
+)
+def test_bad_equipage_and_reach_are_refused(scene, where, wrong, said):
+    with pytest.raises(dsa_des.SceneError) as caught:
+        scene(**{where: wrong})
+    assert said in str(caught.value)
