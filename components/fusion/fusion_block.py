@@ -16,7 +16,7 @@ from components.navigation.errors import navigation_errs
 from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component, Input, Output
+from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
@@ -89,9 +89,9 @@ class Fusion(Component):
         return {
             one.block: replace(
                 one.offer,
-                latest_s=one.latest_s + waits_s,
-                jitter_s=one.jitter_s + waits_s,
-                unforeseen=one.unforeseen,
+                latest_s=how_late_s(one) + waits_s,
+                jitter_s=one.jitter_s + one.offer.jitter_s + waits_s,
+                unforeseen=one.unforeseen or one.offer.unforeseen,
             )
             if isinstance(one.offer, SensorOffer)
             else one.offer
@@ -189,6 +189,12 @@ class Fusion(Component):
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
             **values,
         )
+
+
+def how_late_s(sensor: Producer) -> Fraction:
+    """Return how late a sensor's looks come at most: by its own saying, and on the wire."""
+    own_s = sensor.offer.latest_s if isinstance(sensor.offer, SensorOffer) else None
+    return sensor.latest_s + (own_s or Fraction(0))
 
 
 def poses(message: Detections) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import FUSION_LADDER, Fusion, poses
+from components.fusion.fusion_block import FUSION_LADDER, Fusion, how_late_s, poses
 from components.geometry import (
     angle_by_haversine,
     body_angles,
@@ -190,7 +190,7 @@ class Gated(Fusion):
     def setup(self) -> None:
         """Rank the sensors, and learn how late their detections may come."""
         super().setup()
-        latest_s = max((producer.latest_s for producer in self.context.producers), default=0)
+        latest_s = max((how_late_s(producer) for producer in self.context.producers), default=0)
         self.keep_ticks = self.gate_ticks + math.ceil(latest_s * self.context.ticks_per_s)
 
     def run(self, wake: Wake) -> FusedDetections | None:

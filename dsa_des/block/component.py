@@ -296,6 +296,9 @@ class Component:
         """Return sections of the run's summary that only this block knows."""
         return {}
 
+    def close(self) -> None:
+        """Let go of what runs beside the simulation: a block of it has failed, and it is over."""
+
     def warnings(self) -> list[str]:
         """Say, after `setup`, what of this block decides results unseen or cannot be meant.
 

@@ -131,9 +131,12 @@ class BlockEnvironment:
         """Return the inputs as they are now; queued rows are handed out once."""
         return self._node.receive()
 
-    def send(self, result: Any) -> None:
-        """Send a message, or messages by output name; their tick must be `now`."""
-        self._node.send(result, self.tick_array())
+    def send(self, result: Any, leaves: int | None = None) -> None:
+        """Send a message, or messages by output name; their tick must be `now`.
+
+        It sets out later, where `leaves` is a later tick: before any block runs then.
+        """
+        self._node.send(result, self.tick_array(), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

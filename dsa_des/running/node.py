@@ -53,6 +53,8 @@ class Demand:
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0
 DEPTH_PRIORITY = 1000.0
+# What a block sends later than it is made is there before any block runs.
+LEAVE_PRIORITY = 0.5
 
 
 class Abort(Exception):
@@ -277,8 +279,16 @@ class Node:
 
     # -- sending -------------------------------------------------------------------------------
 
-    def send(self, result: Any, ticks: IntArray) -> None:
-        """Send what a block returned when it ran at `ticks`: a message, or messages by output."""
+    def send(self, result: Any, ticks: IntArray, leaves: int | None = None) -> None:
+        """Send what a block returned when it ran at `ticks`: a message, or messages by output.
+
+        Parameters
+        ----------
+        result : Message, mapping or None
+        ticks : ndarray of int64
+        leaves : int, optional
+            When it sets out, where that is later.
+        """
         outputs = self.component.outputs
         for port, message in by_output(result, tuple(outputs)).items():
             declared = outputs.get(port)
@@ -297,10 +307,19 @@ class Node:
                 self.simulation.ends.note(message.tick, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
-            if self.processor is None:
-                self._deliver(port, message)
+            if leaves is not None and leaves > ticks[0]:
+                event = WakeUp(self.simulation.env, leaves - int(ticks[0]), LEAVE_PRIORITY)
+                event.callbacks.append(partial(self._hand_in, port, message, leaves))
             else:
-                self.processor.submit(self.name, message, partial(self._deliver, port))
+                self._hand_in(port, message)
+
+    def _hand_in(
+        self, port: str, message: Message, sent: int | None = None, event: Any = None
+    ) -> None:
+        if self.processor is None:
+            self._deliver(port, message, sent)
+        else:
+            self.processor.submit(self.name, message, partial(self._deliver, port))
 
     def _deliver(self, port: str, message: Message, sent: int | IntArray | None = None) -> None:
         for channel, node, target_port in self.subscribers.get(port, []):

@@ -307,6 +307,8 @@ class Simulation:
 
     def _raise(self, failure: Failure) -> None:
         """Raise what a block raised; its exact instant is found by running scan by scan again."""
+        for component in self.components.values():
+            component.close()
         before = self.scans * int(failure.ticks[0]) / self.time.run_ticks
         if len(failure.ticks) > 1 and self.time.replicas == 1 and before < _MOST_SCANS_AGAIN:
             try:
