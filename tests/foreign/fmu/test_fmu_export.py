@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from components.foreign.fmu_export import write_chain_fmu
+from components.foreign.fmu.export import write_chain_fmu
 from dsa_des.errors import SceneError
 
 pytest.importorskip("pythonfmu3", reason="needs pythonfmu3: pip install 'dsa-des[fmu]'")

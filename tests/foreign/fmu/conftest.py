@@ -19,7 +19,7 @@ def lag(tmp_path):
 @pytest.fixture(scope="session")
 def reference_fmus():
     """Where the Reference FMUs lie; tests that need them are left out where they are not."""
-    folder = Path(__file__).resolve().parents[3] / "shared" / "data" / "fmus"
+    folder = Path(__file__).resolve().parents[4] / "shared" / "data" / "fmus"
     pytest.importorskip("fmpy", reason="needs FMPy: pip install 'dsa-des[fmi]'")
     if sys.platform != "linux" or not folder.is_dir():
         pytest.skip(f"there is no {folder}")

@@ -19,7 +19,7 @@ import numpy as np
 
 from dsa_des.text.safe_text import printable, shortened
 
-_WORKER = Path(__file__).with_name("fmu_worker.py")
+_WORKER = Path(__file__).with_name("worker.py")
 _LOOK_S = 0.05
 
 

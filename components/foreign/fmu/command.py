@@ -20,6 +20,6 @@ def export_fmu(**options: Any) -> None:
     Its inputs are where the ownship and the scene's aircraft are; its outputs, at the end of a
     step, are what was detected at its start. It runs where dsa_des is installed for Python.
     """
-    from components.foreign.fmu_export import write_chain_fmu
+    from components.foreign.fmu.export import write_chain_fmu
 
     write_chain_fmu(**options)

@@ -23,7 +23,7 @@ _SCENE, _PLANES = "scene.toml", "planes.json"
 #: What pythonfmu3 runs in the FMU; it wants the class to stand in a file of its own.
 _SCRIPT = '''"""The chain of a scene of dsa_des, which must be installed for this Python."""
 
-from components.foreign import fmu_export
+from components.foreign.fmu import export
 from pythonfmu3 import CoSimulation, Fmi3Slave, Fmi3Status, Fmi3StepResult
 from pythonfmu3 import Boolean, Fmi3Causality, Fmi3Variability, Float64, Int32, Unit
 
@@ -33,7 +33,7 @@ class Chain(Fmi3Slave, CoSimulation):
 
     def __init__(self, **options):
         super().__init__(**options)
-        self.chain = fmu_export.Chain(self.resources)
+        self.chain = export.Chain(self.resources)
         self.description = self.chain.title
         self.register_units([Unit("m", m=1), Unit("rad", rad=1), Unit("s", s=1)])
         self.time = 0.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from components.foreign.fmu_model import FmuModel, Variable, read_fmu, unit_of_column
+from components.foreign.fmu.model import FmuModel, Variable, read_fmu, unit_of_column
 from components.foreign.signals import Signals
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
@@ -458,7 +458,7 @@ class ForeignFmu(Component):
 
     def setup(self) -> None:
         """Start the FMU's process, and see that everything it reads from is there."""
-        from components.foreign.fmu_process import process_for
+        from components.foreign.fmu.process import process_for
 
         wiring, model = self.p.wiring, self.p.model
         self._check_sources()
