@@ -203,6 +203,8 @@ class Component:
     also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
+    #: Whether what it records is reason enough for it, wired to somebody or not.
+    stands_alone: ClassVar[bool] = False
     #: How figures mark it; a neutral one by default.
     mark: ClassVar[Mark | None] = None
 
@@ -221,6 +223,14 @@ class Component:
         if isinstance(parameters, ClockedParameters):
             return parameters.clock_spec()
         return None
+
+    @classmethod
+    def class_for(cls, parameters: Any) -> "type[Component]":
+        """Return the class that fills a block with these parameters; itself by default.
+
+        A subclass with the same parameters and ports, where these decide what it can do.
+        """
+        return cls
 
     @classmethod
     def all_hooks(cls) -> dict[str, str]:

@@ -140,10 +140,12 @@ def _without_windows(scene: Scene) -> dict[str, str]:
 
 def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
     """Return the blocks that send over the wires that are shorter than scans are apart."""
+    stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
     return {
-        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound"
+        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound: "
+        f"{', '.join(stuck)}"
         for edge in sorted(opened)
         if shortest_s(scene, edge) * per_s < 1
     }
