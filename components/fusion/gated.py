@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import FUSION_LADDER, Fusion, poses
+from components.fusion.fusion_block import FUSION_LADDER, Fusion, how_late_s, poses
 from components.geometry import (
     angle_by_haversine,
     body_angles,
@@ -190,7 +190,7 @@ class Gated(Fusion):
     def setup(self) -> None:
         """Rank the sensors, and learn how late their detections may come."""
         super().setup()
-        latest_s = max((producer.latest_s for producer in self.context.producers), default=0)
+        latest_s = max((how_late_s(producer) for producer in self.context.producers), default=0)
         self.keep_ticks = self.gate_ticks + math.ceil(latest_s * self.context.ticks_per_s)
 
     def run(self, wake: Wake) -> FusedDetections | None:
@@ -199,8 +199,6 @@ class Gated(Fusion):
         if not reported:
             return None
         since = {name: int(wake.own_ticks(new.tick).min()) for name, new in reported.items()}
-        if not wake.side_by_side:
-            since = {name: int(new.tick[0]) for name, new in reported.items()}
         arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
@@ -209,7 +207,7 @@ class Gated(Fusion):
         pose = {name: poses(arrivals[name].message) for name in order}
         # What came before this wake was reported then; it can only be gathered now.
         free = {
-            name: (wake.own_ticks(came[name]) if wake.side_by_side else came[name]) >= since[name]
+            name: wake.own_ticks(came[name]) >= since[name]
             if name in since
             else np.zeros(len(came[name]), dtype=bool)
             for name in order

@@ -182,8 +182,10 @@ class BlockFailure(Exception):
         )
         super().__init__(block, path, time_s, scan, reason)
 
-    #: Exit code of a command that it ends.
-    exit_code = 1
+    @property
+    def exit_code(self) -> int:
+        """Exit code of a command that it ends: 1, or 3 where a foreign part is the cause."""
+        return int(getattr(self.__cause__, "exit_code", 1))
 
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
@@ -195,7 +197,10 @@ class BlockFailure(Exception):
 class SetupFailure(BlockFailure):
     """A block raised an exception before anything ran: the scene cannot be used."""
 
-    exit_code = 2
+    @property
+    def exit_code(self) -> int:
+        """Exit code of a command that it ends."""
+        return 2
 
 
 class RunRefused(Exception):

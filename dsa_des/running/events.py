@@ -14,6 +14,7 @@ from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
 from dsa_des.time.run_ends import RunEnds
+from dsa_des.time.timeline import ReplicaTime
 
 
 class WakeUp(simpy.Event):
@@ -51,14 +52,7 @@ class RunState(Protocol):
     recorder: Recorder | None
     window: Window
     ends: RunEnds
-
-    @property
-    def span_ticks(self) -> int:
-        """Ticks from one replica's start to the next; 0 where one runs by itself."""
-
-    @property
-    def side_by_side(self) -> bool:
-        """Whether windows are stretches of time of all replicas."""
+    time: ReplicaTime
 
     def stretch(self, ticks: IntArray) -> tuple[int, int]:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""
@@ -131,9 +125,12 @@ class BlockEnvironment:
         """Return the inputs as they are now; queued rows are handed out once."""
         return self._node.receive()
 
-    def send(self, result: Any) -> None:
-        """Send a message, or messages by output name; their tick must be `now`."""
-        self._node.send(result, self.tick_array())
+    def send(self, result: Any, leaves: int | None = None) -> None:
+        """Send a message, or messages by output name; their tick must be `now`.
+
+        It sets out later, where `leaves` is a later tick: before any block runs then.
+        """
+        self._node.send(result, self.tick_array(), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

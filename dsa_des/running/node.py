@@ -42,17 +42,16 @@ class Demand:
         if not self.lead_ticks:
             return self.clock.between(start, end)[1]
         # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.time.end_tick)
+        last = min(end + self.lead_ticks, self.time.run_ticks)
         _, ticks = self.clock.between(start + self.lead_ticks, last)
-        if self.time.span_ticks and not self.time.side_by_side:
-            # Rows from before a replica's start do not exist.
-            ticks = ticks[ticks % self.time.span_ticks >= self.lead_ticks]
         return ticks - self.lead_ticks
 
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0
 DEPTH_PRIORITY = 1000.0
+# What a block sends later than it is made is there before any block runs.
+LEAVE_PRIORITY = 0.5
 
 
 class Abort(Exception):
@@ -93,7 +92,6 @@ class Node:
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
-        self._bell = Bell(self.simulation.env)
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
@@ -102,6 +100,7 @@ class Node:
     def start(self) -> None:
         """Start the block's SimPy process."""
         env = self.simulation.env
+        self._bell = Bell(env)
         own = self.component.process
         env.process(self._loop() if own is None else self._own_process(own))
 
@@ -190,7 +189,7 @@ class Node:
 
     def _run_at(self, tick: int) -> None:
         ends = self.simulation.ends
-        if ends.early and ends.passed(tick, tick + 1):
+        if ends.early and ends.passed(tick):
             return
         if self.processor is not None and self.processor.refuses(self.name):
             return
@@ -233,10 +232,7 @@ class Node:
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
-        return Inputs(
-            self.component.inputs, self.channels, run.ticks_per_s, run.span_ticks,
-            side_by_side=run.side_by_side,
-        )  # fmt: skip
+        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
 
     def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
         wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for)
@@ -277,8 +273,16 @@ class Node:
 
     # -- sending -------------------------------------------------------------------------------
 
-    def send(self, result: Any, ticks: IntArray) -> None:
-        """Send what a block returned when it ran at `ticks`: a message, or messages by output."""
+    def send(self, result: Any, ticks: IntArray, leaves: int | None = None) -> None:
+        """Send what a block returned when it ran at `ticks`: a message, or messages by output.
+
+        Parameters
+        ----------
+        result : Message, mapping or None
+        ticks : ndarray of int64
+        leaves : int, optional
+            When it sets out, where that is later.
+        """
         outputs = self.component.outputs
         for port, message in by_output(result, tuple(outputs)).items():
             declared = outputs.get(port)
@@ -297,10 +301,19 @@ class Node:
                 self.simulation.ends.note(message.tick, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
-            if self.processor is None:
-                self._deliver(port, message)
+            if leaves is not None and leaves > ticks[0]:
+                event = WakeUp(self.simulation.env, leaves - int(ticks[0]), LEAVE_PRIORITY)
+                event.callbacks.append(partial(self._hand_in, port, message, leaves))
             else:
-                self.processor.submit(self.name, message, partial(self._deliver, port))
+                self._hand_in(port, message)
+
+    def _hand_in(
+        self, port: str, message: Message, sent: int | None = None, event: Any = None
+    ) -> None:
+        if self.processor is None:
+            self._deliver(port, message, sent)
+        else:
+            self.processor.submit(self.name, message, partial(self._deliver, port))
 
     def _deliver(self, port: str, message: Message, sent: int | IntArray | None = None) -> None:
         for channel, node, target_port in self.subscribers.get(port, []):

@@ -1,0 +1,273 @@
+"""A program over pipes: frames of Arrow, deadlines, its last words, and its certain end.
+
+A frame is its length in 8 bytes, little-endian, and one Arrow IPC stream whose schema names the
+table in its metadata. A call is frames and an empty one (length 0), and so is its answer.
+"""
+
+import os
+import selectors
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from weakref import finalize
+
+from dsa_des.text.safe_text import printable, shortened
+
+VERSION = "1"
+_HEAD = struct.Struct("<Q")
+_LARGEST_FRAME = 2**31
+_CHUNK = 2**20
+_LAST_WORDS = 2000
+# Ends the program's group when our end of its pipe closes, however we go.
+_GUARD = "import os,sys\nsys.stdin.read()\ntry: os.killpg(int(sys.argv[1]),9)\nexcept OSError: pass"
+
+
+class ProcessError(Exception):
+    """A program died, hung or said what is no message; ends a command with exit code 3."""
+
+    exit_code = 3
+
+
+def frame(table: str, batch: Any, about: Mapping[str, str]) -> list[Any]:
+    """Return a record batch as a frame: its length, and the stream."""
+    import pyarrow as pa
+
+    sink = pa.BufferOutputStream()
+    schema = batch.schema.with_metadata({"table": table, **about})
+    with pa.ipc.new_stream(sink, schema) as writer:
+        if batch.num_rows or not len(schema):
+            writer.write_batch(pa.RecordBatch.from_arrays(batch.columns, schema=schema))
+    content = sink.getvalue()
+    return [_HEAD.pack(len(content)), memoryview(content)]
+
+
+class ProcessLink:
+    """One program, started by its first call.
+
+    Parameters
+    ----------
+    command : list of str
+        The program, as found, and its arguments.
+    folder : Path
+        Where it runs.
+    """
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self._command, self._folder = command, folder
+        self._process: Any = None
+        self.close: Any = lambda: None
+
+    @property
+    def runs(self) -> bool:
+        """Whether it was started and not ended since."""
+        return self._process is not None
+
+    def start(self) -> None:
+        """Start the program in a group of its own, and what ends it when we are gone."""
+        self._words = bytearray()
+        try:
+            self._process = subprocess.Popen(
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE, cwd=self._folder, bufsize=0,
+                start_new_session=os.name == "posix",
+            )  # fmt: skip
+        except OSError as error:
+            raise ProcessError(f"cannot be started: {(error.strerror or '').lower()}") from None
+        guard = None
+        with suppress(OSError):
+            guard = subprocess.Popen(
+                [sys.executable, "-I", "-S", "-c", _GUARD, str(self._process.pid)],
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )  # fmt: skip
+        self.close = finalize(self, _end, self._process, guard)
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            os.set_blocking(pipe.fileno(), False)
+
+    def stop(self) -> None:
+        """End the program, its children with it."""
+        self.close()
+        self._process = None
+
+    def ask(self, parts: Iterable[Any], deadline_s: float) -> list[tuple[dict[str, str], Any]]:
+        """Send frames and return those of the answer: metadata and table of each.
+
+        Raises
+        ------
+        ProcessError
+            With its last words; the program is gone then.
+        """
+        try:
+            return self._ask([*parts, _HEAD.pack(0)], time.monotonic() + deadline_s, deadline_s)
+        except ProcessError as error:
+            words = self._last_words()
+            self.stop()
+            raise ProcessError(f"{error}{words}") from None
+        except BaseException:
+            self.stop()
+            raise
+
+    def _ask(self, parts: list[Any], end_s: float, deadline_s: float) -> Any:
+        process = self._process
+        waiting = [memoryview(part).cast("B") for part in parts if len(part)]
+        waiting.reverse()
+        reader = _Frames()
+        with selectors.DefaultSelector() as selector:
+            selector.register(process.stdin, selectors.EVENT_WRITE)
+            selector.register(process.stdout, selectors.EVENT_READ)
+            if not process.stderr.closed:
+                selector.register(process.stderr, selectors.EVENT_READ)
+            while not reader.done:
+                left_s = end_s - time.monotonic()
+                ready = selector.select(max(left_s, 0.0)) if left_s > 0 else []
+                if not ready:
+                    raise ProcessError(
+                        f"has not answered within deadline_s = {deadline_s:g} s"
+                        f"{' (half a message came)' if reader.begun else ''}"
+                    )
+                for key, _ in ready:
+                    if key.fileobj is process.stdin:
+                        self._write(waiting, selector)
+                    elif key.fileobj is process.stderr:
+                        if not self._hear():
+                            selector.unregister(process.stderr)
+                    else:
+                        self._read(reader)
+        if waiting:
+            raise ProcessError("answered before it had read all that it was sent")
+        return reader.tables()
+
+    def _write(self, waiting: list[memoryview], selector: Any) -> None:
+        try:
+            while waiting:
+                count = os.write(self._process.stdin.fileno(), waiting[-1][:_CHUNK])
+                rest = waiting.pop()[count:]
+                if len(rest):
+                    waiting.append(rest)
+        except BlockingIOError:
+            return
+        except BrokenPipeError:
+            waiting.clear()  # what it says last, and how it ended, comes by the other pipe
+        selector.unregister(self._process.stdin)
+
+    def _read(self, reader: "_Frames") -> None:
+        try:
+            content = os.read(self._process.stdout.fileno(), _CHUNK)
+        except BlockingIOError:
+            return
+        if not content:
+            raise ProcessError(
+                f"{self._how_it_ended()}{' in the middle of a message' if reader.begun else ''}"
+            )
+        reader.add(content)
+
+    def _hear(self) -> bool:
+        """Take what it says on standard error; whether more may come."""
+        with suppress(BlockingIOError):
+            said = os.read(self._process.stderr.fileno(), _CHUNK)
+            self._words += said
+            del self._words[:-_LAST_WORDS]
+            return bool(said)
+        return True
+
+    def _how_it_ended(self) -> str:
+        with suppress(subprocess.TimeoutExpired):
+            code = self._process.wait(1.0)
+            if code < 0:
+                return f"died of signal {-code} ({signal.Signals(-code).name})"
+            return f"ended with exit code {code}"
+        return "closed its output"
+
+    def _last_words(self) -> str:
+        with suppress(OSError, ValueError):
+            for _ in range(64):  # what it has written so far is in the pipe
+                before = len(self._words)
+                if not self._hear() or len(self._words) == before:
+                    break
+        said = [line.strip() for line in self._words.decode(errors="replace").splitlines()]
+        said = [line for line in said if line]
+        if not said:
+            return "; it said nothing on standard error"
+        return "; its last words: " + shortened(printable(" | ".join(said[-5:])), 600)
+
+
+class _Frames:
+    """Frames of an answer, as their bytes come."""
+
+    def __init__(self) -> None:
+        self._frames: list[bytearray] = []
+        self._head = bytearray()
+        self._body: bytearray | None = None
+        self._filled = 0
+        self.done = False
+
+    @property
+    def begun(self) -> bool:
+        """Whether something came, and not all."""
+        return bool(self._head or self._frames or self._body is not None)
+
+    def add(self, content: bytes) -> None:
+        """Take bytes."""
+        view = memoryview(content)
+        while len(view):
+            if self.done:
+                raise ProcessError(f"sent {len(view)} bytes that nobody asked for")
+            if self._body is None:
+                wanted = _HEAD.size - len(self._head)
+                self._head += view[:wanted]
+                view = view[wanted:]
+                if len(self._head) < _HEAD.size:
+                    return
+                (length,) = _HEAD.unpack(self._head)
+                if length > _LARGEST_FRAME:
+                    raise ProcessError(f"sent what is no message: {bytes(self._head)!r} ...")
+                self._head.clear()
+                if not length:
+                    self.done = True
+                    continue
+                self._body, self._filled = bytearray(length), 0
+            count = min(len(view), len(self._body) - self._filled)
+            self._body[self._filled : self._filled + count] = view[:count]
+            self._filled += count
+            view = view[count:]
+            if self._filled == len(self._body):
+                self._frames.append(self._body)
+                self._body = None
+
+    def tables(self) -> list[tuple[dict[str, str], Any]]:
+        """Return metadata and table of each frame."""
+        import pyarrow as pa
+
+        found = []
+        for content in self._frames:
+            try:
+                table = pa.ipc.open_stream(pa.py_buffer(content)).read_all()
+                table.validate(full=True)
+            except (pa.ArrowException, OSError) as error:
+                text = str(error).splitlines()[0] if str(error) else type(error).__name__
+                raise ProcessError(f"sent what is no Arrow stream: {text}") from None
+            about = table.schema.metadata or {}
+            found.append(({k.decode(): v.decode() for k, v in about.items()}, table))
+        return found
+
+
+def _end(process: Any, guard: Any) -> None:
+    """Kill the program's whole group, and reap what we started."""
+    if os.name == "posix":
+        with suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
+    if guard is not None:
+        guard.kill()
+        guard.wait()
+        guard.stdin.close()
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        with suppress(OSError):
+            pipe.close()

@@ -1,0 +1,58 @@
+"""One look of a sensor out of columns of numbers, of which some may be missing."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.aircraft.aircraft import Roster
+from components.messages.columns import MEASURED, POSE
+from components.messages.detections import EXTRAS, Detections
+from components.messages.reach import CULLED, SKIP_REASONS
+from dsa_des.arrays.types import IntArray
+
+_TRUE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
+
+
+def reported_look(
+    tick: IntArray,
+    scan: IntArray,
+    entries: Mapping[str, Any],
+    looks: Mapping[str, Any],
+    target: IntArray,
+    roster: Roster,
+    **more: Any,
+) -> Detections:
+    """Return the message of one row.
+
+    Parameters
+    ----------
+    tick, scan : (1,)
+    entries : mapping of (entries,)
+        Columns of ``detections``.
+    looks : mapping of (1,)
+        The ownship's pose, by column, where it is known.
+    target : (entries,) of int
+    roster : Roster
+    **more
+        Other fields.
+    """
+    count, zero = len(target), np.zeros(1, dtype=np.int64)
+    nothing = np.full(count, np.nan)
+    return Detections(
+        tick=tick,
+        scan=scan,
+        evaluated=zero,
+        skipped=dict.fromkeys((*SKIP_REASONS, CULLED), zero),
+        offsets=np.array([0, count]),
+        target=target,
+        azimuth_rad=entries["azimuth_rad"],
+        elevation_rad=entries["elevation_rad"],
+        range_m=entries.get("range_m", nothing),
+        confidence=entries.get("confidence", nothing),
+        **{name: entries.get(name, nothing) for name in (*_TRUE, *MEASURED)},
+        extras={name: entries[name] for name in EXTRAS if name in entries},
+        roster=roster,
+        **{name: looks[name] for name in POSE if name in looks},
+        **more,
+    )

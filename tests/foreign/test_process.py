@@ -1,0 +1,281 @@
+"""Programs as blocks: that they work, and none of their ways to fail leaves anything behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from covering import covers
+from wired import chain
+
+import dsa_des
+from components.foreign.process_link import ProcessError, ProcessLink, frame
+from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.running.simulation import Simulation
+
+CANNED = str(Path(__file__).with_name("canned.py"))
+EYE = {"type": "optical.range_boundary", "range_km": 20.0, "scan_rate_hz": 5}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    empty = pa.RecordBatch.from_arrays([], schema=pa.schema([]))
+    for name, version in (("hello", "1"), ("hello_2", "2")):
+        (tmp_path / name).write_bytes(b"".join(frame("hello", empty, {"version": version})))
+    return tmp_path
+
+
+def canned(way, call, folder):
+    return [sys.executable, CANNED, way, str(call), str(folder)]
+
+
+def write_table(folder, name, columns):
+    """Let the program answer a table."""
+    content = frame(name, pa.RecordBatch.from_pydict(columns), {})
+    (folder / "table").write_bytes(b"".join(content))
+
+
+def scene(command, duration_s=1, **keys):
+    found = chain({"eye": EYE}, duration_s=duration_s, fusion={"type": "fusion.pass_through"})
+    found["blocks"]["part"] = {"type": "foreign.process", "command": command, **keys}
+    found["wires"] += ["eye -> part -> fusion"]
+    return found
+
+
+def gone(folder, name="pid"):
+    """Whether a process of the program has ended, within a moment."""
+    pid = int((folder / name).read_text())
+    for _ in range(100):
+        try:
+            status = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        except FileNotFoundError:
+            return True
+        if status == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@covers("command", "deadline_s", of=("foreign.process",))
+@pytest.mark.parametrize(
+    ("way", "said"),
+    [
+        ("die", "ended with exit code 7; its last words: line one | the engine is on fire"),
+        ("signal", "died of signal 11 (SIGSEGV); its last words"),
+        ("hang", "has not answered within deadline_s = 0.5 s; its last words"),
+        ("garbage", "sent what is no message: b'Hello, w'"),
+        ("no_arrow", "sent what is no Arrow stream"),
+        ("half", "ended with exit code 0 in the middle of a message"),
+        ("more", "sent 8 bytes that nobody asked for"),
+    ],
+)
+def test_a_program_that_fails_ends_the_run_with_its_last_words(folder, way, said):
+    with pytest.raises(BlockFailure) as error:
+        dsa_des.run(scene(canned(way, 3, folder), deadline_s=0.5))
+    assert said in str(error.value) and "t = 0.4" in str(error.value)
+    assert error.value.exit_code == 3
+    assert gone(folder)
+    if way == "hang":
+        assert gone(folder, "child")
+
+
+@pytest.mark.parametrize("call", [1, 2, 5])
+def test_a_kill_at_any_call_is_one_error_or_a_new_start(folder, call):
+    with pytest.raises(BlockFailure, match="exit code 7"):
+        dsa_des.run(scene(canned("once", call, folder)))
+    (folder / "misbehaved").unlink()
+    run = dsa_des.run(scene(canned("once", call, folder), on_failure="restart"))
+    assert run.info["summary"]["restarts"] == {"part": 1}
+    assert gone(folder)
+
+
+@covers("on_failure", "most_restarts", of=("foreign.process",))
+def test_restarts_are_counted(folder):
+    again = scene(canned("die", 2, folder), on_failure="restart", most_restarts=2)
+    with pytest.raises(BlockFailure, match=r"t = 0\.6"):  # each start lives for one call
+        dsa_des.run(again)
+
+
+def test_another_version_is_refused(folder):
+    with pytest.raises(BlockFailure, match="speaks version '2'"):
+        dsa_des.run(scene(canned("version", 1, folder)))
+    assert gone(folder)
+
+
+def test_a_slow_answer_and_many_words_do_no_harm(folder):
+    dsa_des.run(scene(canned("slow", 2, folder)))
+    dsa_des.run(scene(canned("chatty", 0, folder)))
+    assert gone(folder)
+
+
+@pytest.mark.parametrize(
+    ("table", "columns", "said"),
+    [
+        ("manoeuvre", {"turn_rad": [1.0]}, "did you mean 'manoeuvres'"),
+        ("manoeuvres", {"turn_rad": [1.0]}, "there is no column 'rate_rad_s'"),
+        ("manoeuvres", {"turn_rad": ["x"], "rate_rad_s": [1.0]}, "numbers are needed"),
+        ("manoeuvres", {"turn_rad": [np.nan], "rate_rad_s": [1.0]}, "finite numbers"),
+        ("detections", {"azimuth_rad": [0.0], "elevation_rad": [0.0], "target": ["rollin"]},
+         "did you mean 'rolling'"),
+    ],
+)  # fmt: skip
+def test_a_table_that_is_none_of_ours_is_said(folder, table, columns, said):
+    write_table(folder, table, columns)
+    with pytest.raises(BlockFailure, match=said):
+        dsa_des.run(scene(canned("table", 1, folder)))
+    assert gone(folder)
+
+
+def test_detections_of_a_program_are_fused_as_any(folder):
+    columns = {
+        "azimuth_rad": [0.5],
+        "elevation_rad": [0.1],
+        "range_m": [900.0],
+        "target": ["diving"],
+    }
+    (folder / "table").write_bytes(
+        b"".join(frame("detections", pa.RecordBatch.from_pydict(columns), {}))
+    )
+    found = scene(canned("table", 3, folder))
+    found["wires"].remove("eye -> fusion")
+    rows = dsa_des.run(found).fused.to_pylist()
+    assert [(r["time_s"], r["target"], r["range_m"], r["sensors"]) for r in rows] == [
+        (0.4, "diving", 900.0, "part")
+    ]  # fmt: skip
+
+
+@covers("scan_rate_hz", "offset_s", of=("foreign.process",))
+def test_it_is_called_on_a_clock_of_its_own(folder):
+    columns = {"turn_rad": [1.0], "rate_rad_s": [0.1]}
+    (folder / "table").write_bytes(
+        b"".join(frame("manoeuvres", pa.RecordBatch.from_pydict(columns), {}))
+    )
+    found = scene(canned("table", 2, folder), scan_rate_hz=4, offset_s="0.1")
+    found["wires"].remove("eye -> part -> fusion")
+    found["wires"].append({"from": "part", "to": "traffic", "delay_s": 0.1, "holds": "nothing"})
+    assert dsa_des.run(found).manoeuvres.column("time_s").to_pylist() == [0.35]
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("python3 -c pass", "must be a list of words"),
+        (["no-such-program-of-ours"], "there is no program 'no-such-program-of-ours'"),
+        ([], "at least 1"),
+    ],
+)
+def test_commands_are_lists_of_what_is_there(command, said):
+    with pytest.raises(SceneError) as error:
+        dsa_des.load_scene(scene(command))
+    assert said in str(error.value)
+
+
+def test_no_shell_looks_at_the_words(folder):
+    command = canned("slow", 0, folder)
+    dsa_des.run(scene([*command, "; touch injected", "$(touch injected)"], folder=str(folder)))
+    assert not (folder / "injected").exists()
+
+
+@covers("folder", of=("foreign.process",))
+def test_a_program_is_looked_for_beside_the_scene(folder):
+    program = folder / "part.sh"
+    program.write_text(f"#!/bin/sh\nexec {' '.join(canned('die', 1, folder))}\n")
+    program.chmod(0o755)
+    with pytest.raises(BlockFailure, match="exit code 7"):
+        dsa_des.run(scene(["./part.sh"], folder=str(folder)))
+
+
+def test_an_exception_elsewhere_leaves_nothing_running(folder):
+    found = scene(canned("slow", 0, folder))
+    found["blocks"]["other"] = {
+        "type": "foreign.process", "command": canned("die", 3, folder / "other")
+    }  # fmt: skip
+    (folder / "other").mkdir()
+    (folder / "other" / "hello").write_bytes((folder / "hello").read_bytes())
+    found["wires"].append("eye -> other -> fusion")
+    with pytest.raises(BlockFailure, match="exit code 7") as error:
+        dsa_des.run(found)
+    del error
+    assert gone(folder / "other")
+    assert gone(folder)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_nothing_is_left_when_we_are_interrupted_or_killed(folder, number):
+    file = folder / "scene.toml"
+    command = canned("hang", 2, folder)
+    file.write_text(
+        "duration_s = 1\nseed = 1\n"
+        'wires = ["part -> fusion"]\n[blocks.fusion]\ntype = "fusion.pass_through"\n'
+        f"[blocks.part]\ntype = 'foreign.process'\nscan_rate_hz = 5\ncommand = {command}\n"
+    )
+    ours = subprocess.Popen(
+        [sys.executable, "-m", "dsa_des", "run", str(file), "--out", str(folder / "out")],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    for _ in range(500):
+        if (folder / "child").exists() and (folder / "child").read_text():
+            break
+        time.sleep(0.02)
+    os.kill(ours.pid, number)
+    _, said = ours.communicate(timeout=20)
+    assert ours.returncode == (-9 if number == signal.SIGKILL else 128 + number), said
+    assert gone(folder) and gone(folder, "child")
+    assert not (folder / "out" / "run.json").exists()
+
+
+def test_ten_thousand_calls_and_hundreds_of_megabytes(folder):
+    link = ProcessLink(canned("echo", 0, folder), folder)
+    link.start()
+    batch = pa.RecordBatch.from_pydict({"x": np.arange(3.0)})
+    empty = pa.RecordBatch.from_arrays([], schema=pa.schema([]))
+    link.ask(frame("hello", empty, {}), 5.0)
+    call = frame("call", batch, {})
+    for _ in range(10_000):
+        link.ask(call, 5.0)
+    large = pa.RecordBatch.from_pydict({"x": np.random.default_rng(1).random(13_000_000)})
+    ((about, table),) = link.ask(frame("large", large, {}), 60.0)
+    assert (
+        about["table"] == "large"
+        and table.column("x").to_numpy()[-1] == large.column(0)[-1].as_py()
+    )
+    link.stop()
+    assert gone(folder)
+    with pytest.raises(ProcessError, match="cannot be started"):
+        ProcessLink(["/no/such"], folder).start()
+
+
+@covers(
+    "command", "folder", "deadline_s", "on_failure", "most_restarts", "scan_rate_hz", "offset_s",
+    of=("foreign.process_with_state",),
+)  # fmt: skip
+@covers("arguments", of=("foreign.process", "foreign.process_with_state"))
+def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
+    found = scene([sys.executable, str(Path(__file__).with_name("counts.py"))], duration_s=8)
+    found["wires"].remove("eye -> part -> fusion")
+    found["wires"] += [
+        "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
+    ]  # fmt: skip
+    found["blocks"]["part"] |= {"deadline_s": 20.0, "arguments": {"every": 5}}
+    by_scan = dsa_des.run(found)
+    found["blocks"]["part"]["type"] = "foreign.process_with_state"
+    ahead = dsa_des.run(found)
+    assert by_scan.manoeuvres.num_rows == 8
+    for name in ("manoeuvres", "detections", "scans", "truth"):
+        assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
+    said = [
+        sorted(name for name, node in simulation.nodes.items() if node.windowed)
+        for simulation in (
+            Simulation(dsa_des.load_scene({**found, "blocks": {**found["blocks"], "part": part}}))
+            for part in (
+                found["blocks"]["part"],
+                {**found["blocks"]["part"], "type": "foreign.process"},
+            )
+        )
+    ]
+    assert "part" in said[0] and said[1] == []
