@@ -75,12 +75,8 @@ class BelievedPositions:
 
     def forget(self, ticks: IntArray, times_s: FloatArray, wake: Wake) -> None:
         """Drop what no scan after some asks for."""
-        if wake.side_by_side:  # the next scans come after all of these
-            self._keep(np.flatnonzero(self._time_s >= float(times_s.min()) - self._keep_s))
-            return
-        # What came before the last run began is of runs that have passed.
-        young = self._time_s >= float(times_s[-1]) - self._keep_s
-        self._keep(np.flatnonzero(young & (self._came >= run_begins(ticks[-1:], wake))))
+        young = self._time_s >= float(times_s.max()) - self._keep_s  # the next scans come later
+        self._keep(np.flatnonzero(young & (wake.replica_of(self._came) >= wake.first_run)))
 
     def _keep(self, lines: IntArray) -> None:
         self._came, self._time_s = self._came[lines], self._time_s[lines]

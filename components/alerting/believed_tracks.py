@@ -234,6 +234,6 @@ def _still_asked(came: IntArray, ticks: IntArray, wake: Wake) -> BoolArray:
     last = np.searchsorted(came, ticks[ends], side="right") - 1
     place = np.searchsorted(of_scan[ends], run)
     there = np.minimum(place, len(ends) - 1)
-    # Of runs without a scan all rows; side by side these come again, else they have passed.
+    # Of runs without a scan all rows, unless they have ended.
     kept = (of_scan[ends][there] != run) | (np.arange(len(came)) >= last[there])
-    return kept if wake.side_by_side else kept & (run >= of_scan[-1])
+    return kept & (run >= wake.first_run)

@@ -193,15 +193,10 @@ class DaidalusAlerting(Component):
         runs = wake.replica_of(ticks)
         ends = np.flatnonzero(np.append(runs[1:] != runs[:-1], True))
         self._memory.forget(runs[ends], times[ends])
-        span = round(self._over_s * self.context.ticks_per_s)
-        if wake.side_by_side:
-            # The scans of the next stretch of time come after all of these.
-            earliest = int(wake.own_ticks(ticks).min()) - span
-            self._own.set_aside(earliest, wake, late_sights=self._source != "estimates")
-            return
-        self._memory.forget_before(int(runs[-1]))
-        begin = int(run_begins(ticks[-1:], wake)[0])  # what was before is of runs that have passed
-        self._own.forget_before(int(ticks[-1]) - span, begin)
+        self._memory.forget_before(wake.first_run)
+        # The next scans come after all of these.
+        since = int(wake.own_ticks(ticks).max()) - round(self._over_s * self.context.ticks_per_s)
+        self._own.set_aside(since, wake, late_sights=self._source != "estimates")
 
     def _own_flights(
         self, own: Mapping[str, FloatArray], scan: IntArray, shape: tuple[int, ...]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
@@ -133,14 +134,8 @@ class LevelMemory:
         if len(key) == 0:
             return level
         present = np.ones(len(key), dtype=bool) if present is None else present
-        order = np.argsort(key, kind="stable")
-        begins = np.append(True, key[order][1:] != key[order][:-1])
-        place = np.empty(len(key), dtype=np.int64)
-        place[order] = self._places(key[order][begins])[np.cumsum(begins) - 1]
-        turn = np.empty(len(key), dtype=np.int64)
-        turn[order] = np.arange(len(key)) - np.flatnonzero(begins)[np.cumsum(begins) - 1]
-        turns = np.argsort(turn, kind="stable")
-        for rows in np.split(turns, np.cumsum(np.bincount(turn))[:-1]):
+        place = self._places(key)
+        for rows in turns(key):
             part = self._memory.take(place[rows])
             level[rows] = part.step(now_s[rows], present[rows], due[rows], early[rows])
             self._memory.put(place[rows], part)
@@ -164,7 +159,7 @@ class LevelMemory:
             self._memory = self._memory.take(which)
 
     def _places(self, keys: IntArray) -> IntArray:
-        """Return the rows of targets (keys ascending), all of them remembered from now on."""
+        """Return the rows of targets, all of them remembered from now on."""
         if not np.isin(keys, self._key).all():
             every = np.union1d(self._key, keys)
             old = np.searchsorted(every, self._key)

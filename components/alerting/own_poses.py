@@ -9,8 +9,6 @@ from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
-# Poses of the ownship that are remembered beyond the last scan: for sights that come late.
-_KEPT_POSES = 10_000
 _COLUMNS = ("_came", "_tick", "_place", "_attitude")
 
 
@@ -34,7 +32,7 @@ class OwnPoses:
         self._tick = np.concatenate([self._tick, states.tick])
         self._place = np.concatenate([self._place, np.stack(place, axis=1)])
         self._attitude = np.concatenate([self._attitude, np.stack(angles, axis=1)])
-        if wake.side_by_side:
+        if bool((self._came[1:] < self._came[:-1]).any()):
             self._keep(np.argsort(self._came, kind="stable"))
         # Of those that overtook each other on the way, the newest counts.
         self._tick = np.maximum.accumulate(self._tick)
@@ -96,14 +94,12 @@ class OwnPoses:
             "climb_mps": (now[:, 2] - then[:, 2]) / time_s,
         }
 
-    def forget_before(self, tick: int, begin: int = 0) -> None:
-        """Drop poses that neither a velocity from an instant on nor a late sight asks for."""
-        old = int(np.searchsorted(self._tick, tick, side="left")) - 1
-        keep = max(min(old, len(self._tick) - _KEPT_POSES), 0)
-        self._keep(slice(max(keep, int(np.searchsorted(self._came, begin))), None))
-
     def set_aside(self, own_tick: int, wake: Wake, *, late_sights: bool) -> None:
-        """Set poses of runs side by side aside that only what comes late asks for."""
+        """Set poses aside that only what comes late asks for, and drop those of ended runs."""
+        ended = int(np.searchsorted(self._came, wake.first_run * wake.span_ticks))
+        if ended:
+            self._keep(slice(ended, None))
+            self._old = []
         run, own = wake.replica_of(self._came), wake.own_ticks(self._tick)
         changes = np.append(run[1:] != run[:-1], True)
         recent = own >= own_tick

@@ -15,7 +15,15 @@ from components.display.map_view import (
     reach_text,
 )
 from components.display.recorded_rows import Detected
-from components.display.symbols import Labels, draw_marks, in_turns, mark_of
+from components.display.symbols import (
+    DENSE,
+    Labels,
+    draw_density,
+    draw_marks,
+    in_turns,
+    mark_of,
+    name_lines,
+)
 from components.display.terminal import distance_text
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
@@ -67,11 +75,10 @@ def draw_plan(
     with drawing(width_in, height_in, path) as figure:
         axes = figure.add_axes((left, bottom, right - left, high))
         axes.set(xlim=view.x, ylim=view.y)
-        axes.set_xlabel("east of the ownship's start [km]")
-        axes.set_ylabel("north of the ownship's start [km]")
+        axes.set_xlabel("east of the ownship's start (km)")
+        axes.set_ylabel("north of the ownship's start (km)")
         axes.grid(color="#DDDDDD", linewidth=0.5)
         axes.set_axisbelow(True)
-        axes.ticklabel_format(useOffset=False, style="plain")
         for name, outline in outlines.items():
             draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
@@ -94,7 +101,8 @@ def draw_plan(
         px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
         _draw_altitudes(heights, flights, marks, detected.styles, px_per_s)
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
-        handles = _legend(texts, detected, drawn, summary)
+        dense = len(flights.targets) >= DENSE
+        handles = _legend(texts, detected, drawn, summary, dense)
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
             frameon=False, labelspacing=0.9, borderaxespad=0.0,
@@ -106,6 +114,9 @@ def _draw_lines(axes: Any, lines: list[FloatArray]) -> None:
     """Draw lines of targets, and last that of the ownship."""
     from matplotlib.collections import LineCollection
 
+    if len(lines) > DENSE:
+        draw_density(axes, lines[:-1])
+        lines = lines[-1:]
     targets = len(lines) - 1
     widths = [0.6 if targets >= _MANY else 1.0] * targets + [2.0]
     colours = [_TARGET] * targets + [_OWN]
@@ -124,8 +135,10 @@ def _draw_tracks(axes: Any, view: MapView, flights: Flights) -> None:
     # Drawn with their gaps; ends are sought without them.
     known = [line[np.isfinite(line).all(axis=1)] for line in lines]
     starts = np.array([line[0] for line in known if len(line)])
+    if len(flights.targets) >= DENSE:  # their density says it; the ownship alone has an arrow
+        known, starts = known[-1:], np.array([line[0] for line in known[-1:] if len(line)])
     arrows = [_arrow_head(line, (5.0 if many else 8.0) * view.km_per_px) for line in known]
-    colours = [_TARGET] * len(flights.targets) + [_OWN]
+    colours = [_TARGET] * (len(known) - 1) + [_OWN]
     shown = [(arrow, c) for arrow, c in zip(arrows, colours, strict=True) if arrow is not None]
     axes.add_collection(
         LineCollection([arrow for arrow, _ in shown], colors=[colour for _, colour in shown],
@@ -177,7 +190,16 @@ def _draw_altitudes(
 ) -> None:
     """Draw altitude above the ellipsoid over time, and where each sensor detected what."""
     tracks = [*flights.targets, flights.own]
-    _draw_lines(axes, [np.column_stack((track.time_s, track.alt_m)) for track in tracks])
+    lines = {track.name: np.column_stack((track.time_s, track.alt_m)) for track in tracks}
+    every = np.concatenate([track.alt_m for track in tracks])
+    every = every[np.isfinite(every)]
+    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
+    half = max(high - low, _LEAST_SPAN_M) * 0.58
+    axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+    axes.set_xlim(0.0, max(flights.duration_s, 1e-9))
+    _draw_lines(axes, list(lines.values()))
+    if len(tracks) <= MOST_NAMED:
+        name_lines(axes, lines, "#333333")
     for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
@@ -185,17 +207,10 @@ def _draw_altitudes(
             points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
         if points:
             draw_marks(axes, style, np.concatenate(points))
-    every = np.concatenate([track.alt_m for track in tracks])
-    every = every[np.isfinite(every)]
-    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
-    half = max(high - low, _LEAST_SPAN_M) * 0.58
-    axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    axes.set_xlim(0.0, max(flights.duration_s, 1e-9))
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("altitude [m]")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("altitude (m)")
     axes.grid(color="#DDDDDD", linewidth=0.5)
     axes.set_axisbelow(True)
-    axes.ticklabel_format(useOffset=False, style="plain")
 
 
 def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
@@ -249,13 +264,15 @@ def _nearest_first(flights: Flights) -> list[tuple[float, str, float, float, flo
 
 
 def _legend(
-    reaches: dict[str, str], detected: Detected, drawn: dict[str, int], summary: dict[str, Any]
-) -> list[Any]:
+    reaches: dict[str, str], detected: Detected, drawn: dict[str, int], summary: dict[str, Any],
+    dense: bool,
+) -> list[Any]:  # fmt: skip
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=_OWN, linewidth=2.0, label="ownship"),
-        Line2D([], [], color=_TARGET, linewidth=1.0, label="target"),
+        Line2D([], [], color=_TARGET, linewidth=5.0 if dense else 1.0,
+               label="targets (darker: more)" if dense else "target"),
         Line2D([], [], linestyle="none", marker="o", markersize=5, color="#333333", label="start"),
         Line2D([], [], linestyle=":", marker="x", linewidth=0.7, color="#000000",
                label="closest approach"),

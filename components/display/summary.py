@@ -30,6 +30,8 @@ Columns = Any
 TABLE = "state_tracks"
 #: A track that never comes so near to any target is false.
 NEAR_M = 300.0
+#: Instead of a target's name, for what is near none.
+NO_TARGET = "no target"
 _PLACE = ("north_m", "east_m", "down_m")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
@@ -144,36 +146,61 @@ class TrackSummary:
         ``confirmed`` counts tracks that were ever confirmed. Where truth is recorded: ``false``
         of them have a range and are never within `NEAR_M` of a target (None where no track has
         a range), and ``position_error_m`` is the rms distance of the others' states from the
-        nearest target within `NEAR_M`, None without any.
+        nearest target within `NEAR_M`, None without any. ``first_confirmed`` is the first
+        instant with a confirmed track and its range from the ownship as estimated there (of
+        several the nearest, None without a range), None without any; ``targets`` is the same for
+        each target that a track with a range came within `NEAR_M` of.
         """
         return {"tracks": {name: entry.result() for name, entry in self._entries.items()}}
 
 
 class AlertSummary:
-    """Keeps when each level of an alerter first came on."""
+    """Keeps from when to when each level of an alerter was on, and for which targets."""
 
     tables: ClassVar[frozenset[str]] = frozenset({AlertLevels.entry_table or ""})
 
     def __init__(self, alerters: Iterable[str]) -> None:
-        self._first_s: dict[str, dict[int, float]] = {name: {} for name in alerters}
+        self._entries: dict[str, dict[int, dict[str, list[float]]]] = {n: {} for n in alerters}
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``alerts``, in order of time."""
-        level, time_s = columns["level"], columns["time_s"]
+        level, time_s, target = columns["level"], columns["time_s"], columns["target"]
         for name, rows in rows_by_name(columns["block"]):
-            found, first = np.unique(level[rows], return_index=True)
-            for number, row in zip(found.tolist(), rows[first].tolist(), strict=True):
-                if number > 0:
-                    self._first_s[name].setdefault(number, float(time_s[row]))
+            rows = rows[level[rows] > 0]
+            pairs = np.stack([level[rows], target.codes[rows]])
+            (levels, codes), which = np.unique(pairs, axis=1, return_inverse=True)
+            for place, (number, code) in enumerate(
+                zip(levels.tolist(), codes.tolist(), strict=True)
+            ):
+                of_pair = time_s[rows[which.ravel() == place]]
+                whom = target.names[code] if code >= 0 else NO_TARGET
+                spans = self._entries[name].setdefault(number, {})
+                spans.setdefault(whom, [float(of_pair[0]), 0.0])[1] = float(of_pair[-1])
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``alerts``: alerter → level → time of its first alert, s."""
+        """Return the section ``alerts``: alerter → level → when, and of which targets.
+
+        ``first_s`` and ``last_s`` are the first and the last instant at which any target had that
+        level, ``targets`` the same by target; what is far from all targets is `NO_TARGET`.
+        """
         return {
             "alerts": {
-                name: {str(level): first[level] for level in sorted(first)}
-                for name, first in self._first_s.items()
+                name: {str(level): _spans(levels[level]) for level in sorted(levels)}
+                for name, levels in self._entries.items()
             }
         }
+
+
+def _spans(of_target: dict[str, list[float]]) -> dict[str, Any]:
+    firsts, lasts = zip(*of_target.values(), strict=True)
+    return {
+        "first_s": min(firsts),
+        "last_s": max(lasts),
+        "targets": {
+            name: {"first_s": first_s, "last_s": last_s}
+            for name, (first_s, last_s) in sorted(of_target.items())
+        },
+    }
 
 
 class ManoeuvreSummary:
@@ -318,10 +345,14 @@ class _Tracker:
         self._judged: set[int] = set()
         self._near: set[int] = set()
         self._squares_m2, self._count = 0.0, 0
+        #: Time and range, of any track and by the target it is near.
+        self._first: tuple[float, float] | None = None
+        self._firsts: dict[str, tuple[float, float]] = {}
 
     def add(self, columns: Columns, rows: IntArray) -> None:
         number = columns["track"]
         self._confirmed.update(np.unique(number[rows]).tolist())
+        self._first = _earlier(self._first, columns, rows)
         if self._at is None:
             return
         rows = rows[columns["has_range"][rows]]
@@ -339,6 +370,12 @@ class _Tracker:
         nearest = np.fmin.reduce(apart, axis=0, initial=np.inf)
         near = nearest < NEAR_M
         self._near.update(np.unique(columns["track"][rows[near]]).tolist())
+        closest = np.nanargmin(apart[:, near], axis=0) if near.any() else np.empty(0, np.int64)
+        for target in np.unique(closest).tolist():
+            name = self._targets.names[target]
+            first = _earlier(self._firsts.get(name), columns, rows[near][closest == target])
+            assert first is not None
+            self._firsts[name] = first
         self._squares_m2 += float((nearest[near] ** 2).sum())
         self._count += int(near.sum())
 
@@ -348,7 +385,27 @@ class _Tracker:
             found["false"] = len(self._judged - self._near) if self._judged else None
             mean = self._squares_m2 / self._count if self._count else None
             found["position_error_m"] = None if mean is None else mean**0.5
+        found["first_confirmed"] = None if self._first is None else _first_result(self._first)
+        if self._at is not None:
+            found["targets"] = {n: _first_result(self._firsts[n]) for n in sorted(self._firsts)}
         return found
+
+
+def _earlier(
+    first: tuple[float, float] | None, columns: Columns, rows: IntArray
+) -> tuple[float, float] | None:
+    """Return time and estimated range of the first of rows and what was before, then nearest."""
+    if not len(rows):
+        return first
+    rows = rows[columns["time_s"][rows] == columns["time_s"][rows].min()]
+    apart = [columns[name][rows] - columns[f"own_{name}"][rows] for name in _PLACE]
+    range_m = np.where(columns["has_range"][rows], np.sqrt(sum(d**2 for d in apart)), np.inf)
+    here = float(columns["time_s"][rows[0]]), float(np.fmin.reduce(range_m))
+    return here if first is None else min(first, here)
+
+
+def _first_result(first: tuple[float, float]) -> dict[str, float | None]:
+    return {"time_s": first[0], "range_m": first[1] if math.isfinite(first[1]) else None}
 
 
 def _recorded_targets(simulation: "Simulation") -> Any:

@@ -1,6 +1,6 @@
 """The kit of symbols of all pictures: marks of sensors, marks left out, and names beside them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +9,12 @@ import numpy as np
 from components.sensor.marks import EO, IR, RADAR
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark, marks_of, told_apart
+from dsa_des.record.drawing import figure_text
 
 FONT_SIZE = 8
+#: From so many lines on their density is drawn, in so many cells across and up.
+DENSE = 100
+_CELLS = (160, 100)
 _LINE_PX = FONT_SIZE * 1.9
 _LETTER_PX = FONT_SIZE * 0.95
 _GAP_PX = 8.0
@@ -24,6 +28,7 @@ _SHADES = (0.0, 0.4, -0.35)
 _LIGHT = 0.25
 _KINDS = (("radar", RADAR), ("optical.ir", IR), ("optical", EO))
 
+_NAME_PT = FONT_SIZE - 1
 Box = tuple[float, float, float, float]
 
 
@@ -122,6 +127,49 @@ def by_target(target: IntArray) -> list[tuple[int, IntArray]]:
     order = np.argsort(target, kind="stable")
     starts = np.flatnonzero(np.diff(target[order], prepend=-1))
     return [(int(target[rows[0]]), rows) for rows in np.split(order, starts[1:]) if len(rows)]
+
+
+def name_lines(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
+    """Write a name where each line (points, 2) last is within the axes, above one another."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    ends = []
+    for name, line in lines.items():
+        x, y = line.T
+        seen = np.flatnonzero((x >= left) & (x <= right) & (y >= low) & (y <= high))
+        if len(seen):
+            ends.append((float(y[seen[-1]]), float(x[seen[-1]]), name))
+    height_pt = axes.get_window_extent().height * 72 / axes.figure.dpi
+    step = 1.25 * _NAME_PT / height_pt * (high - low)
+    places: list[float] = []
+    for y, _, _ in sorted(ends):
+        places.append(max(y, places[-1] + step) if places else y)
+    over = max(0.0, places[-1] - high) if places else 0.0
+    for (y, x, name), at in zip(sorted(ends), places, strict=True):
+        axes.annotate(
+            figure_text(name, 14), (x, y), xytext=(4.0, (at - over - y) * height_pt / (high - low)),
+            textcoords="offset points", fontsize=_NAME_PT, color=colour, va="center",
+            annotation_clip=False, zorder=5.0,
+            bbox={"facecolor": "white", "alpha": 0.65, "edgecolor": "none", "pad": 0.4},
+        )  # fmt: skip
+
+
+def draw_density(axes: Any, lines: Sequence[FloatArray]) -> None:
+    """Draw many lines (points, 2) as how many are in each cell of axes of given limits."""
+    from matplotlib.colors import LogNorm
+
+    x, y = axes.get_xlim(), axes.get_ylim()
+    edges = [np.linspace(low, high, n + 1) for (low, high), n in zip((x, y), _CELLS, strict=True)]
+    count = np.zeros(_CELLS)
+    for line in lines:
+        # So close that a line leaves out no cell that it crosses in its length.
+        at = np.linspace(0.0, len(line) - 1.0, 8 * max(_CELLS))
+        across, up = (np.interp(at, np.arange(len(line)), line[:, k]) for k in (0, 1))
+        count += np.histogram2d(across, up, bins=edges)[0] > 0
+    axes.pcolormesh(
+        *edges, np.where(count > 0, count, np.nan).T, cmap="Greys", zorder=0.5,
+        norm=LogNorm(0.3, max(2.0, float(count.max())) * 2.0),
+    )  # fmt: skip
+    axes.set(xlim=x, ylim=y)
 
 
 class Labels:

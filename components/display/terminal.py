@@ -6,6 +6,7 @@ from typing import Any
 from dsa_des.text.safe_text import printable, shortened
 
 MOST_TARGETS = 10
+MOST_IN_A_LINE = 4
 
 
 def show(console: Any, summary: dict[str, Any]) -> None:
@@ -136,9 +137,11 @@ def outcome_lines(summary: dict[str, Any]) -> list[str]:
         for name, late in summary.get("late_looks", {}).items()
         for sensor, entry in late.items()
     ]
-    for name, first_s in summary.get("alerts", {}).items():
-        times = ", ".join(f"level {level} from {when:.1f} s" for level, when in first_s.items())
-        lines.append(f"{name}: {'alerts of ' + times if times else 'no alert'}")
+    for name, levels in summary.get("alerts", {}).items():
+        lines += [
+            f"{name}: level {level} {_span_text(entry)} ({_whom_text(entry['targets'])})"
+            for level, entry in levels.items()
+        ] or [f"{name}: no alert"]
     for name, entry in summary.get("manoeuvres", {}).items():
         text = "no manoeuvre"
         if entry["count"] == 1:
@@ -159,7 +162,40 @@ def _tracks_text(entry: dict[str, Any]) -> str:
         text += f", {format(entry['false'], ',') if entry['false'] else 'none'} of them false"
     if entry.get("position_error_m") is not None:
         text += f"; position error {distance_text(entry['position_error_m'])} rms"
-    return text
+    firsts = entry.get("targets") or {"": entry["first_confirmed"]}
+    text += (
+        "; first confirmed"
+        + (": " if "" not in firsts else " ")
+        + ", ".join(
+            f"{name} at {first['time_s']:.1f} s".lstrip()
+            + ("" if first["range_m"] is None else f" ({distance_text(first['range_m'])} away)")
+            for name, first in _few(firsts)
+        )
+    )
+    return text + _more_text(firsts)
+
+
+def _span_text(entry: dict[str, Any]) -> str:
+    if entry["first_s"] == entry["last_s"]:
+        return f"at {entry['first_s']:.1f} s"
+    return f"from {entry['first_s']:.1f} s to {entry['last_s']:.1f} s"
+
+
+def _whom_text(targets: dict[str, dict[str, float]]) -> str:
+    if len(targets) == 1:
+        return next(iter(targets))
+    spans = [f"{name} {_span_text(entry)}" for name, entry in _few(targets)]
+    return ", ".join(spans) + _more_text(targets)
+
+
+def _few(targets: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Return the first few targets, in order of time."""
+    return sorted(targets.items(), key=lambda item: next(iter(item[1].values())))[:MOST_IN_A_LINE]
+
+
+def _more_text(targets: dict[str, Any]) -> str:
+    more = len(targets) - MOST_IN_A_LINE
+    return f" and {more:,} more" if more > 0 else ""
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:

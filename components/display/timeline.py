@@ -17,7 +17,15 @@ from components.display.recorded_rows import (
     read_scans,
     scans_between,
 )
-from components.display.symbols import by_target, draw_marks, in_turns, mark_of
+from components.display.symbols import (
+    DENSE,
+    by_target,
+    draw_density,
+    draw_marks,
+    in_turns,
+    mark_of,
+    name_lines,
+)
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
@@ -29,7 +37,8 @@ Scans = dict[str, SensorScans]
 MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
-_LEFT, _WIDTH = 0.105, 0.87
+_LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.8  # beside the whole run are names of targets
+_MOST_NAMED = 8
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 
@@ -62,12 +71,10 @@ def draw_timeline(
         _draw_scans(above, scans, shown, detected.styles, close_up)
         title = figure_text(simulation.scene.title, 28)  # the legend is beside it
         above.set_title(f"{title}: {close_up.what}", loc="left")
-        below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
+        below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
-        below.set_title(
-            "Whole run: true slant range of detections (shaded: the part above)", loc="left"
-        )
+        below.set_title("Whole run (shaded: the part above)", loc="left")
     return path
 
 
@@ -202,25 +209,33 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
         default=0.0,
     )
     handles = []
+    lines: list[Any] = []
     if flights is not None:
         lines = [np.column_stack((t.time_s, t.range_m / 1000)) for t in flights.targets]
         farthest = max((float(np.nanmax(line[:, 1], initial=0.0)) for line in lines), default=0.0)
         # A target that stays far beyond anything detected would flatten all the rest.
         top_km = min(farthest, 1.6 * top_km) if top_km else farthest
-        many = len(lines) > 20
+    top_km = max(1.05 * top_km, 0.1)
+    axes.set_ylim(0.0, top_km)
+    axes.set_xlim(0.0, max(duration_s, 1e-9))
+    if len(lines) >= DENSE:
+        draw_density(axes, lines)
+        handles.append(Line2D([], [], color="#999999", lw=5.0, label="targets (darker: more)"))
+    elif lines:
+        width = 0.5 if len(lines) > 20 else 1.0
         axes.add_collection(
-            LineCollection(lines, colors="#999999", linewidths=0.5 if many else 1.0, zorder=1.0),
-            autolim=False,
+            LineCollection(lines, colors="#999999", linewidths=width, zorder=1.0), autolim=False
         )
         handles.append(Line2D([], [], color="#999999", linewidth=1.0, label="target"))
-    top_km = max(1.05 * top_km, 0.1)
-    width_px = _SIZE_IN[0] * _WIDTH * DPI
+        if flights is not None and len(lines) <= _MOST_NAMED:
+            names = [target.name for target in flights.targets]
+            name_lines(axes, dict(zip(names, lines, strict=True)), "#333333")
+    width_px = _SIZE_IN[0] * _BELOW * DPI
     for name in detected.sensors:
         _draw_detections(axes, detected, name, width_px / duration_s)
         label = figure_text(name, 16)
         handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=label))
-    axes.set_ylim(0.0, top_km)
-    axes.set_ylabel("true slant range [km]")
+    axes.set_ylabel("true slant range (km)")
     axes.grid(color="#DDDDDD", linewidth=0.5)
     axes.set_axisbelow(True)
     _time_axis(axes, 0.0, duration_s)
@@ -242,5 +257,4 @@ def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) 
 
 def _time_axis(axes: Any, start_s: float, end_s: float) -> None:
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
-    axes.set_xlabel("time [s]")
-    axes.ticklabel_format(axis="x", useOffset=False, style="plain")
+    axes.set_xlabel("time (s)")

@@ -51,11 +51,8 @@ class DrawnTrack:
     number: int
     columns: dict[str, Any]
     false: bool
-
-    @property
-    def colour(self) -> str:
-        """Its colour in all figures."""
-        return _FALSE if self.false else COLOURS[(self.number - 1) % len(COLOURS)]
+    #: That of its tracker where several are compared, else its own, in all figures.
+    colour: str
 
 
 class DrawnTracks:
@@ -69,7 +66,8 @@ class DrawnTracks:
         targets = [target for source in sources for target in source.targets]
         self.targets = TargetsInFrame(targets, self.origin)
         self.tracks = []
-        for block in sorted(set(columns["block"].tolist())):
+        self.blocks = sorted(set(columns["block"].tolist()))
+        for place, block in enumerate(self.blocks):
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -77,7 +75,9 @@ class DrawnTracks:
                 near = distances(one, slice(None), self.targets.at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
-                self.tracks.append(DrawnTrack(block, number, one, false))
+                turn = place if len(self.blocks) > 1 else number - 1
+                colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
+                self.tracks.append(DrawnTrack(block, number, one, false, colour))
 
     @classmethod
     def read(cls, simulation: "Simulation", folder: Path) -> "DrawnTracks | None":
@@ -141,16 +141,16 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         for one in drawn.tracks:
             _draw_one(plan, height, one, drawn.origin[2])
         plan.set_aspect("equal", adjustable="datalim")
-        plan.set_xlabel("east of the origin [km]")
-        plan.set_ylabel("north of the origin [km]")
-        height.set_xlabel("time [s]")
-        height.set_ylabel("height in the frame [m]")
+        plan.set_xlabel("east of the origin (km)")
+        plan.set_ylabel("north of the origin (km)")
+        height.set_xlabel("time (s)")
+        height.set_ylabel("height in the frame (m)")
         false = sum(one.false for one in drawn.tracks)
         many = len(drawn.tracks) - false
         plan.set_title(
             f"{many} confirmed track{'s' * (many != 1)} near targets, {false} false", loc="left"
         )
-        _legend(figure, false > 0)
+        _legend(figure, drawn.blocks, false > 0)
         tight(figure)
         figure.subplots_adjust(top=0.93)
         _names(figure, plan, drawn, positions, own)
@@ -190,21 +190,30 @@ def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) ->
         plan.plot(x, y, color=colour, linewidth=0.6, zorder=1)
 
 
-def _legend(figure: Any, false: bool) -> None:
+def _legend(figure: Any, blocks: list[str], false: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     entries = [
         Line2D([], [], color=_TRUTH, linewidth=0.7, label="truth"),
         Line2D([], [], color=_OWN, linewidth=0.7, linestyle="--", label="ownship"),
-        Line2D([], [], color=COLOURS[0], linewidth=1.4, label="track, by its number"),
-        Patch(facecolor=COLOURS[0], alpha=0.3, label="95 %"),
+        *(
+            Line2D(
+                [],
+                [],
+                color=COLOURS[place % len(COLOURS)],
+                linewidth=1.4,
+                label=figure_text(block, 16) if blocks[1:] else "track, by its number",
+            )
+            for place, block in enumerate(blocks)
+        ),
+        Patch(facecolor=_FALSE if blocks[1:] else COLOURS[0], alpha=0.3, label="95 %"),
     ]
     if false:
         entries.append(
             Line2D([], [], color=_FALSE, linestyle=":", marker="x", label="never near a target")
         )
-    figure.legend(handles=entries, loc="upper center", ncols=len(entries), frameon=False)
+    figure.legend(handles=entries, loc="upper center", ncols=min(len(entries), 7), frameon=False)
 
 
 def _names(
@@ -228,10 +237,8 @@ def _names(
             labels.add(figure_text(name), float(there[-1][0]), float(there[-1][1]))
     if len(drawn.tracks) > _MOST_NAMED:
         return
-    blocks = {one.block for one in drawn.tracks}
     for one, line in zip(drawn.tracks, lines[len(positions) + 1 :], strict=True):
-        text = f"{one.number}" if len(blocks) == 1 else f"{figure_text(one.block)} {one.number}"
-        labels.add(text, float(line[0][0]), float(line[0][1]), one.colour, "bold")
+        labels.add(f"{one.number}", float(line[0][0]), float(line[0][1]), one.colour, "bold")
 
 
 def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
@@ -250,11 +257,15 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     if not shown:
         return None
     every = np.concatenate([values[~np.isnan(values)] for _, _, values in shown])
-    with drawing(7.5, 6.4, path) as figure:
+    with drawing(9.0, 6.4, path) as figure:
         errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        labelled: set[str] = set()
         for track, time_s, values in shown:
-            errors.plot(time_s, values, color=track.colour, linewidth=0.9,
-                        label=f"track {track.number}")  # fmt: skip
+            label = f"track {track.number}"
+            if len(drawn.blocks) > 1:
+                label = "" if track.block in labelled else figure_text(track.block, 16)
+                labelled.add(track.block)
+            errors.plot(time_s, values, color=track.colour, linewidth=0.9, label=label or None)
         low, high = chi_square_bounds(6)
         errors.axhspan(low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0)
         errors.axhline(6.0, color="#666666", linewidth=0.8, zorder=0)
@@ -263,21 +274,39 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
             f"Error squared by its covariance (NEES): mean {every.mean():.3g} (honest: 6), "
             f"{inside:.0%} inside", loc="left",
         )  # fmt: skip
-        if len(shown) <= 6:
-            errors.legend(loc="upper right", ncols=3)
+        if len(shown) <= 6 or len(drawn.blocks) > 1:
+            errors.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         _draw_innovations(innovations, drawn)
         errors.set_yscale("log")
         bottom, top = errors.get_ylim()
         errors.set_ylim(max(bottom, _LOWEST), min(max(top, 20.0), _HIGHEST))
         plain_log_ticks(errors.yaxis)
         innovations.set_ylim(bottom=0.0)
-        innovations.set_xlabel("time [s]")
+        innovations.set_xlabel("time (s)")
         tight(figure)
     return path
 
 
 def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
-    held = [one.columns for one in drawn.tracks]
+    for place, block in enumerate(drawn.blocks):
+        held = [one.columns for one in drawn.tracks if one.block == block]
+        label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
+        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[place % len(COLOURS)], label)
+    if drawn.blocks[1:]:
+        axes.set_title("Innovation squared by its covariance (NIS), per quantity (honest: 1)",
+                       loc="left")  # fmt: skip
+    if axes.get_legend_handles_labels()[1]:
+        axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def _draw_innovations_of(
+    axes: Any,
+    held: list[dict[str, Any]],
+    span_s: tuple[float, float],
+    colour: str,
+    tracker: str,
+) -> None:
     time_s, nis, freedom = (
         np.concatenate([columns[name] for columns in held])
         for name in ("state_s", "nis", "nis_freedom")
@@ -287,18 +316,18 @@ def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
     if len(nis) == 0:
         axes.set_title("Innovation squared (NIS): this tracker tells none", loc="left")
         return
-    edges = np.linspace(drawn.time_s[0], drawn.time_s[1] + 1e-9, _STRETCHES + 1)
+    edges = np.linspace(span_s[0], span_s[1] + 1e-9, _STRETCHES + 1)
     total, many = (np.histogram(time_s, edges, weights=values)[0] for values in (nis, freedom))
     middle = 0.5 * (edges[1:] + edges[:-1])[many > 0]
     total, many = total[many > 0], many[many > 0]
     low, high = np.array([chi_square_bounds(n) for n in many.tolist()]).T / many
-    axes.fill_between(middle, low, high, color="#999999", alpha=0.3, linewidth=0, label="95 %")
-    axes.plot(middle, total / many, color="#0072B2", marker=".", linewidth=0.9,
-              label="mean per quantity")  # fmt: skip
-    axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
+    axes.fill_between(middle, low, high, color=colour if tracker else "#999999",
+                      alpha=0.15 if tracker else 0.3, linewidth=0, zorder=0,
+                      label=None if tracker else "95 %")  # fmt: skip
+    axes.plot(middle, total / many, color=colour, marker=".", linewidth=0.9,
+              label=tracker or "mean per quantity")  # fmt: skip
     inside = np.mean((total / many >= low) & (total / many <= high))
     axes.set_title(
         f"Innovation squared by its covariance (NIS): {nis.sum() / freedom.sum():.3g} per quantity "
         f"(honest: 1), {inside:.0%} of stretches inside", loc="left",
     )  # fmt: skip
-    axes.legend(loc="upper right")

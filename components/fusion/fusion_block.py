@@ -108,28 +108,25 @@ class Fusion(Component):
 
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
+        for name, seen in self._recent.items():
+            if ended := int(np.searchsorted(seen.tick, wake.first_run * wake.span_ticks)):
+                rows = slice(ended, None)
+                self._recent[name] = Arrivals(name, seen.tick[rows], seen.message.take(rows))
         for name, new in arrivals.items():
             old = self._recent.get(name)
             if old is not None:
                 message = Detections.concatenate([old.message, new.message])
                 ticks = np.concatenate([old.tick, new.tick])
-                if wake.side_by_side:  # those of each replica together
+                if bool((ticks[1:] < ticks[:-1]).any()):  # those of each replica together
                     order = np.argsort(ticks, kind="stable")
                     ticks, message = ticks[order], message.take(order)
                 new = Arrivals(name, ticks, message)
             self._recent[name] = new
-        if wake.side_by_side:
-            latest = max(int(wake.own_ticks(new.tick).max()) for new in arrivals.values())
-        else:
-            latest = max(int(new.tick[-1]) for new in arrivals.values())
+        latest = max(int(wake.own_ticks(new.tick).max()) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            if wake.side_by_side:
-                young = np.flatnonzero(wake.own_ticks(seen.tick) >= latest - self.keep_ticks)
-                self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
-                continue
-            keep = slice(int(np.searchsorted(seen.tick, latest - self.keep_ticks)), len(seen.tick))
-            self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
+            young = np.flatnonzero(wake.own_ticks(seen.tick) >= latest - self.keep_ticks)
+            self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
         return dict(sorted(together.items()))
 
     def combine(

@@ -199,8 +199,6 @@ class Gated(Fusion):
         if not reported:
             return None
         since = {name: int(wake.own_ticks(new.tick).min()) for name, new in reported.items()}
-        if not wake.side_by_side:
-            since = {name: int(new.tick[0]) for name, new in reported.items()}
         arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
@@ -209,7 +207,7 @@ class Gated(Fusion):
         pose = {name: poses(arrivals[name].message) for name in order}
         # What came before this wake was reported then; it can only be gathered now.
         free = {
-            name: (wake.own_ticks(came[name]) if wake.side_by_side else came[name]) >= since[name]
+            name: wake.own_ticks(came[name]) >= since[name]
             if name in since
             else np.zeros(len(came[name]), dtype=bool)
             for name in order

@@ -113,7 +113,7 @@ def draw_error_map(folder: Path) -> list[Path]:
             folder / "error_map_angle.png",
             maps[:-1],
             [np.degrees(m.direction_rad) for m in maps[:-1]],
-            "Error of the line of sight's direction [deg]",
+            "Error of the line of sight's direction (deg)",
             rounding,
             "deg",
             (1e-5, 1e2),
@@ -123,7 +123,7 @@ def draw_error_map(folder: Path) -> list[Path]:
             folder / "error_map_range.png",
             maps[:-1],
             [m.range_error_m for m in maps[:-1]],
-            "Error of the slant range [m]",
+            "Error of the slant range (m)",
             rounding,
             "m",
             (1e-3, 1e5),
@@ -177,12 +177,12 @@ def _draw(
                     levels=[level], colors=[colour], linestyles=[dashes], linewidths=1.6,
                 )  # fmt: skip
             axes.set_xscale("log")
-            axes.set_xlabel("slant range [km]")
+            axes.set_xlabel("slant range (km)")
             axes.set_xticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
             axes.set_yticks(np.arange(0, 91, 15), [] if column else None)
             axes.set_title(found.model.replace("_", " "), loc="left")
             if column == 0:
-                axes.set_ylabel("latitude [deg]")
+                axes.set_ylabel("latitude (deg)")
         place = (left + pitch * len(maps), 0.235, 0.13 / width_in, 0.53)
         bar = figure.colorbar(shades, cax=figure.add_axes(place))
         bar.ax.yaxis.set_major_formatter("{x:g}")

@@ -150,7 +150,7 @@ def eo_ranges(printed: Cells) -> Made:
                 axes.bar_label(drawn, labels, fontsize=7)
             axes.set_xticks(place, names)
             axes.set_xlabel("geometry and intruder (the thesis's cell for the first is lost)")
-            axes.set_ylabel("detection range [km]")
+            axes.set_ylabel("detection range (km)")
             axes.set_ylim(0, 13)
             axes.legend(loc="upper left", ncols=2)
 
@@ -232,8 +232,8 @@ def area_error(printed: Cells) -> Made:
             axes.plot(at_km, shorter, "--", color=ORANGE,
                       label="area 20 % too small: range too short by")  # fmt: skip
             axes.axhline(600.0, color=GREY, linewidth=0.9, label="thesis: about 600 m everywhere")
-            axes.set_xlabel("detection range without the error [km]")
-            axes.set_ylabel("error in detection range [m]")
+            axes.set_xlabel("detection range without the error (km)")
+            axes.set_ylabel("error in detection range (m)")
             axes.set(xlim=(1, 10), ylim=(0, 1100))
             axes.legend(loc="upper left")
 
@@ -319,8 +319,8 @@ def _ir_made(
                 if before is not None:
                     axes.plot(HEADING_DEG, before[name], ":", color=colour, linewidth=1.0,
                               label=f"{label}, first parameters")  # fmt: skip
-            axes.set_xlabel("relative heading [deg]: 0 flies away, 180 comes towards us")
-            axes.set_ylabel("IR detection range [km]")
+            axes.set_xlabel("relative heading (deg): 0 flies away, 180 comes towards us")
+            axes.set_ylabel("IR detection range (km)")
             axes.set(xlim=(0, 180), xticks=range(0, 181, 30))
             axes.set_ylim(0, 7.9 if before else 6.9)
             axes.legend(loc="upper left", ncols=2 if before else 3)

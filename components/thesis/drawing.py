@@ -79,8 +79,8 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
         axes.plot(track.east_km, track.north_km, color=GREY, linewidth=1.0, label=label)
     axes.plot([0.0], [0.0], "*", color="#000000", markersize=11, label="ownship", zorder=3)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("east [km]")
-    axes.set_ylabel("north [km]")
+    axes.set_xlabel("east (km)")
+    axes.set_ylabel("north (km)")
 
 
 def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> None:

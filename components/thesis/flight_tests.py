@@ -215,7 +215,7 @@ def detection_ranges(printed: Cells) -> Made:
                 one.set_ylabel(f"flights of {REPLICAS}\nper 0.5 km")
                 one.set_title(f"class {name}, {CLASSES[name][0]} dBsm", loc="left")
             legend_below(axes[0], 2)
-            axes[-1].set_xlabel("range [km]")
+            axes[-1].set_xlabel("range (km)")
             axes[-1].set_xlim(0, 15.5)
 
     data = {

@@ -137,7 +137,7 @@ def detections_over_range(_: Cells) -> Made:
             shares.plot(curve_km, curve, color=BLUE, label="Pd, Swerling I, 1.76 dBsm")
             shares.errorbar(middle_km, share, 2.0 * sigma, fmt="o", markersize=4, color=ORANGE,
                             label="share of scans that detect (±2σ)")  # fmt: skip
-            shares.set_xlabel("range [km]")
+            shares.set_xlabel("range (km)")
             shares.set_ylabel("probability of detection [1]")
             shares.set(xlim=(0, 15.5), ylim=(0, 1.08))
             shares.legend(loc="lower left")
@@ -334,7 +334,7 @@ def unsynchronised(printed: Cells) -> Made:
             times.set_xticks(range(11))
             times.set(xlim=(-0.3, 10.3), ylim=(-0.5, len(_MARKS) - 0.5))
             times.set_title("radar scan rate 5 Hz, IR scan rate 2 Hz", loc="left")
-            times.set_xlabel("time [s]")
+            times.set_xlabel("time (s)")
             legend_below(places, 5, without="ownship")
 
     data: Columns = _joined(fused, ("time_s",), "sensors")

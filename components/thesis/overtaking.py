@@ -67,8 +67,8 @@ def spread(flights: list[Overtaking], printed: Printed) -> tuple[list[Row], Pict
                               label=f"{name}, {above} m above")  # fmt: skip
             axes.axhline(printed.value, color=GREY, linewidth=1.2,
                          label=f"thesis: {printed.text} km")  # fmt: skip
-            axes.set_xlabel("distance to the left at which the intruder passes [m]")
-            axes.set_ylabel("range within which the EO joins [km]")
+            axes.set_xlabel("distance to the left at which the intruder passes (m)")
+            axes.set_ylabel("range within which the EO joins (km)")
             axes.set(xlim=(0, 3500), ylim=(0, 14))
             legend_below(axes, 3)
 
@@ -141,8 +141,8 @@ def overtaking(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        shown = (("range error [m]", errors_m), ("azimuth error\n[deg]", azimuth),
-                 ("elevation error\n[deg]", elevation))  # fmt: skip
+        shown = (("range error (m)", errors_m), ("azimuth error\n(deg)", azimuth),
+                 ("elevation error\n(deg)", elevation))  # fmt: skip
         with panels(path, 3, 1, sharex=True, height_in=5.4) as axes:
             for one, (label, values) in zip(axes, shown, strict=True):
                 for part, marker, colour, said in (
@@ -159,7 +159,7 @@ def overtaking(printed: Cells) -> Made:
                 loc="left",
             )
             legend_below(axes[0])
-            axes[-1].set_xlabel("time [s]")
+            axes[-1].set_xlabel("time (s)")
             far = axes[-1].secondary_xaxis(
                 -0.42,
                 functions=(
@@ -167,7 +167,7 @@ def overtaking(printed: Cells) -> Made:
                     lambda r: np.interp(r, range_km, time_s),
                 ),
             )
-            far.set_xlabel("range [km]")  # fmt: skip
+            far.set_xlabel("range (km)")  # fmt: skip
 
     data = {
         "time_s": time_s,

@@ -100,7 +100,7 @@ def pd_over_snr(_: Cells) -> Made:
                           label=f"{name}, truncated table")  # fmt: skip
             axes.axhline(pfa, color=GREY, linewidth=0.7)
             axes.annotate(f"Pfa {pfa:g}", (29.5, pfa), fontsize=8, ha="right", va="bottom")
-            axes.set_xlabel("SNR [dB]")
+            axes.set_xlabel("SNR (dB)")
             axes.set_ylabel("probability of detection Pd [1]")
             axes.set(xlim=(-20, 30), ylim=(0, 1.02))
             axes.legend(loc="upper left")
@@ -143,13 +143,13 @@ def over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
     def draw(path: Path) -> None:
         with panels(path, 2, 1, sharex=True, height_in=4.6) as (upper, lower):
             upper.plot(range_km, snr_db, color=BLUE, label=f"SNR, {rcs_dbsm} dBsm")
-            upper.set_ylabel("SNR [dB]")
+            upper.set_ylabel("SNR (dB)")
             lower.plot(range_km, fluctuating, color=BLUE, label="Pd, Swerling I")
             lower.plot(range_km, steady, "--", color=ORANGE, label="Pd, Swerling V")
             lower.plot([average_km], [thesis.value], "kx", markersize=7,
                        label=f"thesis: {thesis.text} at {average_km:.2f} km")  # fmt: skip
             lower.set_ylabel("probability of detection Pd [1]")
-            lower.set_xlabel("range [km]")
+            lower.set_xlabel("range (km)")
             lower.set(xlim=(1, 15), ylim=(0, 1.03))
             for axes in (upper, lower):
                 axes.axvline(average_km, color=GREY, linewidth=0.8, linestyle=":")
@@ -230,7 +230,7 @@ def specified_range(printed: Cells) -> Made:
                 axes.annotate(text, (km, 0.03), fontsize=8, ha=side)
             axes.plot([first_km], [0.9], "kx", markersize=7,
                       label="threshold radar set to 6.48 km: first detection")  # fmt: skip
-            axes.set_xlabel("range [km]")
+            axes.set_xlabel("range (km)")
             axes.set_ylabel("Pd of 5 m², Swerling I [1]")
             axes.set(xlim=(2, 15), ylim=(0, 1.03))
             legend_below(axes, 2)

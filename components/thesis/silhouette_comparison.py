@@ -189,7 +189,7 @@ def _draw_panels(panels: Any, comparisons: Sequence[RotationComparison]) -> None
         panel.grid(True, alpha=0.3)
     panels[0].set_ylim(bottom=0.0)
     panels[0].legend(fontsize=8)
-    panels[-1].set_xlabel("Camera angle about the axis [deg]")
+    panels[-1].set_xlabel("Camera angle about the axis (deg)")
     panels[-1].set_xticks(np.arange(0.0, 181.0, 30.0))
 
 

@@ -94,7 +94,7 @@ def front_and_back(printed: Cells) -> Made:
             axes.plot(heading_deg, back, "--", color=BLUE, label="back sphere, a = 1 m²")
             axes.plot(heading_deg, front, ":", color=ORANGE, label="front sphere, b = 1.5 m²")
             axes.plot(heading_deg, together, color=GREEN, label="sum (eq. 21)")
-            axes.set_xlabel("relative heading ψ_rel [deg]: 0 flies away, 180 comes towards us")
+            axes.set_xlabel("relative heading ψ_rel (deg): 0 flies away, 180 comes towards us")
             axes.set_ylabel("contribution to the signature [m²]")
             axes.set(xlim=(0, 360), ylim=(0, 1.8), xticks=range(0, 361, 45))
             axes.legend(loc="upper center", ncols=3)

@@ -108,12 +108,12 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
             middle, mean, spread = radar.by_range(radar.east_m)
             places.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
-            angles.set_ylabel("root mean square angle error [deg]")
-            places.set_ylabel("east error of the intruder's position [m]")
+            angles.set_ylabel("root mean square angle error (deg)")
+            places.set_ylabel("east error of the intruder's position (m)")
             angles.set_ylim(bottom=0.0)
             places.legend(loc="lower left")
             for axes in (angles, places):
-                axes.set_xlabel("range [km]")
+                axes.set_xlabel("range (km)")
             angles.set_title("angles in north-east-down, as believed", loc="left")
             legend_below(angles)
 
@@ -248,7 +248,7 @@ def systems(printed: Cells) -> Made:
                 names.append(SYSTEMS[name].replace(": ", ":\n"))
                 height += 0.7
             axes.set_yticks(ticks, names, fontsize=8)
-            axes.set_xlabel("range of the first detection [km]")
+            axes.set_xlabel("range of the first detection (km)")
             axes.set_ylabel("system (configs/systems)")
             axes.set_xlim(0, 20)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -13,21 +13,19 @@ from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_tracks import (
-    FusedColumns,
     fused_states,
-    joined,
     no_fused_tracks,
     reported_after,
     state_tracks,
-    taken,
 )
 from components.track_fusion.local_tracks import (
-    FusionRecords,
     LocalTracks,
     local_tracks,
+    records_of,
     with_newest,
 )
 from components.track_fusion.track_association import MatchRules, matched, without_strays
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -154,8 +152,7 @@ class CovarianceIntersection(Component):
             math.radians(self.p.bearing_rate_deg_s),
             self.p.stay_factor,
         )
-        none = np.empty(0, dtype=np.int64)
-        self._records = FusionRecords(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
+        self._records = records_of(np.empty(0, dtype=np.int64))
         #: By tracker: of each replica, the newest instant that it reported of.
         self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
@@ -175,35 +172,19 @@ class CovarianceIntersection(Component):
         replica = wake.replica[rows]
         records = self._records_of(np.unique(replica), came, row_of, wake)
         reports = self._reports(wake, came, row_of, records)
-        local = self._local.take(np.isin(self._local.replica, records.replica))
-        reported = taken(self._reported, np.isin(self._reported["replica"], records.replica))
+        local, reported = self._local.of(records.replica), self._reported.of(records.replica)
         parts = []
-        turn_of = np.arange(len(rows)) - np.searchsorted(replica, replica)
-        for turn in range(int(turn_of.max()) + 1):
-            at = np.flatnonzero(turn_of == turn)
+        for at in turns(replica):
             local, records = self._taken_in(local, records, reports, rows[at], replica[at])
             new = self._fused(local, records, reported, rows[at], replica[at])
             parts.append(new)
-            kept = taken(new, new["track_status"] != DELETED)
-            reported = joined([taken(reported, ~np.isin(reported["replica"], replica[at])), kept])
-        self._remember(records, local, reported, wake)
-        return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
-
-    def _remember(
-        self, records: FusionRecords, local: LocalTracks, reported: FusedColumns, wake: Wake
-    ) -> None:
-        """Keep what is held of the replicas that may come again."""
-        if wake.side_by_side:
-            others = ~np.isin(self._local.replica, records.replica)
-            self._local = LocalTracks.joined([self._local.take(others), local])
-            others = ~np.isin(self._reported["replica"], records.replica)
-            self._reported = joined([taken(self._reported, others), reported])
-            self._records = self._records.kept_with(records)
-            return
-        last = records.replica[-1]
-        self._records = records.take(records.replica == last)
-        self._local = local.take(local.replica == last)
-        self._reported = taken(reported, reported["replica"] == last)
+            kept = new.take(new.track_status != DELETED)
+            reported = reported.after(replica[at], kept, wake.first_run)
+        runs, first = records.replica, wake.first_run
+        self._records = self._records.after(runs, records, first)
+        self._local = self._local.after(runs, local, first)
+        self._reported = self._reported.after(runs, reported, first)
+        return state_tracks(KeyedTable.joined(parts), rows, wake.ticks[rows], self.sensors)
 
     def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
@@ -223,14 +204,10 @@ class CovarianceIntersection(Component):
 
     def _records_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
-    ) -> FusionRecords:
+    ) -> KeyedTable:
         """Return what is kept of replicas; the frame of a new one is that of its first track."""
-        count = len(replicas)
-        records = FusionRecords(
-            replicas, np.full((3, count), np.nan), np.ones(count, dtype=np.int64),
-            np.full(count, -np.inf), np.full((3, count), np.nan),
-        )  # fmt: skip
-        first = np.full(count, np.iinfo(np.int64).max)
+        records = records_of(replicas)
+        first = np.full(len(replicas), np.iinfo(np.int64).max)
         for name in sorted(came):
             message = came[name].message
             row = np.repeat(row_of[name], np.diff(message.offsets))
@@ -239,20 +216,17 @@ class CovarianceIntersection(Component):
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
             records.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
-        old = self._records.take(np.isin(self._records.replica, replicas))
-        here = np.searchsorted(replicas, old.replica)
-        records.next_number[here], records.time_s[here] = old.next_number, old.time_s
-        records.own_m[:, here] = old.own_m
-        begun = ~np.isnan(old.origin[0])
-        records.origin[:, here[begun]] = old.origin[:, begun]
-        return records
+        kept = self._records.continued(records)
+        return kept.with_columns(
+            origin=np.where(np.isnan(kept.origin[0]), records.origin, kept.origin)
+        )
 
     def _reports(
         self,
         wake: Wake,
         came: dict[str, Arrivals],
         row_of: dict[str, IntArray],
-        records: FusionRecords,
+        records: KeyedTable,
     ) -> _Reports:
         parts, rows = [], []
         reported_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
@@ -276,11 +250,11 @@ class CovarianceIntersection(Component):
     def _taken_in(
         self,
         local: LocalTracks,
-        records: FusionRecords,
+        records: KeyedTable,
         reports: _Reports,
         at: IntArray,
         replica: IntArray,
-    ) -> tuple[LocalTracks, FusionRecords]:
+    ) -> tuple[LocalTracks, KeyedTable]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
         new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
@@ -297,20 +271,20 @@ class CovarianceIntersection(Component):
             busy, next_number = matched(
                 self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )
-            records = replace(records, next_number=next_number)
+            records = records.with_columns(next_number=next_number)
         return LocalTracks.joined([idle, busy]), records
 
     def _fused(
         self,
         local: LocalTracks,
-        records: FusionRecords,
-        reported: FusedColumns,
+        records: KeyedTable,
+        reported: KeyedTable,
         at: IntArray,
         replica: IntArray,
-    ) -> FusedColumns:
+    ) -> KeyedTable:
         """Return what is reported of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))
-        before = taken(reported, np.isin(reported["replica"], replica))
+        before = reported.of(replica)
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
         found = fused_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(records.replica, found.replica)

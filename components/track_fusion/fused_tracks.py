@@ -1,6 +1,5 @@
 """Fused tracks: their states, from those of their members, and the message that reports them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,8 @@ from components.messages.state_tracks import (
 )
 from components.track_fusion.local_tracks import LocalTracks
 from components.track_fusion.track_association import bearing, leaders
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import offsets_of
 
 
@@ -118,9 +118,6 @@ _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _OWN = ("own_north_m", "own_east_m", "own_down_m")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
-#: Columns over fused tracks, the tracks on their last axis.
-FusedColumns = dict[str, AnyArray]
-
 _WHOLE = ("replica", "row", "track", "track_status", "contributors", "updated_by")
 _NUMBERS = (
     "born_s", "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
@@ -128,103 +125,94 @@ _NUMBERS = (
 )  # fmt: skip
 
 
-def no_fused_tracks() -> FusedColumns:
+def no_fused_tracks() -> KeyedTable:
     """Return the columns of no track."""
-    found: FusedColumns = {name: np.empty(0, dtype=np.int64) for name in _WHOLE}
-    found |= {name: np.empty(0) for name in _NUMBERS}
-    found |= {"state": np.empty((6, 0)), "covariance": np.empty((6, 6, 0))}
-    found |= {"own": np.empty((3, 0)), "origin": np.empty((3, 0))}
-    return {**found, "has_range": np.empty(0, dtype=bool)}
-
-
-def taken(reported: FusedColumns, which: AnyArray) -> FusedColumns:
-    """Return some of the tracks."""
-    return {name: values[..., which] for name, values in reported.items()}
-
-
-def joined(parts: Sequence[FusedColumns]) -> FusedColumns:
-    """Return the tracks of all parts, one after the other."""
-    return {n: np.concatenate([part[n] for part in parts], axis=-1) for n in parts[0]}
+    shapes = {"state": (6,), "covariance": (6, 6), "own": (3,), "origin": (3,)}
+    floats = dict.fromkeys((*_NUMBERS, *shapes), float)
+    return KeyedTable.empty({**dict.fromkeys(_WHOLE, int), **floats, "has_range": bool}, shapes)
 
 
 def reported_after(
-    before: FusedColumns,
+    before: KeyedTable,
     found: FusedStates,
     members: LocalTracks,
     origin_deg_m: FloatArray,
     own_m: FloatArray,
     replica: IntArray,
     row_of_replica: IntArray,
-) -> FusedColumns:
+) -> KeyedTable:
     """Return what is reported of fused tracks, and once of those that are no more."""
     row = row_of_replica[np.searchsorted(replica, found.replica)]
     count = len(found.replica)
     held = {
         key: place
         for place, key in enumerate(
-            zip(before["replica"].tolist(), before["track"].tolist(), strict=True)
+            zip(before.replica.tolist(), before.track.tolist(), strict=True)
         )
     }
     keys = list(zip(found.replica.tolist(), found.number.tolist(), strict=True))
     old = np.array([held.get(key, -1) for key in keys], dtype=np.int64)
     known = old >= 0
     born_s, contributors = found.time_s.copy(), found.contributors.copy()
-    born_s[known] = before["born_s"][old[known]]
-    contributors[known] |= before["contributors"][old[known]]
+    born_s[known] = before.born_s[old[known]]
+    contributors[known] |= before.contributors[old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
     seen, by_state = linearised(Kind(False), found.state, SensorPose(own_m, axes))
     spread = product_transposed(product(by_state, found.covariance[:3, :3]), by_state)
     newest = members.take(found.newest)
     azimuth, elevation = newest.direction()
     ranged = found.ranged
-    new: FusedColumns = {
-        "replica": found.replica,
-        "row": row,
-        "track": found.number,
-        "track_status": found.status,
-        "existence": found.existence,
-        "born_s": born_s,
-        "contributors": contributors,
-        "updated_by": found.updated_by,
-        "has_range": ranged,
-        "state": np.where(ranged, found.state, np.nan),
-        "covariance": np.where(ranged, found.covariance, np.nan),
-        "azimuth_rad": np.where(ranged, seen[0], azimuth) % (2.0 * np.pi),
-        "elevation_rad": np.where(ranged, seen[1], elevation),
-        "azimuth_variance_rad2": np.where(ranged, spread[0, 0], newest.azimuth_variance_rad2),
-        "elevation_variance_rad2": np.where(ranged, spread[1, 1], newest.elevation_variance_rad2),
-        "own": np.where(ranged, own_m, newest.own_m),
-        "origin": origin_deg_m,
-        "state_s": np.where(ranged, found.time_s, newest.time_s),
-        "updated_s": found.updated_s,
-    }
-    new["age_s"] = np.maximum(new["state_s"] - born_s, 0.0)
+    state_s = np.where(ranged, found.time_s, newest.time_s)
+    new = KeyedTable(
+        replica=found.replica,
+        row=row,
+        track=found.number,
+        track_status=found.status,
+        existence=found.existence,
+        born_s=born_s,
+        contributors=contributors,
+        updated_by=found.updated_by,
+        has_range=ranged,
+        state=np.where(ranged, found.state, np.nan),
+        covariance=np.where(ranged, found.covariance, np.nan),
+        azimuth_rad=np.where(ranged, seen[0], azimuth) % (2.0 * np.pi),
+        elevation_rad=np.where(ranged, seen[1], elevation),
+        azimuth_variance_rad2=np.where(ranged, spread[0, 0], newest.azimuth_variance_rad2),
+        elevation_variance_rad2=np.where(ranged, spread[1, 1], newest.elevation_variance_rad2),
+        own=np.where(ranged, own_m, newest.own_m),
+        origin=origin_deg_m,
+        state_s=state_s,
+        age_s=np.maximum(state_s - born_s, 0.0),
+        updated_s=found.updated_s,
+    )
     alive = set(keys)
     ended = np.array([key not in alive for key in held], dtype=bool)
     if not ended.any():
         return new
-    last = taken(before, ended)
-    last["row"] = row_of_replica[np.searchsorted(replica, last["replica"])]
-    last["track_status"] = np.full(int(ended.sum()), DELETED)
-    return joined([last, new])
+    last = before.take(ended)
+    last = last.with_columns(
+        row=row_of_replica[np.searchsorted(replica, last.replica)],
+        track_status=np.full(len(last), DELETED),
+    )
+    return KeyedTable.joined([last, new])
 
 
 def state_tracks(
-    reported: FusedColumns, rows: IntArray, ticks: IntArray, sensors: tuple[str, ...]
+    reported: KeyedTable, rows: IntArray, ticks: IntArray, sensors: tuple[str, ...]
 ) -> StateTracks:
     """Return the message of what is reported at some rows."""
-    order = np.lexsort((reported["track"], reported["row"]))
-    reported = taken(reported, order)
+    order = np.lexsort((reported.track, reported.row))
+    reported = reported.take(order)
     names = [name for name in (*_WHOLE, *_NUMBERS) if name not in ("replica", "row", "born_s")]
     return StateTracks(
         tick=ticks,
-        offsets=offsets_of(np.searchsorted(rows, reported["row"]), len(rows)),
-        has_range=reported["has_range"],
-        covariance={name: reported["covariance"][place] for place, name in COVARIANCE.items()},
+        offsets=offsets_of(np.searchsorted(rows, reported.row), len(rows)),
+        has_range=reported.has_range,
+        covariance={name: reported.covariance[place] for place, name in COVARIANCE.items()},
         extras={},
         sensors=sensors,
-        **{name: reported[name] for name in names},
-        **dict(zip(_STATE, reported["state"], strict=True)),
-        **dict(zip(_OWN, reported["own"], strict=True)),
-        **dict(zip(_ORIGIN, reported["origin"], strict=True)),
+        **{name: reported.columns[name] for name in names},
+        **dict(zip(_STATE, reported.state, strict=True)),
+        **dict(zip(_OWN, reported.own, strict=True)),
+        **dict(zip(_ORIGIN, reported.origin, strict=True)),
     )

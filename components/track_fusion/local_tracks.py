@@ -1,7 +1,6 @@
 """The tracks of several trackers in one frame: what each reported last, and how that goes on."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -10,7 +9,8 @@ from components.estimation.batched import times
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.types import FloatArray, IntArray
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _OWN = ("own_north_m", "own_east_m", "own_down_m")
@@ -19,69 +19,28 @@ _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _NUMBERS = 1 << 36
 
 
-@dataclass(frozen=True, eq=False)
-class LocalTracks:
-    """Tracks of several trackers, in the frame of the replica that they belong to."""
+class LocalTracks(KeyedTable):
+    """Tracks of several trackers, in the frame of the replica that they belong to.
 
-    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
-    # track
-    replica: IntArray
-    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
-    # track
-    tracker: IntArray
-    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
-    # track
-    number: IntArray
-    system: IntArray  # (n,) of int, number of the fused track that it belongs to; 0 for none yet
-    status: IntArray
-    existence: FloatArray
-    ranged: BoolArray
-    state: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
-    covariance: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
-    azimuth_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
-    elevation_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
-    azimuth_variance_rad2: FloatArray
-    elevation_variance_rad2: FloatArray
-    own_m: FloatArray  # (3, n), where the ownship believed to be then
-    turn: FloatArray  # (3, 3, n), turns the tracker's axes into those of the frame
-    time_s: FloatArray  # (n,), the instant that all this speaks of
-    updated_s: FloatArray
-    contributors: IntArray  # (n,) of int, masks over all sensors
-    updated_by: IntArray  # (n,) of int, masks over all sensors
-
-    def __len__(self) -> int:
-        return len(self.replica)
-
-    def take(self, which: AnyArray) -> Self:
-        """Return some of them."""
-        return type(self)(**{f.name: getattr(self, f.name)[..., which] for f in fields(self)})
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return those of all parts, one after the other."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(
-            **{
-                f.name: np.concatenate([getattr(part, f.name) for part in parts], axis=-1)
-                for f in fields(cls)
-            }
-        )
+    ``tracker`` is its place among all of the scene, ``number`` its own number of the track,
+    ``system`` that of the fused track that it belongs to, 0 for none yet. ``state`` (6, n) and
+    ``covariance`` (6, 6, n) of a track without a range are 0 and the identity. ``azimuth_rad`` and
+    ``elevation_rad`` are the direction along the tracker's own axes, ``own_m`` (3, n) is where the
+    ownship believed to be, and ``turn`` (3, 3, n) turns the axes into those of the frame; all this
+    speaks of ``time_s``. ``contributors`` and ``updated_by`` are masks over all sensors.
+    """
 
     @classmethod
     def none(cls) -> Self:
         """Return no tracks."""
-        shapes: Mapping[str, tuple[int, ...]] = {
-            "state": (6, 0), "covariance": (6, 6, 0), "own_m": (3, 0), "turn": (3, 3, 0),
-        }  # fmt: skip
         whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by")
-        types = {**dict.fromkeys(whole, np.int64), "ranged": np.bool_}
-        return cls(
-            **{
-                f.name: np.empty(shapes.get(f.name, (0,)), types.get(f.name, np.float64))
-                for f in fields(cls)
-            }
-        )
+        numbers = (
+            "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
+            "elevation_variance_rad2", "time_s", "updated_s",
+        )  # fmt: skip
+        shapes = {"state": (6,), "covariance": (6, 6), "own_m": (3,), "turn": (3, 3)}
+        floats = dict.fromkeys((*numbers, *shapes), float)
+        return cls.empty({**dict.fromkeys(whole, int), **floats, "ranged": bool}, shapes)
 
     def key(self) -> IntArray:
         """Return a number for each that no other track bears, also later."""
@@ -100,7 +59,7 @@ class LocalTracks:
         order = np.argsort(known)
         mine = self.key()
         place = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
-        return replace(self, system=np.where(known[place] == mine, old.system[place], 0))
+        return self.with_columns(system=np.where(known[place] == mine, old.system[place], 0))
 
     def place(self) -> SensorPose:
         """Return from where, and along which axes, each reports its direction."""
@@ -175,34 +134,23 @@ def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class FusionRecords:
-    """What is kept of each replica beside its tracks, replicas ascending."""
+def records_of(replicas: IntArray) -> KeyedTable:
+    """Return what is kept of each run beside its tracks, before the first of them.
 
-    replica: IntArray
-    # (3, n), of its frame (latitude, longitude in deg, height in m); NaN before the first track
-    origin: FloatArray
-    next_number: IntArray
-    time_s: FloatArray  # (n,), the newest instant that any track spoke of
-    own_m: FloatArray  # (3, n), where in the frame the ownship was then
-
-    def take(self, which: Any) -> "FusionRecords":
-        """Return those of some replicas."""
-        return FusionRecords(
-            self.replica[which], self.origin[:, which], self.next_number[which],
-            self.time_s[which], self.own_m[:, which],
-        )  # fmt: skip
-
-    def kept_with(self, newer: "FusionRecords") -> "FusionRecords":
-        """Return those of all replicas, as they are in `newer` where they are among them."""
-        old = self.take(~np.isin(self.replica, newer.replica))
-        names = [field.name for field in fields(self)]
-        both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
-        whole = FusionRecords(*both)
-        return whole.take(np.argsort(whole.replica, kind="stable"))
+    ``origin`` (3, n) of its frame is latitude, longitude and height in deg and m, ``time_s`` the
+    newest instant that any track spoke of, and ``own_m`` (3, n) where the ownship was then.
+    """
+    count = len(replicas)
+    return KeyedTable(
+        replica=replicas,
+        origin=np.full((3, count), np.nan),
+        next_number=np.ones(count, dtype=np.int64),
+        time_s=np.full(count, -np.inf),
+        own_m=np.full((3, count), np.nan),
+    )
 
 
-def with_newest(records: FusionRecords, new: LocalTracks) -> FusionRecords:
+def with_newest(records: KeyedTable, new: LocalTracks) -> KeyedTable:
     """Return records that know the newest instant, and where the ownship is then."""
     time_s, own_m = records.time_s.copy(), records.own_m.copy()
     order = np.lexsort((-new.tracker, new.time_s))
@@ -210,4 +158,4 @@ def with_newest(records: FusionRecords, new: LocalTracks) -> FusionRecords:
     late = new.time_s[order] >= time_s[of]
     time_s[of[late]] = new.time_s[order][late]
     own_m[:, of[late]] = new.own_m[:, order][:, late]
-    return replace(records, time_s=time_s, own_m=own_m)
+    return records.with_columns(time_s=time_s, own_m=own_m)

@@ -7,7 +7,7 @@ trackers as independent: they share the motion's noise, which makes the true dif
 that the gate errs on the wide side.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -
     )
     system = tracks.system.copy()
     system[member[pair[share > rules.stay_factor**2]]] = 0
-    return replace(tracks, system=system)
+    return tracks.with_columns(system=system)
 
 
 def matched(
@@ -150,7 +150,7 @@ def matched(
     system = tracks.system.copy()
     next_number = next_number.copy()
     for tracker in range(trackers):
-        now = replace(tracks, system=system)
+        now = tracks.with_columns(system=system)
         mine = tracks.tracker == tracker
         alone = _alone(now)
         free = np.flatnonzero(mine & ((system == 0) | alone))
@@ -164,7 +164,7 @@ def matched(
         within = np.arange(len(new)) - (np.cumsum(counts) - counts)[place]
         system[new] = next_number[place] + within
         next_number += counts
-    return replace(tracks, system=system), next_number
+    return tracks.with_columns(system=system), next_number
 
 
 def _alone(tracks: LocalTracks) -> BoolArray:

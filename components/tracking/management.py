@@ -128,29 +128,27 @@ def initiated(
     tick, mask, ones = scans.tick[looks][of], scans.contributors[detection], np.ones(count)
     whole = ones.astype(np.int64)
     born = TrackStore(
-        {
-            "replica": replica[of],
-            "number": next_number[of] + within,
-            "tick": tick,
-            "born_tick": tick,
-            "updated_tick": tick,
-            "history": whole,
-            "looks": whole,
-            "misses": 0 * whole,
-            "status": np.full(count, TENTATIVE),
-            "score": rules.start_score * ones,
-            "contributors": mask,
-            "updated_by": mask,
-            "ranged": ranged,
-            "nis": 0.0 * ones,
-            "freedom": 0 * whole,
-            "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
-            "seen": np.full((3, len(rules.fields), count), np.nan),
-            "seen_tick": np.full((len(rules.fields), count), -1),
-            **estimate_columns(
-                Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
-            ),
-        }
+        replica=replica[of],
+        number=next_number[of] + within,
+        tick=tick,
+        born_tick=tick,
+        updated_tick=tick,
+        history=whole,
+        looks=whole,
+        misses=0 * whole,
+        status=np.full(count, TENTATIVE),
+        score=rules.start_score * ones,
+        contributors=mask,
+        updated_by=mask,
+        ranged=ranged,
+        nis=0.0 * ones,
+        freedom=0 * whole,
+        vain=np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
+        seen=np.full((3, len(rules.fields), count), np.nan),
+        seen_tick=np.full((len(rules.fields), count), -1),
+        **estimate_columns(
+            Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
+        ),
     )
     if rules.lasting is not None:
         born = born.with_columns(**now_seen(born, pose, mask))

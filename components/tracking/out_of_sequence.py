@@ -218,7 +218,7 @@ def stores_before(before: dict[int, Before], looks: list[int], replicas: list[in
             before[look].store.take(before[look].store.replica == replica)
             for look, replica in zip(looks, replicas, strict=True)
         ]
-    )
+    ).in_order()
 
 
 def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> TrackStore:
@@ -229,7 +229,7 @@ def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> Trac
         by_store.setdefault(id(before), (before, []))[1].append(number)
     parts = [store.take(~np.isin(store.replica, replicas))]
     parts += [old.take(np.isin(old.replica, mine)) for old, mine in by_store.values()]
-    return TrackStore.joined(parts)
+    return TrackStore.joined(parts).in_order()
 
 
 # Looks whose fate is worked out.

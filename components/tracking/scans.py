@@ -213,7 +213,7 @@ def when_made(
     of_look = scans.tick // span
     there = np.minimum(row, len(wake) - 1)
     ready = (row < len(wake)) & (wake.replica[there] == of_look)
-    waiting = ~ready & (wake.side_by_side | (of_look == wake.replica[-1]))
+    waiting = ~ready & (of_look >= wake.first_run)
     order = np.lexsort((scans.sensors, scans.tick, row))
     done = replace(scans, row=row).take(order[ready[order]])
     return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None

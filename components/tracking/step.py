@@ -52,7 +52,7 @@ def step(
     if not held.all():
         new, next_number = initiated(rules, batch, ~held, next_number)
         parts.append(new)
-    return TrackStore.joined(parts), next_number
+    return TrackStore.joined(parts).in_order(), next_number
 
 
 def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:

@@ -11,6 +11,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
@@ -57,10 +58,9 @@ class TrackerStub(Component):
 
     def setup(self) -> None:
         """Start with no tracks."""
-        self._targets: IntArray = np.empty(0, dtype=np.int64)
-        self._held: dict[str, Any] = {name: np.empty(0) for name in _HELD}
-        #: Whose each of them is; replicas ascending.
-        self._replicas: IntArray = np.empty(0, dtype=np.int64)
+        types: dict[str, type] = {"replica": int, "target": int, **dict.fromkeys(_HELD, float)}
+        #: What each run holds of each target.
+        self._held = KeyedTable.empty(types)
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
@@ -73,14 +73,14 @@ class TrackerStub(Component):
         if len(updated) == 0:
             return None
         replica = wake.replica[updated]
-        passed = self._set_aside(replica, wake)
-        targets = _present(self._targets, fused.target, len(fused.roster))
-        pool, held, new = self._pool(fused, np.repeat(replica, counts[updated]))
+        before = self._held.of(replica)
+        targets = _present(before.target, fused.target, len(fused.roster))
+        pool, held, new = _pool(before, fused, np.repeat(replica, counts[updated]))
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
-            first_row = begins.nonzero()[0][np.searchsorted(replica[begins], self._replicas)]
-            last[first_row, targets.searchsorted(self._targets)] = held
+            first_row = begins.nonzero()[0][np.searchsorted(replica[begins], before.replica)]
+            last[first_row, targets.searchsorted(before.target)] = held
         rows: Any = 0
         if len(updated) > 1:
             rows = np.repeat(np.arange(len(updated)), counts[updated])
@@ -90,70 +90,16 @@ class TrackerStub(Component):
         if replica[0] != replica[-1]:
             # What each row holds of replicas before its own is not its own's.
             own_from = first.copy()
-            np.minimum.at(own_from, np.searchsorted(replica, self._replicas), held)
+            np.minimum.at(own_from, np.searchsorted(replica, before.replica), held)
             own_from = np.maximum.accumulate(np.where(begins, own_from, 0))
             last[last < own_from[:, np.newaxis]] = -1
-        self._remember(last, replica, targets, pool, passed, wake)
-        return self._tracks(fused, wake.ticks[updated], targets, last, pool, first)
-
-    def _set_aside(self, replica: IntArray, wake: Wake) -> Any:
-        """Keep what is held by replicas that are updated now; return what others hold."""
-        here = np.isin(self._replicas, replica if wake.side_by_side else replica[:1])
-        if here.all():
-            return None
-        aside = self._targets[~here], self._replicas[~here], {
-            name: values[~here] for name, values in self._held.items()
-        }  # fmt: skip
-        self._targets, self._replicas = self._targets[here], self._replicas[here]
-        self._held = {name: values[here] for name, values in self._held.items()}
-        return aside if wake.side_by_side else None
-
-    def _remember(
-        self,
-        last: IntArray,
-        replica: IntArray,
-        targets: IntArray,
-        pool: dict[str, Any],
-        aside: Any,
-        wake: Wake,
-    ) -> None:
-        """Hold what each replica, or the last one if the others never come again, holds now."""
         ends = np.append(replica[1:] != replica[:-1], True).nonzero()[0]
-        if not wake.side_by_side:
-            ends = ends[-1:]
         row, column = (last[ends] >= 0).nonzero()
         entry = last[ends][row, column]
-        self._targets, self._replicas = targets[column], replica[ends][row]
-        self._held = {name: values[entry] for name, values in pool.items()}
-        if aside is None:
-            return
-        order = np.argsort(np.concatenate([self._replicas, aside[1]]), kind="stable")
-        self._targets = np.concatenate([self._targets, aside[0]])[order]
-        self._replicas = np.concatenate([self._replicas, aside[1]])[order]
-        for name, values in self._held.items():
-            self._held[name] = np.concatenate([values, aside[2][name]])[order]
-
-    def _pool(
-        self, fused: FusedDetections, replica: IntArray
-    ) -> tuple[dict[str, Any], IntArray, IntArray]:
-        """Return everything that may be held, and the places in it of what was and what is new.
-
-        What was held comes before what is new of the same replica.
-        """
-        start = len(self._targets)
-        new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD}
-        if isinstance(fused, FusedWithPose):
-            new |= fused.pose_columns()
-        count = len(replica)
-        if start == 0:
-            return new, self._targets, np.arange(count)
-        pool = {name: np.concatenate([self._held[name], new[name]]) for name in new}
-        if replica[0] == replica[-1]:
-            return pool, np.arange(start), np.arange(start, start + count)
-        order = np.argsort(np.concatenate([self._replicas, replica]), kind="stable")
-        place = np.empty(start + count, dtype=np.int64)
-        place[order] = np.arange(start + count)
-        return {name: v[order] for name, v in pool.items()}, place[:start], place[start:]
+        now = {name: values[entry] for name, values in pool.items()}
+        table = KeyedTable(replica=replica[ends][row], target=targets[column], **now)
+        self._held = self._held.after(replica, table, wake.first_run)
+        return self._tracks(fused, wake.ticks[updated], targets, last, pool, first)
 
     def _tracks(
         self,
@@ -194,6 +140,28 @@ class TrackerStub(Component):
             updated=entry >= first[row],
             **({"own_of_entries": pose} if pose else {}),
         )
+
+
+def _pool(
+    before: KeyedTable, fused: FusedDetections, replica: IntArray
+) -> tuple[dict[str, Any], IntArray, IntArray]:
+    """Return everything that may be held, and the places in it of what was and what is new.
+
+    What was held comes before what is new of the same replica.
+    """
+    new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD}
+    if isinstance(fused, FusedWithPose):
+        new |= fused.pose_columns()
+    start, count = len(before), len(replica)
+    if start == 0:
+        return new, before.replica, np.arange(count)
+    pool = {name: np.concatenate([before.columns[name], new[name]]) for name in new}
+    if replica[0] == replica[-1]:
+        return pool, np.arange(start), np.arange(start, start + count)
+    order = np.argsort(np.concatenate([before.replica, replica]), kind="stable")
+    place = np.empty(start + count, dtype=np.int64)
+    place[order] = np.arange(start + count)
+    return {name: v[order] for name, v in pool.items()}, place[:start], place[start:]
 
 
 def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:

@@ -35,7 +35,8 @@ from components.tracking.report import Reported, state_tracks
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
-from components.tracking.track_store import ReplicaRecords, TrackStore
+from components.tracking.track_store import TrackStore, records_of
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
@@ -96,7 +97,7 @@ class Tracker(Component):
         self._estimator = self.estimator()
         self._sensors: tuple[str, ...] = ()
         self._store = self._no_tracks(0)
-        self._records = ReplicaRecords.none()
+        self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
         self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
@@ -147,7 +148,7 @@ class Tracker(Component):
         ]
 
     def _no_tracks(self, sensors: int) -> TrackStore:
-        return TrackStore.empty([model.size for model in self._estimator.models], sensors)
+        return TrackStore.of_models([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what came, look by look, and report all tracks."""
@@ -167,10 +168,8 @@ class Tracker(Component):
         if len(scans) == 0:
             return None
         replica = wake.replica[scans.row]
-        records = self._records.continued_by(replica, scans.pose[:3])
-        store = self._store
-        if not wake.side_by_side:
-            store = store.take(np.isin(store.replica, records.replica))
+        records = self._records.continued(records_of(replica, scans.pose[:3]))
+        store = self._store.take(self._store.replica >= wake.first_run)
         past = self._past
         begin = 0
         before: dict[int, Before] = {}
@@ -191,7 +190,7 @@ class Tracker(Component):
         poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
         reported: list[Reported] = []
-        for works in _turns(plan.of):
+        for works in turns(plan.of):
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
                 of_late = plan.of[late]
@@ -224,11 +223,8 @@ class Tracker(Component):
                         plan.row[works[reports]],
                     )
                 )
-        if wake.side_by_side:
-            self._records, self._store = self._records.kept_with(records), store
-        else:
-            self._records = records.take(records.replica == records.replica[-1])
-            self._store = store.take(store.replica == records.replica[-1])
+        self._records = self._records.after(records.replica, records, wake.first_run)
+        self._store = store
         self._past = Past.of(
             scans, memory.get(len(records.replica) - 1), before, records.replica[-1]
         )
@@ -241,7 +237,7 @@ class Tracker(Component):
     def _remember(
         self,
         store: TrackStore,
-        records: ReplicaRecords,
+        records: KeyedTable,
         plan: Plan,
         works: IntArray,
         before: dict[int, Before],
@@ -268,16 +264,6 @@ class Tracker(Component):
         """Return whose looks came too late, and how many had to wait for their own instant."""
         late = {self.name: self._count.late()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}
-
-
-def _turns(of: IntArray) -> list[IntArray]:
-    """Return the first work of every replica, then the second ones, and so on."""
-    if len(of) == 0:
-        return []
-    counts = np.bincount(of)
-    place = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
-    order = np.argsort(place, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(place))[:-1])
 
 
 def _pose(pose: FloatArray) -> tuple[Any, Any]:

@@ -32,6 +32,7 @@ from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
 from components.traffic.steered_ownship import arrived_manoeuvres
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import ReplicaRuns, Wake
 
@@ -267,20 +268,15 @@ class FlownTogether:
         known: IntArray = self._own.count[replica]
         if self._pending:
             now, self._pending = self._due(wake)
-            while now:  # the first of every ownship, then the second ones
-                first: dict[int, tuple[int, Manoeuvre]] = {}
-                later = []
-                for one in now:
-                    if first.setdefault(one[0] // wake.span_ticks, one) is not one:
-                        later.append(one)
-                ownship = np.array(list(first), dtype=np.int64)
-                ticks = np.array([tick for tick, _ in first.values()], dtype=np.int64)
+            came = np.array([tick for tick, _ in now], dtype=np.int64)
+            for one in turns(came // wake.span_ticks):  # the first of every ownship, then the next
+                ticks, manoeuvres = came[one], [now[number][1] for number in one.tolist()]
+                ownship = ticks // wake.span_ticks
                 at_s = (ticks % wake.span_ticks) / self._ticks_per_s
-                self._own.steer(ownship, at_s, [manoeuvre for _, manoeuvre in first.values()])
+                self._own.steer(ownship, at_s, manoeuvres)
                 if self._epochs is not None:
                     self._epochs.forget(ownship)
                 known = known + _later(replica, wake.ticks, ownship, ticks)
-                now = later
         return known
 
     def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:

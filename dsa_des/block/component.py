@@ -184,10 +184,9 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others;
-    #: where a wake is a stretch of time of all of them (`Wake.side_by_side`) the next one comes
-    #: back to each. A class says so of its own code only: a subclass that does not say it again
-    #: gets an instance for each replica.
+    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others:
+    #: the next wake comes back to each but those before its `Wake.first_run`. A class says so of
+    #: its own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -204,6 +203,8 @@ class Component:
     also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
+    #: Whether what it records is reason enough for it, wired to somebody or not.
+    stands_alone: ClassVar[bool] = False
     #: How figures mark it; a neutral one by default.
     mark: ClassVar[Mark | None] = None
 
@@ -222,6 +223,14 @@ class Component:
         if isinstance(parameters, ClockedParameters):
             return parameters.clock_spec()
         return None
+
+    @classmethod
+    def class_for(cls, parameters: Any) -> "type[Component]":
+        """Return the class that fills a block with these parameters; itself by default.
+
+        A subclass with the same parameters and ports, where these decide what it can do.
+        """
+        return cls
 
     @classmethod
     def all_hooks(cls) -> dict[str, str]:

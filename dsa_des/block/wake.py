@@ -48,8 +48,8 @@ class Wake:
     span_ticks : int
         When replicas run in lock step: ticks from the start of one to the start of the next
         (`dsa_des.time.timeline`); 0 otherwise.
-    side_by_side : bool
-        Whether rows of every replica may come again; else those of one that has passed never do.
+    first_run : int
+        The first replica that runs now: rows of those before it never come again.
     """
 
     def __init__(
@@ -61,8 +61,7 @@ class Wake:
         arrived: Mapping[str, list[Arrivals]],
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
         span_ticks: int = 0,
-        *,
-        side_by_side: bool = False,
+        first_run: int = 0,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -71,7 +70,7 @@ class Wake:
         self._arrived = arrived
         self._demand = demand
         self.span_ticks = span_ticks
-        self.side_by_side = side_by_side
+        self.first_run = first_run
 
     def __len__(self) -> int:
         return len(self.ticks)

@@ -142,6 +142,9 @@ def drawing(
             {
                 "font.size": 9,
                 "axes.titlesize": 10,
+                # A tick says its value: no offset to add, no power of ten to multiply by.
+                "axes.formatter.useoffset": False,
+                "axes.formatter.limits": (-7, 9),
                 "axes.spines.top": False,
                 "axes.spines.right": False,
                 "legend.fontsize": 8,

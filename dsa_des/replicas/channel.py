@@ -1,8 +1,7 @@
 """The buffer at the receiving end of one wire, for the rows of all replicas in lock step.
 
-Rows stand in order of replica, then of arrival. Replicas that run end to end pass by one after the
-other; of replicas side by side every window takes what arrives in its stretch of time, and what
-each of them holds is remembered until the next.
+Rows stand in order of replica, then of arrival. Every window takes what arrives in its stretch of
+time, and what each replica holds is remembered until the next, or until it ends.
 """
 
 from collections import deque
@@ -110,8 +109,8 @@ class ReplicaChannel(Channel):
 
     def _due(self, arrivals: IntArray, end: int) -> slice | BoolArray:
         """Return which rows arrive before `end`."""
-        if not self._time.side_by_side:
-            return slice(0, int(np.searchsorted(arrivals, end)))
+        if end >= self._time.run_ticks:
+            return slice(None)
         due = arrivals % self._span < end
         return slice(None) if due.all() else due
 
@@ -122,11 +121,7 @@ class ReplicaChannel(Channel):
         for arrivals, message in self._waiting:
             due = self._due(arrivals, end)
             if isinstance(due, slice):
-                now, later = due, slice(len(arrivals[due]), None)
-                if len(arrivals[now]):
-                    taken.append((arrivals[now], message.take(now)))
-                if len(arrivals[later]):
-                    left.append((arrivals[later], message.take(later)))
+                taken.append((arrivals, message))
                 continue
             rows, others = np.flatnonzero(due), np.flatnonzero(~due)
             if len(rows):
@@ -147,18 +142,17 @@ class ReplicaChannel(Channel):
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds in each replica at each of `ticks`; see `Channel.sample`."""
-        if not self._time.side_by_side:
-            return self._sample_along(ticks, end)
         new = self.collect(end)
         if new is not None:
             self._passed.append(new)
             rows = last_at_or_before(new[0], ticks)
             if bool((new[0][rows] == ticks).all()):
                 # What has come at the very instant is held: what was before need not be looked up.
-                if self._of_all(new[0]):
-                    self._passed, self._last = [new], None  # nothing older is held by any replica
-                elif len(self._passed) > _MOST_PASSED:
-                    self._remember()
+                if len(self._passed) > _MOST_PASSED or end >= self._time.run_ticks:
+                    self._remember(end)
+                elif self._of_all(new[0]):
+                    self._passed = [new]  # nothing older is held by any replica
+                    self._last = self._last if self._goes_on(self._last, end) else None
                 return new[1], rows
         if self._last is not None:
             self._passed.insert(0, self._last)
@@ -168,27 +162,7 @@ class ReplicaChannel(Channel):
             return None
         arrivals, message = held
         rows = self._held_rows(arrivals, ticks)
-        self._remember()
-        return message, rows
-
-    def _sample_along(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
-        """Return what `sample` does where replicas lie end to end: those passed never come again.
-
-        So a window keeps no more of what has come than the last row of its last replica.
-        """
-        new, old = self.collect(end), self._last
-        if old is not None and old[0][-1] < ticks[0] - ticks[0] % self._span:
-            old = None
-        held = _in_order([part for part in (old, new) if part is not None])
-        self._last = None
-        if held is None:
-            return None
-        arrivals, message = held
-        rows = self._held_rows(arrivals, ticks)
-        first = int(np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span))
-        if first < len(arrivals):
-            lasts = first + _last_of_each(arrivals[first:] // self._span)
-            self._last = arrivals[lasts], message.take(lasts)
+        self._remember(end)
         return message, rows
 
     def _held_rows(self, arrivals: IntArray, ticks: IntArray) -> IntArray:
@@ -200,21 +174,28 @@ class ReplicaChannel(Channel):
 
     def _of_all(self, arrivals: IntArray) -> bool:
         """Whether there is a row of every replica that goes on, of rows in order of replica."""
-        if len(arrivals) < self._time.replicas and not self._ends.early:
+        runs = self._time.runs
+        if len(arrivals) < len(runs) and not self._ends.early:
             return False
         replica = arrivals // self._span
         if self._ends.early:
-            every = np.arange(self._time.replicas)
-            return self._ends.running(np.unique(replica)) == self._ends.running(every)
-        return 1 + int(np.count_nonzero(replica[1:] != replica[:-1])) == self._time.replicas
+            return self._ends.running(np.unique(replica)) == self._ends.running(np.array(runs))
+        return 1 + int(np.count_nonzero(replica[1:] != replica[:-1])) == len(runs)
 
-    def _remember(self) -> None:
-        """Keep of what has passed the last row of each replica."""
-        held = _in_order(([] if self._last is None else [self._last]) + self._passed)
+    def _remember(self, end: int) -> None:
+        """Keep of what has passed the last row of each replica that goes on."""
+        parts = ([] if self._last is None else [self._last]) + self._passed
+        held = _in_order([part for part in parts if self._goes_on(part, end)])
         self._passed, self._last = [], None
         if held is not None:
             lasts = _last_of_each(held[0] // self._span)
             self._last = held[0][lasts], held[1].take(lasts)
+
+    def _goes_on(self, part: tuple[IntArray, Message] | None, end: int) -> bool:
+        """Whether a part holds rows of replicas that go on after a window, rather than passed."""
+        runs = self._time.runs
+        first = runs.stop if end >= self._time.run_ticks else runs.start
+        return part is not None and bool(part[0][-1] >= first * self._span)
 
 
 def _last_of_each(replica: IntArray) -> IntArray:

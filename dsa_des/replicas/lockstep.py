@@ -21,7 +21,6 @@ from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import may_be_late, plan, unspent
 from dsa_des.running.grain import Grain, opened_loops
@@ -79,7 +78,7 @@ def lock_step(
 
 
 class Replicas(Timeline):
-    """Runs of a scene that share blocks, end to end on one timeline.
+    """Runs of a scene that share blocks, on one timeline.
 
     Parameters
     ----------
@@ -105,9 +104,7 @@ class Replicas(Timeline):
 
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Lay runs end to end, and split the blocks that cannot serve all of them."""
-        self.time = ReplicaTime.of_replicas(
-            len(self._scenes), self._run_ticks(duration_s), side_by_side=bool(self._opened)
-        )
+        self.time = ReplicaTime.of_replicas(len(self._scenes), self._run_ticks(duration_s))
         if not self.time.fits:
             raise NotInLockStep(
                 f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
@@ -123,16 +120,13 @@ class Replicas(Timeline):
                 if (runner := self._together(name, component)) is not None:
                     self.together[name] = runner
                     continue
-                self.split[name] = SplitBlock(
-                    tuple(component.outputs), make, self._finished,
-                    side_by_side=self.time.side_by_side,
-                )  # fmt: skip
+                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finished)
 
     def _shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
             return False
-        if self.time.side_by_side and not component.goes_side_by_side():
+        if self._opened and not component.goes_side_by_side():
             return False
         differing = self._differing(name)
         if isinstance(component.p, ClockedParameters):
@@ -264,19 +258,18 @@ class Replicas(Timeline):
     def windows(
         self, longest_ticks: int, lookahead_ticks: int | None, rewinder: Rewinder | None
     ) -> Windows:
-        """Return windows that hold many whole replicas, or parts of one."""
+        """Return windows that hold many whole replicas, or in loops stretches of all of them."""
         if lookahead_ticks is None:
-            return ReplicaWindows(self.time, longest_ticks)
+            return EqualWindows(self.time, longest_ticks)
         scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
         if self.time.run_ticks > lookahead_ticks * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
             said = f"{lookahead_ticks / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
-        return EqualWindows(self.time.run_ticks, min(longest_ticks, lookahead_ticks))
+        of_all = max(1, longest_ticks // self.runs)  # each of them has as many scans
+        return EqualWindows(self.time, min(of_all, lookahead_ticks), self.runs)
 
     def grain(self, window: int | None) -> Grain:
-        """Return the grain: in loops, all blocks run in windows that nothing comes back in."""
-        if not self._opened:
-            return super().grain(window)
+        """Return the grain: all run in windows, in loops in those that nothing comes back in."""
         return Grain(set(self.scene.blocks), False, self._opened, {})
 
     def channel(self, wire: Wire, delay_ticks: int) -> Channel:
@@ -290,10 +283,6 @@ class Replicas(Timeline):
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
         """Return the window: clocks are asked for one stretch only, and know it the second time."""
         return window.start, window.end
-
-    def final_before(self, tick: int) -> int:
-        """Return 0 where replicas go side by side: rows are put in order at the end."""
-        return 0 if self.time.side_by_side else tick
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Let instances report; a shared block has seen the rows of all and speaks for none."""

@@ -24,9 +24,7 @@ class NotInLockStep(RunRefused):
 
 
 class SplitBlock:
-    """One instance per replica, made when its replica begins and let go when it has ended.
-
-    Of replicas side by side all have their instances to the end.
+    """One instance per replica, made when its rows come and let go when the next replicas run.
 
     Each instance sees only its own replica's rows, with its own ticks and scan numbers, as in a
     run of its own. It is no block and has no face of its own: only `run` is called on it.
@@ -39,8 +37,6 @@ class SplitBlock:
         Makes the instance of a replica.
     finished : callable
         Called with a replica's number and its instance when its last window is over.
-    side_by_side : bool
-        Whether windows come back to a replica when another one's have begun.
     """
 
     def __init__(
@@ -48,12 +44,9 @@ class SplitBlock:
         outputs: Sequence[str],
         make: Callable[[int], Component],
         finished: Callable[[int, Component], None],
-        *,
-        side_by_side: bool = False,
     ) -> None:
         self._outputs = tuple(outputs)
         self.make, self._finished = make, finished
-        self._side_by_side = side_by_side
         self._instances: dict[int, Component] = {}
         self._made: set[int] = set()
         #: By replica and port, what has come for an instance that has not run since.
@@ -64,13 +57,11 @@ class SplitBlock:
         replica = wake.replica
         cuts = np.flatnonzero(replica[1:] != replica[:-1]) + 1
         sent: dict[str, list[Message]] = {}
-        if self._side_by_side:
-            self._keep_waiting(wake, replica)
+        self._let_go(wake.first_run)
+        self._keep_waiting(wake, replica)
         for first, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(wake)], strict=True):
             number = int(replica[first])
             if number not in self._instances:
-                if not self._side_by_side:
-                    self._let_go(number)
                 self._instances[number] = self.make(number)
                 self._made.add(number)
             part = _part(wake, slice(first, end), number)

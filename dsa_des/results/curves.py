@@ -1,6 +1,7 @@
 """Curves of a study's results: along an axis, over bearing, of a series, spread over the runs."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,6 +24,8 @@ _MOST_LINES = 12
 _TITLE = 80
 #: More texts than this below an axis cannot be told apart.
 _MOST_NAMES = 60
+#: With room for the legend beside the axes, and between series at one value.
+_WIDE_IN, _APART_PT = 9.0, 5.0
 _FEWEST_BINS, _MOST_BINS = 5, 40
 
 
@@ -54,31 +57,28 @@ def draw_axis(
     values = list(dict.fromkeys(line.at[place] for line in lines))
     where, numeric = _positions(values, category)
     series = list(_series_along(axes, lines, axis, by).items())
-    with drawing(9.6 if len(series) > 4 else 7.5, 6.4 if shown else 4.2, target) as figure:
+    with drawing(_WIDE_IN, 6.4 if shown else 4.2, target) as figure:
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
-            shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
-            x = np.array([where[line.at[place]] for line in some]) + shift
+            x = np.array([where[line.at[place]] for line in some])
             known = any(not np.isnan(line.estimate.half_width) for line in some)
             seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
-            _points(top, x, some, colour, marker, seen, join=numeric)
+            drawn = _points(top, x, some, colour, marker, seen, join=numeric)
             expected = [line.expected for line in some]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
                 # One entry for all: each is dotted in the colour of its series.
                 note = "analytic" if number == 0 else None
-                top.plot(
+                drawn += top.plot(
                     x, y, color=colour, ls=":" if numeric else "", marker="_", ms=9, label=note,
                     zorder=1,
                 )  # fmt: skip
+            _dodge(top, drawn, number, len(series))
         top.set_ylabel(readable(metric))
         top.set_title(figure_text(title, _TITLE), loc="left")
-        if len(series) > 1 or top.get_legend_handles_labels()[1][1:]:
-            _beside_or_inside(top)
-        else:
-            top.legend()
+        _beside(top)
         if shown:
             _differences(grid[1], shown, where, axes, axis, confidence)
         bottom = grid[-1]
@@ -124,26 +124,38 @@ def _apart(values: list[float]) -> list[float]:
     return sorted(kept)
 
 
-def _beside_or_inside(axes: Any) -> None:
-    """Put the legend inside where it is short, and beside the axes where it would cover them."""
-    names = axes.get_legend_handles_labels()[1]
-    if len(names) > 4:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
-    else:
-        axes.legend()
+def _beside(axes: Any) -> None:
+    """Put the legend beside the axes, where it covers nothing, in lines that leave them room."""
+    handles, names = axes.get_legend_handles_labels()
+    if names:
+        names = [textwrap.fill(name, 26) for name in names]
+        axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def _dodge(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
+    """Move a series to the side, so that the intervals of several stand beside each other."""
+    from matplotlib.transforms import ScaledTranslation
+
+    apart_pt = min(_APART_PT, 30.0 / of)
+    right_in = (number - (min(of, _MOST_LINES) - 1) / 2) * apart_pt / 72
+    # After it was drawn: the limits of the axes are those of the data where they are.
+    moved = axes.transData + ScaledTranslation(right_in, 0.0, axes.figure.dpi_scale_trans)
+    for artist in drawn:
+        artist.set_transform(moved)
 
 
 def _points(
     axes: Any, x: Any, lines: list[Line], colour: str, marker: str, series_label: str, *, join: bool
-) -> None:
+) -> list[Any]:
     y = np.array([line.estimate.value for line in lines])
     low = np.array([line.estimate.low for line in lines])
     high = np.array([line.estimate.high for line in lines])
     bars = np.nan_to_num(np.abs([y - low, high - y]))
-    axes.errorbar(
+    drawn = axes.errorbar(
         x, y, yerr=bars, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
         ls="-" if join else "none", label=series_label or None, zorder=2,
     )  # fmt: skip
+    return list(drawn.get_children())
 
 
 def _differences(
@@ -167,8 +179,9 @@ def _differences(
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
         series_label = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
-        axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
+        drawn = axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
                       ls="none", label=series_label or None)  # fmt: skip
+        _dodge(axes, drawn.get_children(), number, len(groups))
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
@@ -177,9 +190,9 @@ def _differences(
                 axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
     unit = unit_of(shown[0].result.name)
     axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
-    axes.set_title(
-        f"Paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
-    )
+    known = any(np.isfinite(item.difference.paired.half_width) for item in shown)
+    intervals = f", {100 * confidence:g} % intervals" if known else ""
+    axes.set_title(f"Paired differences on the same units{intervals}", loc="left")
     axes.margins(x=0.12, y=0.2)
 
 
@@ -233,7 +246,7 @@ def draw_histogram(
         for series_label, values in series[:_MOST_LINES]
     ]
     every = np.concatenate([values for _, values, _ in known] or [np.empty(0)])
-    with drawing(9.0 if len(known) > 4 else 7.5, 4.2, path) as figure:
+    with drawing(_WIDE_IN, 4.2, path) as figure:
         axes = figure.add_subplot()
         edges = _edges(every, max((len(values) for _, values, _ in known), default=0))
         for number, (series_label, values, runs) in enumerate(known):
@@ -257,7 +270,7 @@ def draw_cdf(
     Runs without a value count as well: where some have none, a curve ends below 1.
     """
     shown = series[:_MOST_LINES]
-    with drawing(9.0 if len(shown) > 4 else 7.5, 4.2, path) as figure:
+    with drawing(_WIDE_IN, 4.2, path) as figure:
         axes = figure.add_subplot()
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
@@ -301,7 +314,7 @@ def _edges(values: FloatArray, most: int) -> FloatArray:
 def _finish(figure: Any, axes: Any, metric: str, title: str) -> None:
     axes.set_xlabel(readable(metric))
     axes.set_title(figure_text(title, _TITLE), loc="left")
-    _beside_or_inside(axes)
+    _beside(axes)
     tight(figure)
 
 
@@ -322,7 +335,7 @@ def draw_series(
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
     """
     name, _, along = metric.partition(".")
-    with drawing(9.6 if len(series) > 4 else 7.5, 4.2, path) as figure:
+    with drawing(_WIDE_IN, 4.2, path) as figure:
         axes = figure.add_subplot()
         if freedom is not None and series:
             _bounds(axes, series[0][1], series[0][2], freedom, confidence)
@@ -333,16 +346,15 @@ def draw_series(
                 for part in ("value", "low", "high")
             )
             label = series_label or f"mean of the runs, {100 * confidence:g} % interval"
-            axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label, zorder=2)
-            axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2)
+            drawn = axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label,
+                              zorder=2)  # fmt: skip
+            drawn.append(axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2))
+            _dodge(axes, drawn, place, len(series))
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel(axis_label(along) if along else "")
         axes.set_ylabel(readable(name))
         axes.set_title(figure_text(title, _TITLE), loc="left")
-        if len(series) > 4:
-            _beside_or_inside(axes)
-        else:  # from 0 on there is room below
-            axes.legend(loc="lower left")
+        _beside(axes)
         tight(figure)
 
 

@@ -70,7 +70,12 @@ def _split(name: str) -> tuple[str, str]:
     return (rest, _UNITS[ending]) if rest and ending in _UNITS else (name, "")
 
 
+#: An item of a list in a key, as ``wires[4]``.
+_ITEM = re.compile(r"(\w+?)s?\[(\d+)\]")
+
+
 def _spaced(name: str) -> str:
+    name = _ITEM.sub(lambda found: f"{found[1]} {int(found[2]) + 1}", name)
     words = name.replace("_", " ").split(" ")
     return " ".join(word.upper() if _short(word) else word for word in words)
 

@@ -23,7 +23,7 @@ from dsa_des.results.models import (
     read_explained,
     versions,
 )
-from dsa_des.results.printing import RATIO_HEADS, ratio_cells, rounded
+from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, rounded
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO, run_command
 from dsa_des.results.sealed_files import read_regular
 from dsa_des.results.summary import Answer, Line, one_sided
@@ -239,7 +239,7 @@ def study_report(folder: StudyFolder) -> bytes:
         heads=[*map(axis_label, tables.rows.axes), "result", "value", "interval", "units",
                "no value", "", "cut off", "expected"],
         shown=[_line(line) for line in tables.shown_lines()[:_MOST_SHOWN]],
-        lines=[_line(line) for line in tables.lines[:_MOST_ROWS]],
+        lines=[_line(line, exact=True) for line in tables.lines[:_MOST_ROWS]],
         few=any(line.estimate.few for line in tables.lines),
         level=f"{100 * record.confidence:g} %", methods=_methods(tables),
         axis_heads=list(map(axis_label, tables.rows.axes)),
@@ -304,12 +304,15 @@ def _verbatim(lines: Iterable[str]) -> Markup:
     return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
 
 
-def _line(line: Line) -> tuple[Any, ...]:
-    """Return one line of the summary as the cells of a row."""
+def _line(line: Line, exact: bool = False) -> tuple[Any, ...]:
+    """Return one line of the summary as the cells of a row: rounded, or with the table's name."""
+    e = line.estimate
+    said = (readable(line.result.name), *rounded(e))
+    if exact:
+        said = (line.result.name, short(e.value), interval_text(e))
     return (
-        *map(_value, line.at), readable(line.result.name), *rounded(line.estimate),
-        line.estimate.count, line.missing, "few" if line.estimate.few else "", cut_off_text(line),
-        "" if line.expected is None else short(line.expected),
+        *map(_value, line.at), *said, e.count, line.missing, "few" if e.few else "",
+        cut_off_text(line), "" if line.expected is None else short(line.expected),
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import ReplicaTime
 
 
 @dataclass(frozen=True)
@@ -225,8 +226,8 @@ class Inputs:
     wires : mapping
         The wires into each.
     ticks_per_s : int
-    span_ticks, side_by_side
-        As for `Wake`.
+    time : ReplicaTime, optional
+        How runs lie in time, where there are many.
     """
 
     def __init__(
@@ -234,15 +235,13 @@ class Inputs:
         declared: Mapping[str, Input],
         wires: Mapping[str, Sequence[WireEnd]],
         ticks_per_s: int,
-        span_ticks: int = 0,
-        *,
-        side_by_side: bool = False,
+        time: ReplicaTime | None = None,
     ) -> None:
         every = [(port, wire) for port in declared for wire in wires.get(port, ())]
         self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].held]
         self._queued = [(p, wire) for p, wire in every if not declared[p].held]
-        self._ticks_per_s, self._span_ticks = ticks_per_s, span_ticks
-        self._side_by_side = side_by_side
+        self._ticks_per_s = ticks_per_s
+        self._time = ReplicaTime(1, 0) if time is None else time
 
     def seen(
         self,
@@ -287,10 +286,8 @@ class Inputs:
             if new is not None:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         asked = None if demand is None else partial(demand, ticks)
-        return Wake(
-            ticks, scans, self._ticks_per_s, held, arrived, asked, self._span_ticks,
-            side_by_side=self._side_by_side,
-        )  # fmt: skip
+        span, run = self._time.span_ticks, self._time.runs.start
+        return Wake(ticks, scans, self._ticks_per_s, held, arrived, asked, span, run)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

@@ -14,6 +14,7 @@ from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
 from dsa_des.time.run_ends import RunEnds
+from dsa_des.time.timeline import ReplicaTime
 
 
 class WakeUp(simpy.Event):
@@ -51,14 +52,7 @@ class RunState(Protocol):
     recorder: Recorder | None
     window: Window
     ends: RunEnds
-
-    @property
-    def span_ticks(self) -> int:
-        """Ticks from one replica's start to the next; 0 where one runs by itself."""
-
-    @property
-    def side_by_side(self) -> bool:
-        """Whether windows are stretches of time of all replicas."""
+    time: ReplicaTime
 
     def stretch(self, ticks: IntArray) -> tuple[int, int]:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""

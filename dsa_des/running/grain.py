@@ -140,10 +140,12 @@ def _without_windows(scene: Scene) -> dict[str, str]:
 
 def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
     """Return the blocks that send over the wires that are shorter than scans are apart."""
+    stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
     return {
-        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound"
+        edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound: "
+        f"{', '.join(stuck)}"
         for edge in sorted(opened)
         if shortest_s(scene, edge) * per_s < 1
     }
@@ -238,9 +240,7 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
     per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
-    if time.side_by_side and window is None:  # each of them makes these scans
-        per_tick *= time.replicas
-    return max(1, int(scans / per_tick)) if per_tick else time.end_tick
+    return max(1, int(scans / per_tick)) if per_tick else time.run_ticks
 
 
 def _clocks(nodes: Iterable[Node]) -> list[ScanClock]:

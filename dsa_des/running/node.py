@@ -42,11 +42,8 @@ class Demand:
         if not self.lead_ticks:
             return self.clock.between(start, end)[1]
         # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.time.end_tick)
+        last = min(end + self.lead_ticks, self.time.run_ticks)
         _, ticks = self.clock.between(start + self.lead_ticks, last)
-        if self.time.span_ticks and not self.time.side_by_side:
-            # Rows from before a replica's start do not exist.
-            ticks = ticks[ticks % self.time.span_ticks >= self.lead_ticks]
         return ticks - self.lead_ticks
 
 
@@ -95,7 +92,6 @@ class Node:
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
-        self._bell = Bell(self.simulation.env)
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
@@ -104,6 +100,7 @@ class Node:
     def start(self) -> None:
         """Start the block's SimPy process."""
         env = self.simulation.env
+        self._bell = Bell(env)
         own = self.component.process
         env.process(self._loop() if own is None else self._own_process(own))
 
@@ -192,7 +189,7 @@ class Node:
 
     def _run_at(self, tick: int) -> None:
         ends = self.simulation.ends
-        if ends.early and ends.passed(tick, tick + 1):
+        if ends.early and ends.passed(tick):
             return
         if self.processor is not None and self.processor.refuses(self.name):
             return
@@ -235,10 +232,7 @@ class Node:
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
-        return Inputs(
-            self.component.inputs, self.channels, run.ticks_per_s, run.span_ticks,
-            side_by_side=run.side_by_side,
-        )  # fmt: skip
+        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
 
     def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
         wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for)

@@ -145,7 +145,7 @@ class Simulation:
         #: When runs end, as far as that is known.
         self.ends = self.timeline.ends
         self._check_ends()
-        processors = start_processors(scene, grain, self.time.end_tick, self.env, self._record)
+        processors = start_processors(scene, grain, self.end_tick, self.env, self._record)
         self.nodes = build_nodes(
             self, self.timeline, self.components, grain, processors, shuffle_ties
         )
@@ -169,19 +169,9 @@ class Simulation:
         return timing_plan(self.scene, everything=self._everything)
 
     @property
-    def span_ticks(self) -> int:
-        """Ticks from one replica's start to the next; 0 for a single run."""
-        return self.time.span_ticks
-
-    @property
-    def side_by_side(self) -> bool:
-        """Whether windows are stretches of time of all replicas."""
-        return self.time.side_by_side
-
-    @property
     def end_tick(self) -> int:
         """First tick that is no longer simulated: runs cover [0, T)."""
-        return self.time.end_tick
+        return self.time.run_ticks
 
     def run(self, progress: Callable[[float], None] | None = None) -> Outcome:
         """Run the scene to its end.
@@ -203,11 +193,13 @@ class Simulation:
         self._check_ready()
         started = time.process_time()
         self._open_recorder()
-        for node in self.nodes.values():
-            node.start()
+        runs = range(0)
         while (window := self.windows.next()) is not None:
-            if self.ends.passed(window.start, window.end):
-                if self.ends.passed(window.start, self.end_tick):
+            if self.time.runs != runs:
+                runs = self.time.runs
+                self._start(runs)
+            if self.ends.passed(window.start):
+                if runs.stop == self.time.replicas:
                     break
                 self.windows.heard(window, None)  # nothing is left to run in it
                 continue
@@ -218,7 +210,7 @@ class Simulation:
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self.recorder.advance(self.timeline.final_before(final))
+                self.recorder.advance(self.time.final_before(runs, final))
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
@@ -233,6 +225,13 @@ class Simulation:
             sorted(name for name, node in self.nodes.items() if node.windowed),
             self.timeline.finish(self.components),
         )
+
+    def _start(self, runs: range) -> None:
+        """Start the processes of all blocks for runs; time begins again, and SimPy's never does."""
+        if runs.start > 0:
+            self.env = simpy.Environment(initial_time=0)
+        for node in self.nodes.values():
+            node.start()
 
     def stretch(self, ticks: IntArray) -> tuple[int, int]:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""
@@ -273,7 +272,7 @@ class Simulation:
     def _open_recorder(self) -> None:
         if self.recorder is not None:
             self.recorder.open(
-                self.recorded_messages(), self.ticks_per_s, self.span_ticks, self.ends
+                self.recorded_messages(), self.ticks_per_s, self.time.span_ticks, self.ends
             )
 
     def _record(self, block: str, message: Message) -> None:

@@ -105,10 +105,6 @@ class Timeline:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""
         return int(ticks[0]), int(ticks[-1]) + 1
 
-    def final_before(self, tick: int) -> int:
-        """Return before which tick rows are final when windows have come to a tick."""
-        return tick
-
     def runner(self, component: Component) -> Any:
         """Return what handles the wakes of a block: itself, or what stands in for it."""
         return component
@@ -127,10 +123,10 @@ class Timeline:
             If windows may be undone.
         """
         if rewinder is not None:
-            return RewindingWindows(self.time.end_tick, longest_ticks, rewinder)
+            return RewindingWindows(self.time, longest_ticks, rewinder)
         if lookahead_ticks is not None:
-            return SureWindows(self.time.end_tick, longest_ticks, lookahead_ticks)
-        return EqualWindows(self.time.end_tick, longest_ticks)
+            return SureWindows(self.time, longest_ticks, lookahead_ticks)
+        return EqualWindows(self.time, longest_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""

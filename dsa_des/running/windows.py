@@ -25,6 +25,7 @@ from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
 from dsa_des.time.run_ends import RunEnds
+from dsa_des.time.timeline import ReplicaTime
 
 
 class Window(NamedTuple):
@@ -89,22 +90,32 @@ class Windows(Protocol):
 
 
 class EqualWindows:
-    """Windows of one length from the start of a run to its end.
+    """Windows of one length from the start of some runs to their end, then of the next runs.
 
     Parameters
     ----------
-    end_tick : int
-        Where the last one ends.
+    time : ReplicaTime
+        Knows which runs have their time.
     longest_ticks : int
+    together : int, optional
+        How many runs go through windows together; by default as many whole ones as one may hold.
     """
 
-    def __init__(self, end_tick: int, longest_ticks: int) -> None:
-        self.end_tick, self.longest_ticks = end_tick, longest_ticks
+    def __init__(self, time: ReplicaTime, longest_ticks: int, together: int | None = None) -> None:
+        self.time, self.end_tick, self.longest_ticks = time, time.run_ticks, longest_ticks
+        self._together = together
+        self._begin(0)
+
+    def _begin(self, first: int) -> None:
+        together = self._together or max(1, self.longest_ticks // self.end_tick)
+        self.time.runs = range(first, min(first + together, self.time.replicas))
         self.start = 0
 
     def limit(self, longest_ticks: int) -> None:
         """Let no window be longer than this."""
         self.longest_ticks = min(self.longest_ticks, max(1, longest_ticks))
+        if self.start == 0:
+            self._begin(self.time.runs.start)
 
     def end_after(self, length_ticks: int) -> int:
         """Return where a window of this length from `start` on ends."""
@@ -119,6 +130,8 @@ class EqualWindows:
     def heard(self, window: Window, failure: Failure | None) -> int | None:
         """Go on where a window ended."""
         self.start = window.end
+        if self.start >= self.end_tick and self.time.runs.stop < self.time.replicas:
+            self._begin(self.time.runs.stop)
         return window.end
 
 
@@ -137,14 +150,14 @@ class SureWindows(EqualWindows):
 
     Parameters
     ----------
-    end_tick, longest_ticks
+    time, longest_ticks
         As for `EqualWindows`.
     lookahead_ticks : int
         The shortest delay over which something comes back.
     """
 
-    def __init__(self, end_tick: int, longest_ticks: int, lookahead_ticks: int) -> None:
-        super().__init__(end_tick, longest_ticks)
+    def __init__(self, time: ReplicaTime, longest_ticks: int, lookahead_ticks: int) -> None:
+        super().__init__(time, longest_ticks)
         self._lookahead = lookahead_ticks
         self._ahead = 0  # up to when blocks before the loops have run
 
@@ -228,13 +241,13 @@ class RewindingWindows(EqualWindows):
 
     Parameters
     ----------
-    end_tick, longest_ticks
+    time, longest_ticks
         As for `EqualWindows`.
     rewinder : Rewinder
     """
 
-    def __init__(self, end_tick: int, longest_ticks: int, rewinder: Rewinder) -> None:
-        super().__init__(end_tick, longest_ticks)
+    def __init__(self, time: ReplicaTime, longest_ticks: int, rewinder: Rewinder) -> None:
+        super().__init__(time, longest_ticks)
         self._rewinder = rewinder
         self._length = 0
         self._least = rewinder.sure_ticks

@@ -302,6 +302,7 @@ def read_blocks(
         try:
             with foreign_code(ValidationError):
                 parameters = cls.Parameters.model_validate(given)
+                cls = classes[name] = cls.class_for(parameters)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
             problems += explain(scene_file, key, str(type_name), cls.Parameters, error)

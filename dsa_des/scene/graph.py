@@ -110,7 +110,7 @@ def _check_reach(
         problems.append(scene.problem(("blocks", name), message))
     if len(graph) > 1:
         for name in sources:
-            if graph.out_degree(name) == 0:
+            if graph.out_degree(name) == 0 and not classes[name].stands_alone:
                 message = "this source is wired to nothing; wire it or remove it"
                 problems.append(scene.problem(("blocks", name), message))
 

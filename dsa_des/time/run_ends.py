@@ -47,16 +47,10 @@ class RunEnds:
         """Return how many of some replicas are not known to end early."""
         return int(np.count_nonzero(self.ticks[replicas] == self._time.run_ticks))
 
-    def passed(self, start: int, end: int) -> bool:
-        """Return whether all runs that a window from `start` to `end` holds are over before it."""
-        if not self.early:
-            return False
-        span = self._time.span_ticks
-        if self._time.side_by_side or not span:
-            return bool((self.ticks <= start).all())
-        first, last = start // span, -(-end // span)
-        begin = np.arange(first, last) * span
-        return bool((self.ticks[first:last] <= start - begin).all())
+    def passed(self, tick: int) -> bool:
+        """Return whether all runs whose time it is are over before a tick of theirs."""
+        runs = self._time.runs
+        return self.early and bool((self.ticks[runs.start : runs.stop] <= tick).all())
 
     def cut(self, end: int) -> int:
         """Return the end of a window, or that of a run by itself if it comes first."""

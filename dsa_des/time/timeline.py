@@ -1,15 +1,14 @@
-"""One timeline for many replicas, laid end to end or side by side.
+"""One timeline for many replicas, laid end to end.
 
 Replicas of a scene that run in lock step share one run: replica r occupies the ticks from r times
 the span. Rows of many replicas are then rows of one long run, in order, and every array expression
 over rows is one over replicas and rows. Scan numbers carry the replica in their high bits, so that
 a draw is still a function of its own replica's seed and scan.
 
-Replicas that run *end to end* go along that line, some whole replicas at a time. In a feedback loop
-they run *side by side*: a window is a stretch of time of all of them at once, and it holds that
-stretch's rows of the first replica, then those of the second, and so on. Ticks of rows are those of
-the line in both cases; side by side, those of windows, and those that clocks are asked for, are
-within the replicas.
+Some of them run at a time, side by side, and when these have ended the next. A window is a stretch
+of time of all that run: it holds that stretch's rows of the first of them, then those of the
+second, and so on. Ticks of rows are those of the line; those of windows, and those that clocks are
+asked for, are within the replicas.
 """
 
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from dsa_des.time.clock import MAX_TICK
 _SCAN_BITS = 40
 
 
-@dataclass(frozen=True)
+@dataclass
 class ReplicaTime:
     """How replicas lie on their common timeline; one run by itself is one replica.
 
@@ -33,28 +32,32 @@ class ReplicaTime:
         Length of each run: it covers [0, run_ticks) of its own ticks.
     span_ticks : int
         Ticks from one replica's start to the next; 0 for a run by itself.
-    side_by_side : bool
-        Whether a window is a stretch of time of all replicas, not of the line they lie on.
+
+    Attributes
+    ----------
+    runs : range
+        The replicas that run now; all before them have ended.
     """
 
     replicas: int
     run_ticks: int
     span_ticks: int = 0
-    side_by_side: bool = False
+
+    def __post_init__(self) -> None:
+        self.runs = range(self.replicas)
 
     @classmethod
-    def of_replicas(
-        cls, replicas: int, run_ticks: int, *, side_by_side: bool = False
-    ) -> "ReplicaTime":
+    def of_replicas(cls, replicas: int, run_ticks: int) -> "ReplicaTime":
         """Return replicas so far apart that nothing of one run reaches the other's."""
-        return cls(replicas, run_ticks, 1 << (2 * run_ticks).bit_length(), side_by_side)
+        return cls(replicas, run_ticks, 1 << (2 * run_ticks).bit_length())
 
-    @property
-    def end_tick(self) -> int:
-        """First tick that no window reaches."""
-        if self.side_by_side:
-            return self.run_ticks
-        return (self.replicas - 1) * self.span_ticks + self.run_ticks
+    def final_before(self, runs: range, tick: int) -> int:
+        """Return the instant of the line before which no row comes, when runs are at a tick."""
+        if not self.span_ticks:
+            return tick
+        if tick >= self.run_ticks:
+            return runs.stop * self.span_ticks
+        return runs.start * self.span_ticks + (tick if len(runs) == 1 else 0)
 
     @property
     def fits(self) -> bool:

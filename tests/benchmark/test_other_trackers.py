@@ -8,7 +8,7 @@ from components.benchmark.track_updates import (
     _looks,
     _started,
     by_stone_soup,
-    heard,
+    listening,
     plain_looks,
     plainly,
     track_plainly,
@@ -17,7 +17,7 @@ from components.messages.state_tracks import COVARIANCE
 
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():
-    block = heard(1, 4)
+    block = listening(1, 4)
     scans, places = _looks(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     assert sorted({look.measured.shape[1] for look in looks}) == [2, 3] and len(looks) == LOOKS

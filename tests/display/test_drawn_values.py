@@ -209,8 +209,8 @@ def test_flights_on_the_plan_and_the_arrows_at_their_ends(drawn):
             assert (wing - tip) @ right == pytest.approx(0.5 * side * size, rel=2e-2)
     (starts,) = [one for one in plan.lines if to_hex(one.get_markeredgecolor()) == "#333333"]
     assert starts.get_xydata() == pytest.approx(np.array([s[0] for s in flown.get_segments()]))
-    assert plan.get_xlabel() == "east of the ownship's start [km]"
-    assert plan.get_ylabel() == "north of the ownship's start [km]"
+    assert plan.get_xlabel() == "east of the ownship's start (km)"
+    assert plan.get_ylabel() == "north of the ownship's start (km)"
     (x, y), box = (plan.get_xlim(), plan.get_ylim()), plan.get_position()
     inches = drawn.figure["plan"].get_size_inches()
     assert np.ptp(x) / (box.width * inches[0]) == pytest.approx(
@@ -261,14 +261,17 @@ def test_altitudes_and_ranges_over_time(drawn):
     assert low == pytest.approx(2275.0 - 650.0 * 0.58, abs=3)
     assert high == pytest.approx(2275.0 + 650.0 * 0.58, abs=3)
     assert heights.get_xlim() == below.get_xlim() == (0.0, 24.0)
-    assert heights.get_ylabel() == "altitude [m]"
+    assert heights.get_ylabel() == "altitude (m)"
+    assert sorted(one.get_text() for one in heights.texts) == ["one", "ownship", "two"]
+    for one in below.texts:  # a name stands at the end of its own line
+        assert one.xy[1] * 1e3 == pytest.approx(drawn.apart_m(one.get_text(), one.xy[0]), abs=3)
     farthest = 0.0
     for line, name in zip(collections(below)[0].get_segments(), ("one", "two"), strict=True):
         assert line[:, 1] * 1e3 == pytest.approx(drawn.apart_m(name, line[:, 0]), abs=3)
         farthest = max(farthest, line[:, 1].max())
     top = 1.6 * max(drawn.seen(name)["true_range_m"].max() for name in CLOCKS) / 1e3
     assert below.get_ylim() == pytest.approx((0.0, 1.05 * min(farthest, top)))
-    assert below.get_ylabel() == "true slant range [km]"
+    assert below.get_ylabel() == "true slant range (km)"
 
 
 def test_closest_approaches_and_names(drawn):
@@ -378,7 +381,7 @@ def test_tracks_and_their_ellipses(drawn):
             assert abs(turn[-1] - turn[0]) == pytest.approx(2 * math.pi)
     assert place == len(edges)
     assert plan.get_title(loc="left").startswith(f"{len(numbers)} confirmed tracks near targets, 0")
-    assert plan.get_xlabel() == "east of the origin [km]" and plan.get_ylabel()[:5] == "north"
+    assert plan.get_xlabel() == "east of the origin (km)" and plan.get_ylabel()[:5] == "north"
 
 
 def test_true_flights_behind_the_tracks(drawn):

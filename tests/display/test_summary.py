@@ -9,7 +9,13 @@ import pymap3d
 import pytest
 
 import dsa_des
-from components.display.summary import FusedSummary, ManoeuvreSummary, SensorSummary, TrackSummary
+from components.display.summary import (
+    AlertSummary,
+    FusedSummary,
+    ManoeuvreSummary,
+    SensorSummary,
+    TrackSummary,
+)
 from components.display.terminal import outcome_lines, unseen_lines
 from components.messages.state_tracks import STATUSES
 from dsa_des.block.message import Text
@@ -216,7 +222,10 @@ def test_who_never_comes_near_a_target_is_false():
         "has_range": np.array([row[2] for row in rows]),
         "state_s": np.array([row[3] for row in rows]),
         "north_m": np.array([row[4] for row in rows]),
-        **{name: np.zeros(len(rows)) for name in ("east_m", "down_m", *ORIGIN)},
+        "time_s": np.array([row[3] + 0.5 for row in rows]),
+        **{name: np.zeros(len(rows)) for name in ("east_m", "down_m", "own_down_m", *ORIGIN)},
+        "own_north_m": np.full(len(rows), 3.0),
+        "own_east_m": np.full(len(rows), 4.0),
     }
     for pieces in (1, len(rows)):
         summary = TrackSummary(["t", "u"], lambda origin: Still())
@@ -227,25 +236,102 @@ def test_who_never_comes_near_a_target_is_false():
             }
             summary.update("state_tracks", some)
         assert summary.result()["tracks"] == {
-            "t": {"confirmed": 4, "false": 1, "position_error_m": pytest.approx(7.505553)},
-            "u": {"confirmed": 0, "false": None, "position_error_m": None},
+            "t": {
+                "confirmed": 4,
+                "false": 1,
+                "position_error_m": pytest.approx(7.505553),
+                # Track 2, 985 m north and 4 m west of the ownship; track 4 has no range.
+                "first_confirmed": {"time_s": 1.5, "range_m": pytest.approx(985.008122)},
+                "targets": {
+                    "a": {"time_s": 2.5, "range_m": 4.0},
+                    "b": {"time_s": 1.5, "range_m": pytest.approx(985.008122)},
+                },
+            },
+            "u": {
+                "confirmed": 0,
+                "false": None,
+                "position_error_m": None,
+                "first_confirmed": None,
+                "targets": {},
+            },
         }
+
+
+def test_a_track_of_directions_alone_is_confirmed_at_no_range():
+    summary = TrackSummary(["t"], lambda origin: Still())
+    blank = {name: np.full(1, np.nan) for name in ("north_m", "east_m", "down_m")}
+    summary.update("state_tracks", {
+        "block": text(["t"], ("t",)), "track": np.array([7]), "has_range": np.array([False]),
+        "track_status": text(["confirmed"], STATUSES), "time_s": np.array([3.0]),
+        **blank, **{f"own_{name}": np.zeros(1) for name in blank},
+    })  # fmt: skip
+    found = summary.result()["tracks"]["t"]
+    assert found["first_confirmed"] == {"time_s": 3.0, "range_m": None}
+    assert found["targets"] == {}
 
 
 def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
     folder, summary = crossing
     alerts = pq.read_table(folder / "alerts.parquet").to_pylist()
-    for block, first_s in summary["alerts"].items():
+    for block, levels in summary["alerts"].items():
         mine = [row for row in alerts if row["block"] == block and row["level"] > 0]
-        levels = sorted({row["level"] for row in mine})
-        assert first_s == {
-            str(level): min(row["time_s"] for row in mine if row["level"] == level)
-            for level in levels
-        } != {}  # fmt: skip
+        assert sorted(levels) == sorted({str(row["level"]) for row in mine}) != []
+        for level, found in levels.items():
+            times = [row["time_s"] for row in mine if str(row["level"]) == level]
+            assert (found["first_s"], found["last_s"]) == (min(times), max(times))
     flown = pq.read_table(folder / "manoeuvres.parquet")["time_s"].to_pylist()
     assert summary["manoeuvres"]["pilot"] == {
         "count": len(flown), "first_s": flown[0], "last_s": flown[-1]
     }  # fmt: skip
+
+
+def test_a_target_is_first_confirmed_when_its_first_near_track_is_at_the_true_range(crossing):
+    folder, summary = crossing
+    found = summary["tracks"]["tracker"]
+    tracks = pq.read_table(folder / "state_tracks.parquet").to_pylist()
+    began_s = min(row["time_s"] for row in tracks if row["track_status"] == "confirmed")
+    assert found["first_confirmed"]["time_s"] == began_s
+    (name,) = found["targets"]
+    truth = pq.read_table(folder / "truth.parquet").to_pylist()
+    state_s = next(row["state_s"] for row in tracks if row["time_s"] == began_s)
+    there = [row for row in truth if abs(row["time_s"] - state_s) < 1e-6]
+    own = next(row for row in there if row["target"] is None)
+    other = next(row for row in there if row["target"] == name)
+    _, _, range_m = pymap3d.geodetic2aer(
+        *(other[key] for key in ("lat_deg", "lon_deg", "alt_m")),
+        *(own[key] for key in ("lat_deg", "lon_deg", "alt_m")),
+    )
+    assert found["targets"][name]["range_m"] == pytest.approx(range_m, abs=100.0)
+
+
+def test_alerts_come_piece_by_piece_and_keep_each_level_and_target():
+    rows = [  # block, time, target, level
+        ("x", 1.0, "a", 1), ("x", 1.0, "b", 0), ("x", 2.0, "a", 2), ("x", 2.0, "b", 1),
+        ("y", 2.0, None, 1), ("x", 5.0, "a", 1), ("x", 6.0, "b", 1),
+    ]  # fmt: skip
+    for cuts in ([], [1], [2, 4], range(1, 7)):
+        summary = AlertSummary(["x", "y", "z"])
+        for part in np.split(np.arange(len(rows)), cuts):
+            some = [rows[row] for row in part]
+            summary.update("alerts", {
+                "block": text([row[0] for row in some], ("x", "y")),
+                "time_s": np.array([row[1] for row in some]),
+                "target": text([row[2] for row in some], TARGETS),
+                "level": np.array([row[3] for row in some]),
+            })  # fmt: skip
+        spans = {
+            name: {"first_s": first_s, "last_s": last_s}
+            for name, first_s, last_s in (("a", 1.0, 5.0), ("b", 2.0, 6.0), ("a2", 2.0, 2.0))
+        }
+        assert summary.result()["alerts"] == {
+            "x": {
+                "1": {"first_s": 1.0, "last_s": 6.0,
+                      "targets": {"a": spans["a"], "b": spans["b"]}},
+                "2": spans["a2"] | {"targets": {"a": spans["a2"]}},
+            },
+            "y": {"1": spans["a2"] | {"targets": {"no target": spans["a2"]}}},
+            "z": {},
+        }  # fmt: skip
 
 
 def test_manoeuvres_come_piece_by_piece():
@@ -262,7 +348,9 @@ def test_manoeuvres_come_piece_by_piece():
 def test_without_recorded_truth_nothing_is_said_of_it_and_without_such_blocks_nothing(configs):
     scene = configs / "avoidance/crossing_tracked.toml"
     summary = dsa_des.run(dsa_des.load_scene(scene, sets=["record.truth=false"], duration_s="5"))
-    assert summary.summary["tracks"] == {"tracker": {"confirmed": 1}}
+    found = summary.summary["tracks"]["tracker"]
+    assert list(found) == ["confirmed", "first_confirmed"] and found["confirmed"] == 1
+    assert found["first_confirmed"]["range_m"] > 0
     plain = dsa_des.run(dsa_des.load_scene(configs / "first_light.toml", duration_s="1")).summary
     assert {"tracks", "alerts", "manoeuvres"}.isdisjoint(plain)
 
@@ -270,11 +358,36 @@ def test_without_recorded_truth_nothing_is_said_of_it_and_without_such_blocks_no
 def test_a_line_for_each_block():
     summary = {
         "tracks": {
-            "ekf": {"confirmed": 3, "false": 1, "position_error_m": 34.56},
-            "eo": {"confirmed": 1, "false": None, "position_error_m": None},
+            "ekf": {
+                "confirmed": 3,
+                "false": 1,
+                "position_error_m": 34.56,
+                "first_confirmed": {"time_s": 1.0, "range_m": None},
+                "targets": {f"t{i}": {"time_s": 9.0 - i, "range_m": 1e3 * i} for i in range(1, 7)},
+            },
+            "eo": {"confirmed": 1, "first_confirmed": {"time_s": 4.0, "range_m": None}},
             "ir": {"confirmed": 0},
         },
-        "alerts": {"alerting": {"1": 12.0, "3": 14.25}, "true": {}},
+        "alerts": {
+            "alerting": {
+                "1": {
+                    "first_s": 12.0,
+                    "last_s": 30.0,
+                    "targets": {
+                        "a": {"first_s": 14.25, "last_s": 14.25},
+                        "b": {"first_s": 12.0, "last_s": 30.0},
+                    },
+                },
+                "3": {
+                    "first_s": 14.25,
+                    "last_s": 14.25,
+                    "targets": {
+                        "a": {"first_s": 14.25, "last_s": 14.25},
+                    },
+                },
+            },
+            "true": {},
+        },
         "manoeuvres": {
             "a": {"count": 0, "first_s": None, "last_s": None},
             "b": {"count": 1, "first_s": 22.0, "last_s": 22.0},
@@ -282,10 +395,14 @@ def test_a_line_for_each_block():
         },
     }
     assert outcome_lines(summary) == [
-        "ekf: 3 confirmed tracks, 1 of them false; position error 34.6 m rms",
-        "eo: 1 confirmed track",
+        "ekf: 3 confirmed tracks, 1 of them false; position error 34.6 m rms; "
+        "first confirmed: t6 at 3.0 s "
+        "(6.00 km away), t5 at 4.0 s (5.00 km away), t4 at 5.0 s (4.00 km away), t3 at 6.0 s "
+        "(3.00 km away) and 2 more",
+        "eo: 1 confirmed track; first confirmed at 4.0 s",
         "ir: no confirmed track",
-        "alerting: alerts of level 1 from 12.0 s, level 3 from 14.2 s",
+        "alerting: level 1 from 12.0 s to 30.0 s (b from 12.0 s to 30.0 s, a at 14.2 s)",
+        "alerting: level 3 at 14.2 s (a)",
         "true: no alert",
         "a: no manoeuvre",
         "b: 1 manoeuvre, at 22.0 s",

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from components.display import symbols as module
-from components.display.symbols import Labels, by_target, evenly, staggered, styles_of
+from components.display.symbols import Labels, by_target, draw_density, evenly, staggered, styles_of
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
 from components.radar.radar import RangeBoundary
@@ -168,3 +168,16 @@ def test_no_two_colours_are_close_to_eyes_without_red_or_green() -> None:
             seen[mark.colour] = np.clip(left, 0, 1) ** (1 / 2.2)
         for one, other in combinations(seen, 2):
             assert np.linalg.norm(seen[one] - seen[other]) > 0.1, (one, other)
+
+
+def test_density_counts_each_line_once_in_every_cell_that_it_crosses():
+    axes = Figure().subplots()
+    axes.set(xlim=(0.0, 160.0), ylim=(0.0, 100.0))
+    level = np.array([[0.0, 10.5], [160.0, 10.5]])
+    gap = np.array([[0.0, 20.5], [np.nan, np.nan], [160.0, 20.5]])
+    draw_density(axes, [level, level, gap, np.array([[5.5, 30.5]])])
+    cells = np.ma.filled(axes.collections[0].get_array().reshape(100, 160), 0.0)
+    assert (cells[10] == 2.0).all()
+    assert cells[20, 80] == 0.0 and cells[30, 5] == 1.0
+    assert cells.sum() == 2 * 160 + cells[20].sum() + 1
+    assert axes.get_xlim() == (0.0, 160.0) and axes.get_ylim() == (0.0, 100.0)

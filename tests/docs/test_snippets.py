@@ -26,8 +26,12 @@ from dsa_des.cli import main
 from tests import warm_process
 
 RUN = [page for page in PAGES if any(not not_run(part) for part in read_snippets(page))]
-#: Pages that show what an extra does, and the package that it installs.
-EXTRAS = {"docs/formats.md": "asterix", "docs/stone-soup.md": "stonesoup"}
+#: Pages that show what extras do, and the packages that they install.
+EXTRAS = {
+    "docs/fmu.md": ("fmpy", "pythonfmu3"),
+    "docs/formats.md": ("asterix",),
+    "docs/stone-soup.md": ("stonesoup",),
+}
 LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
 
 
@@ -93,8 +97,8 @@ def play(parts: list[Snippet], folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
 def test_page_runs_as_written(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if page in EXTRAS:
-        pytest.importorskip(EXTRAS[page], reason=f"{page} needs the extra {EXTRAS[page]}")
+    for package in EXTRAS.get(page, ()):
+        pytest.importorskip(package, reason=f"{page} needs the package {package}")
     monkeypatch.chdir(desk(tmp_path))
     play(read_snippets(page), tmp_path)
 

@@ -13,6 +13,7 @@ from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/benchmark/manoeuvres.toml"
+MANY = "blocks.traffic.intruders=30"
 
 
 def run(scene, **kwargs):
@@ -25,14 +26,14 @@ def run(scene, **kwargs):
 @pytest.mark.parametrize(
     "sets",
     [
-        [],
+        [MANY],
         ["blocks.avoidance.pause_s=7", "blocks.traffic.intruders=20"],
-        ["blocks.avoidance.pause_s=0.9", "blocks.avoidance.turn_deg=2"],
-        ["blocks.avoidance.range_km=0.001"],
+        [MANY, "blocks.avoidance.pause_s=0.9", "blocks.avoidance.turn_deg=2"],
+        [MANY, "blocks.avoidance.range_km=0.001"],
     ],
 )
 def test_any_window_gives_the_same_rows(sets):
-    scene = load_scene(SCENE, sets=["blocks.traffic.intruders=30", *sets], duration_s="90")
+    scene = load_scene(SCENE, sets=sets, duration_s="90")
     _, scan_by_scan = run(scene, window=1)
     for window in (None, 64):
         simulation, tables = run(scene, window=window)
@@ -44,7 +45,7 @@ def test_any_window_gives_the_same_rows(sets):
 
 
 def test_windows_are_few_when_what_comes_back_is_regular():
-    scene = load_scene(SCENE, sets=["blocks.traffic.intruders=30"], duration_s="600")
+    scene = load_scene(SCENE, sets=[MANY], duration_s="600")
     windows = []
 
     class Counted(Simulation):
@@ -63,7 +64,7 @@ def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
     """A block that only fails on a path that is not flown does not fail."""
     from components.flights.steered_flight import SteeredFlight
 
-    scene = load_scene(SCENE, sets=["blocks.traffic.intruders=30"], duration_s="90")
+    scene = load_scene(SCENE, sets=[MANY], duration_s="90")
     _, expected = run(scene)
     first_turn_s = expected["manoeuvres"]["time_s"][0].as_py() + 0.5
     straight = SteeredFlight.at
@@ -81,7 +82,7 @@ def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
 def test_a_failure_that_happens_is_reported(monkeypatch):
     from components.tracking.stub import TrackerStub
 
-    scene = load_scene(SCENE, sets=["blocks.traffic.intruders=30"], duration_s="90")
+    scene = load_scene(SCENE, sets=[MANY], duration_s="90")
     track = TrackerStub.run
 
     def fails(self, wake):

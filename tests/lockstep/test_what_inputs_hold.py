@@ -5,29 +5,29 @@ import pytest
 
 from dsa_des.block.message import Message
 from dsa_des.replicas.channel import ReplicaChannel
+from dsa_des.running.windows import EqualWindows
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
 RUN_TICKS = 60
 
 
-def as_held(time, ends, sent, asked, windows):
+def as_held(time, ends, sent, asked, longest, together=None):
     """Whether every replica holds at each tick that it asks about what came there last."""
     channel = ReplicaChannel("source", 0, None, time, ends)
+    windows = EqualWindows(time, longest, together)
     span, told = time.span_ticks, 0
-    for start, end in windows:
 
-        def line(ticks, start=start, end=end):
-            own = [(k, t, k * span + t) for k, some in enumerate(ticks) for t in some]
-            inside = [at for _, t, at in own if start <= (t if time.side_by_side else at) < end]
-            return np.array(sorted(inside), dtype=np.int64)
+    def line(ticks, start, end):
+        inside = [k * span + t for k in time.runs for t in ticks[k] if start <= t < end]
+        return np.array(inside, dtype=np.int64)
 
-        new, ticks = line(sent), line(asked)
+    while (window := windows.next()) is not None:
+        start, end = window[:2]
+        new, ticks = line(sent, start, end), line(asked, start, end)
         if len(new):
             channel.push(Message(new))
-        if not len(ticks):
-            continue
-        found = channel.sample(ticks, end)
+        found = channel.sample(ticks, end) if len(ticks) else None
         rows = np.full(len(ticks), -1) if found is None else found[1]
         for tick, row in zip(ticks.tolist(), rows.tolist(), strict=True):
             replica, own = divmod(tick, span)
@@ -35,27 +35,26 @@ def as_held(time, ends, sent, asked, windows):
             got = None if found is None or row < 0 else int(found[0].tick[row]) - replica * span
             assert got == (max(came) if came else None), (replica, own)
             told += got is not None
+        windows.heard(window, None)
     return told
 
 
 @pytest.mark.parametrize("ended", [(), (2,), (0, 2)])
 def test_what_came_long_ago_is_held_beside_a_replica_that_is_told_all_the_time(ended):
     """The first asks at the instants at which it is told, for longer than rows pile up."""
-    time = ReplicaTime.of_replicas(4, RUN_TICKS, side_by_side=True)
+    time = ReplicaTime.of_replicas(4, RUN_TICKS)
     ends = RunEnds(time)
     for replica in ended:
         ends.note(np.array([replica * time.span_ticks + 40]), "over")
     last = [40 if replica in ended else RUN_TICKS for replica in range(4)]
     sent = [range(last[0]), [3], [0, 5], [2, 30]]
     asked = [range(last[0]), [50, 58], [5], [30, 55]]
-    windows = [(tick, tick + 1) for tick in range(RUN_TICKS)]
-    assert as_held(time, ends, sent, asked, windows) == last[0] + 5
+    assert as_held(time, ends, sent, asked, 1, 4) == last[0] + 5
 
 
 @pytest.mark.parametrize("step", [1, 7, 64, 300])
 def test_what_came_at_the_very_start_is_held_to_the_end_of_its_run(step):
-    """Replicas lie end to end, and windows begin and end anywhere."""
+    """One replica runs after the other, or some at a time."""
     time = ReplicaTime.of_replicas(3, RUN_TICKS)
     sent, asked = [[0], [4], [0, 20]], [range(0, RUN_TICKS, 3)] * 3
-    windows = [(at, at + step) for at in range(0, time.end_tick, step)]
-    assert as_held(time, RunEnds(time), sent, asked, windows) == 20 + 18 + 20
+    assert as_held(time, RunEnds(time), sent, asked, step) == 20 + 18 + 20

@@ -24,10 +24,9 @@ blocks.second.type = "tracking.ekf"
 blocks.whole.type = "fusion.covariance_intersection"
 """
 #: A camera that looks seldom, and noise enough for tracks of it.
-SEEN_SOON = [
-    "blocks.eo.scan_rate_hz=4", "blocks.radar.false_alarm_probability=0.02",
-    "blocks.traffic.intruders[0].north_m=6000",
-]  # fmt: skip
+NEAR = "blocks.traffic.intruders[0].north_m=6000"
+SELDOM = "blocks.eo.scan_rate_hz=4"
+SEEN_SOON = [SELDOM, NEAR, "blocks.radar.false_alarm_probability=0.02"]
 #: Scene, length in s, what is set, and the table in which every replica has something.
 SCENES = {
     "alerts of tracks": ("avoidance/crossing_tracked.toml", "8", [
@@ -38,7 +37,7 @@ SCENES = {
     ], "cues"),
     "navigation errors": ("systems/tecvol.toml", "6", [], "detections"),
     "declaration by place": ("tracking/cueing.toml", "5", [
-        *SEEN_SOON, 'blocks.radar.declare_by="place"', "blocks.radar.false_alarm_probability=0.4",
+        SELDOM, NEAR, 'blocks.radar.declare_by="place"', "blocks.radar.false_alarm_probability=0.4",
         "blocks.radar.declare_m=2", "blocks.eo.declare_m=2", "blocks.eo.declare_n=3",
     ], "detections"),
     "a sweeping beam": ("avoidance/crossing.toml", "10", [
@@ -81,7 +80,7 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
     cueing = Path("configs/tracking/cueing.toml").resolve()
     path.write_text(DISTRIBUTED.format(cueing=cueing), encoding="utf-8")
     rates = ["blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1"]
-    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON, *rates])
+    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON[1:], *rates])
     late = [
         replace(wire, jitter_s=Fraction(2, 5)) if wire.source == "second" else wire
         for wire in scene.wires
@@ -124,5 +123,12 @@ def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
     phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
     scenes = lock.replicas_of(scene, *phases)
     simulation = lock.same_as_alone(scenes, window=None if closed else 2)
-    assert simulation.side_by_side == closed
+    assert (simulation.time.runs == range(3)) == closed
     assert not simulation.timeline.split
+
+
+def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next(lock):
+    """Each run goes through several windows, and they run one after the other."""
+    scene = load_scene("configs/systems/tecvol_tracked.toml", duration_s="6")
+    simulation = lock.same_as_alone(lock.replicas_of(scene, {}, {}, {}), window=9)
+    assert simulation.time.runs == range(2, 3)

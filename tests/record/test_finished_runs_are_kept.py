@@ -100,7 +100,8 @@ def test_a_block_whose_report_fails_leaves_the_run(configs, tmp_path, monkeypatc
     monkeypatch.setattr(TrafficSource, "report", fail)
     result = run(configs, tmp_path / "kept")
     assert result.exit_code == 0
-    assert "Unable to allocate 7.3 GiB; the run itself is complete" in result.stderr
+    assert "Unable to allocate 7.3 GiB (" in result.stderr
+    assert "; the run itself is complete" in result.stderr
     assert (tmp_path / "kept" / "plan.png").exists()
 
 

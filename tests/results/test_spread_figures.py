@@ -1,5 +1,6 @@
 """Histograms and cumulative shares in studies: drawn alike each time, refused with reasons."""
 
+import io
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.results.curves import _edges
+from dsa_des.record.drawing import drawing
+from dsa_des.results.curves import _dodge, _edges
 
 STUDY = """
 scene = "small.toml"
@@ -87,3 +89,24 @@ sys.exit(any(name.partition(".")[0] == "matplotlib" for name in sys.modules))
         assert done.returncode == 0, (words, done.stdout, done.stderr)
     assert not [*Path("r").glob("*.png"), *Path("s").glob("*.png")]
     assert Path("r/detections.parquet").exists() and Path("s/summary.parquet").exists()
+
+
+def test_no_tick_has_an_offset_and_intervals_of_two_series_stand_side_by_side(tmp_path):
+    drawn = io.BytesIO()
+    with drawing(4.0, 3.0, drawn) as figure:
+        axes = figure.subplots()
+        first, second = (axes.errorbar([1, 2], [0.02499, 0.025], yerr=1e-5) for _ in range(2))
+        _dodge(axes, first.get_children(), 0, 2)
+        _dodge(axes, second.get_children(), 1, 2)
+        figure.canvas.draw()
+        assert axes.yaxis.get_offset_text().get_text() == ""
+        assert any(one.get_text().startswith("0.02499") for one in axes.get_yticklabels())
+        low, high = axes.get_ylim()
+        assert low < 0.02498 and high > 0.02501
+        apart_px = 5.0 / 72 * figure.dpi
+        for part in range(len(first.get_children())):  # the line, its caps and its bars
+            places = [
+                bars.get_children()[part].get_transform().transform((1.0, 0.025))
+                for bars in (first, second)
+            ]
+            assert places[1] - places[0] == pytest.approx(np.array([apart_px, 0.0]), abs=0.01)

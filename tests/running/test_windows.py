@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from dsa_des.cli import main
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
@@ -33,22 +32,43 @@ def all_of(windows):
     ("longest", "expected"), [(4, [(0, 4), (4, 8), (8, 10)]), (10, [(0, 10)]), (99, [(0, 10)])]
 )
 def test_equal_windows_cover_a_run_once(longest, expected):
-    assert all_of(EqualWindows(10, longest)) == expected
-    windows = EqualWindows(10, longest)
+    assert all_of(EqualWindows(ReplicaTime(1, 10), longest)) == expected
+    windows = EqualWindows(ReplicaTime(1, 10), longest)
     windows.limit(0)  # no window is shorter than a tick
     assert all_of(windows) == [(k, k + 1) for k in range(10)]
 
 
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
 def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
+    time, ran, count = ReplicaTime.of_replicas(4, 10), [], 0
+    windows = EqualWindows(time, longest)
+    while (window := windows.next()) is not None:
+        ran += [(run, tick) for tick in range(*window[:2]) for run in time.runs]
+        assert len(time.runs) == 1 or window[:2] == (0, 10)
+        assert windows.heard(window, None) == window.end
+        count += 1
+    assert sorted(ran) == [(run, tick) for run in range(4) for tick in range(10)]
+    assert count == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
+
+
+def test_windows_of_runs_together_come_back_to_each_of_them():
     time = ReplicaTime.of_replicas(4, 10)
-    found = all_of(ReplicaWindows(time, longest))
-    ticks = np.concatenate([np.arange(*window) for window in found])
-    ran = ticks[ticks % time.span_ticks < time.run_ticks]
-    starts = np.arange(4)[:, None] * time.span_ticks
-    assert ran.tolist() == (starts + np.arange(10)).ravel().tolist()
-    assert all(start % time.span_ticks < time.run_ticks for start, _ in found)
-    assert len(found) == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
+    windows = EqualWindows(time, 4, together=3)
+    found = []
+    while (window := windows.next()) is not None:
+        found.append((time.runs, *window[:2]))
+        windows.heard(window, None)
+    cuts = [(0, 4), (4, 8), (8, 10)]
+    assert found == [(runs, *cut) for runs in (range(3), range(3, 4)) for cut in cuts]
+
+
+def test_rows_are_final_up_to_where_all_runs_have_come():
+    time = ReplicaTime.of_replicas(9, 10)
+    span = time.span_ticks
+    assert time.final_before(range(2, 5), 7) == 2 * span
+    assert time.final_before(range(2, 5), 10) == 5 * span
+    assert time.final_before(range(2, 3), 7) == 2 * span + 7
+    assert ReplicaTime(1, 10).final_before(range(1), 7) == 7
 
 
 def a_loop(lab, end, back):
@@ -88,7 +108,7 @@ def test_a_loop_that_cannot_be_rewound_runs_in_windows_that_nothing_comes_back_i
 
 
 def test_blocks_before_a_loop_run_ahead_of_it():
-    windows, found = SureWindows(100, 40, 15), []
+    windows, found = SureWindows(ReplicaTime(1, 100), 40, 15), []
     while (window := windows.next()) is not None:
         assert windows.heard(window, None) == window.end
         found.append((window.start, window.end, window.ahead))
@@ -151,7 +171,7 @@ def test_a_pacer_waits_for_what_is_final_only():
 
     now = [50.0]
     pacer = Pacer(2.0, lambda: now[0], lambda s: (waits.append(s), now.__setitem__(0, now[0] + s)))
-    windows = PacedWindows(Undecided(40, 99), pacer, ticks_per_s=100)
+    windows = PacedWindows(Undecided(ReplicaTime(1, 40), 99), pacer, ticks_per_s=100)
     now[0] = 70.0  # until the first window is asked for, no time goes by
     ran = []
     while (window := windows.next()) is not None:

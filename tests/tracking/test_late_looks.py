@@ -30,8 +30,9 @@ LATE = ["blocks.eo.latency_s=0.31", "blocks.ir.latency_s=0.117"]
 
 def scene(*sets, kind="tracking.ekf", duration_s="4"):
     swaps = [f"tracker={kind}", "fusion=fusion.pass_through"]
+    chosen = {text.partition("=")[0]: text for text in (*NEARER, *sets)}  # the last of each key
     return load_scene(
-        "configs/first_light.toml", swaps=swaps, sets=[*NEARER, *sets], duration_s=duration_s
+        "configs/first_light.toml", swaps=swaps, sets=chosen.values(), duration_s=duration_s
     )
 
 

@@ -114,7 +114,7 @@ def the_report_says_what_the_tables_hold(folder: Path) -> None:
     runs = pq.read_table(folder / "parts").to_pylist()
     (ratios,) = (t for t in tables if t[0][:3] == ["ratio of events", "unresolved", "induced"])
     assert ratios[0][3:7] == ["gamma", "bootstrap", "effective size", "nominal, mitigated, induced"]
-    (results,) = (t for t in tables if t[0][:3] == ["result", "value", "interval"])
+    *_, results = (t for t in tables if t[0][:3] == ["result", "value", "interval"])
     printed = {row[0]: row[1:] for row in results[1:]}
     seen = 0
     for name, unresolved, induced, gamma, bootstrap, size, counts, *_ in ratios[1:]:

@@ -1,0 +1,1 @@
+"""FMUs in a scene, and a scene as an FMU."""

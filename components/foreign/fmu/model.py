@@ -1,0 +1,287 @@
+"""What an FMU says of itself: variables, units, clocks; read from its file, nothing is run."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from dsa_des.errors import did_you_mean
+
+_KINDS = {"Real": "Float64", "Integer": "Int32"}
+#: Names of our units: powers of (m, s, rad), and how large each is in SI units.
+_UNITS: dict[str, tuple[tuple[int, int, int], float]] = {
+    "m": ((1, 0, 0), 1.0), "km": ((1, 0, 0), 1e3), "ft": ((1, 0, 0), 0.3048),
+    "m2": ((2, 0, 0), 1.0), "s": ((0, 1, 0), 1.0), "ms": ((0, 1, 0), 1e-3),
+    "rad": ((0, 0, 1), 1.0), "deg": ((0, 0, 1), math.pi / 180),
+    "m/s": ((1, -1, 0), 1.0), "km/h": ((1, -1, 0), 1 / 3.6), "kn": ((1, -1, 0), 1852 / 3600),
+    "m/s2": ((1, -2, 0), 1.0), "rad/s": ((0, -1, 1), 1.0),
+    "deg/s": ((0, -1, 1), math.pi / 180), "Hz": ((0, -1, 0), 1.0), "1/s": ((0, -1, 0), 1.0),
+}  # fmt: skip
+#: How a column's name ends, and its unit; longer endings first.
+_ENDINGS = {
+    "_rad_s": "rad/s", "_deg_s": "deg/s", "_m_s": "m/s", "_mps": "m/s", "_mps2": "m/s2",
+    "_rad": "rad", "_deg": "deg", "_km": "km", "_hz": "Hz", "_db": "dB", "_dbsm": "dBsm",
+    "_rad2": "rad2", "_m2": "m2", "_m": "m", "_s": "s",
+}  # fmt: skip
+
+
+def unit_of_column(name: str) -> str:
+    """Return the unit that a column's name ends with, or nothing."""
+    ending = max((end for end in _ENDINGS if name.endswith(end)), key=len, default="")
+    return _ENDINGS.get(ending, "")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A unit: powers of m, s, rad, kg, A, K, mol and cd, and x SI = factor x + offset."""
+
+    powers: tuple[int, ...]
+    factor: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of an FMU.
+
+    Parameters
+    ----------
+    name, unit : str
+    reference : int
+        What the FMU knows it by.
+    kind : str
+        As FMI 3 calls types; an enumeration is a whole number.
+    causality, variability : str
+    dimensions : tuple of (int or str)
+        Lengths, or the structural parameters that hold them.
+    start : str or None
+    settable : bool
+        Whether a scene may give its start value.
+    """
+
+    name: str
+    unit: str
+    reference: int
+    kind: str
+    causality: str
+    variability: str
+    dimensions: tuple[int | str, ...] = ()
+    start: str | None = None
+    settable: bool = False
+    alias: bool = False
+
+
+@dataclass(frozen=True)
+class PartitionClock:
+    """An input clock of a scheduled-execution FMU; `interval_s` is None where it varies."""
+
+    name: str
+    reference: int
+    priority: int
+    variability: str
+    interval_s: Fraction | None = None
+    shift_s: Fraction = Fraction(0)
+    fraction: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FmuModel:
+    """What an FMU says of itself.
+
+    Parameters
+    ----------
+    path : Path
+    version : {2, 3}
+    kind : {"cs", "se"}
+        Co-simulation or scheduled execution.
+    identifier, token : str
+    rewindable, alone, varying_steps, events : bool
+        Whether its state can be saved; whether a process can hold one instance only; whether steps
+        may differ in length; whether it has an event mode.
+    step_s : Fraction or None
+        Of its default experiment.
+    """
+
+    path: Path
+    version: int
+    kind: str
+    identifier: str
+    token: str
+    rewindable: bool
+    alone: bool
+    varying_steps: bool
+    events: bool
+    step_s: Fraction | None
+    variables: Mapping[str, Variable]
+    scales: Mapping[str, Scale | None]
+    clocks: Mapping[str, PartitionClock] = field(default_factory=dict)
+    raised: Mapping[str, int] = field(default_factory=dict)
+    terminals: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def variable(self, name: str, allowed: str = "") -> Variable:
+        """Return a variable by its name; ValueError names the nearest."""
+        names = [v.name for v in self.variables.values() if allowed in ("", v.causality)]
+        if name not in names:
+            what = f"{allowed} variable" if allowed else "variable"
+            raise ValueError(f"{self.path.name} has no {what} {name!r}{did_you_mean(name, names)}")
+        return self.variables[name]
+
+    def converted(self, unit: str, variable: Variable) -> tuple[float, float]:
+        """Return (a, b): a value x of `unit` is a x + b in the variable's own unit.
+
+        Raises
+        ------
+        ValueError
+            If one cannot be made of the other. A variable without a unit takes any.
+        """
+        own = variable.unit
+        if own in ("", unit) or not unit:
+            return 1.0, 0.0
+        to = self.scales.get(own) or _scale_of(own)
+        known = _scale_of(unit)
+        if known is None or to is None or known.powers != to.powers:
+            raise ValueError(
+                f"{variable.name!r} of {self.path.name} is in {own!r}, which {unit!r} cannot be "
+                "made into"
+            )
+        return known.factor / to.factor, (known.offset - to.offset) / to.factor
+
+
+def _scale_of(unit: str) -> Scale | None:
+    named = unit.replace("²", "2").replace("^", "")
+    if named not in _UNITS:
+        return None
+    powers, factor = _UNITS[named]
+    return Scale((*powers, 0, 0, 0, 0, 0), factor)
+
+
+def read_fmu(path: Path) -> FmuModel:
+    """Return what an FMU says of itself.
+
+    Raises
+    ------
+    ValueError
+        If it is no FMU that can run here: the reason, and what there is instead.
+    """
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    return _read(path, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=64)
+def _read(path: Path, changed: int, size: int) -> FmuModel:
+    try:
+        import fmpy
+    except ImportError:
+        raise ValueError("foreign.fmu needs FMPy: pip install 'dsa-des[fmi]'") from None
+    try:
+        said: Any = fmpy.read_model_description(str(path), validate=False)
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            terminals = _terminals(archive, names)
+            clocks, raised = _clocks(archive)
+    except Exception as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ValueError(f"{path} is no FMU that can be read: {first}") from error
+    version = 2 if said.fmiVersion.startswith("2.") else 3 if said.fmiVersion[0] == "3" else 0
+    if not version:
+        raise ValueError(f"{path} is of FMI {said.fmiVersion}: 2 and 3 are run")
+    kind, interface = "cs", said.coSimulation
+    if interface is None and version == 3 and said.scheduledExecution is not None:
+        kind, interface = "se", said.scheduledExecution
+    if interface is None:
+        raise ValueError(
+            f"{path} is made for model exchange only, without a solver: it must be exported for "
+            "co-simulation (or, FMI 3, scheduled execution)"
+        )
+    wanted = fmpy.platform_tuple if version == 3 else fmpy.platform
+    library = f"binaries/{wanted}/{interface.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    if library not in names:
+        there = sorted({name.split("/")[1] for name in names if name.startswith("binaries/")})
+        there = [name for name in there if name]
+        raise ValueError(
+            f"{path} holds no library for {wanted}, only for {', '.join(there) or 'no platform'}"
+        )
+    step = said.defaultExperiment.stepSize if said.defaultExperiment else None
+    everything = said.modelVariables
+    return FmuModel(
+        path, version, kind, interface.modelIdentifier,
+        said.guid if version == 2 else said.instantiationToken,
+        bool(interface.canGetAndSetFMUstate), bool(interface.canBeInstantiatedOnlyOncePerProcess),
+        kind == "se" or bool(interface.canHandleVariableCommunicationStepSize),
+        version == 3 and kind == "cs" and bool(interface.hasEventMode),
+        None if step is None else Fraction(str(step)),
+        {v.name: _variable(v, version, everything) for v in everything if v.type != "Clock"},
+        {unit.name: _scale(unit) for unit in said.unitDefinitions}, clocks, raised, terminals,
+    )  # fmt: skip
+
+
+def _variable(v: Any, version: int, everything: Any) -> Variable:
+    kind = _KINDS.get(v.type, v.type)
+    if kind == "Enumeration":
+        kind = "Int64" if version == 3 else "Int32"
+    declared = v.declaredType.unit if v.declaredType is not None else None
+    by_reference = {one.valueReference: one.name for one in everything if v.dimensions}
+    dimensions = tuple(
+        int(d.start) if d.start is not None else by_reference[d.valueReference]
+        for d in v.dimensions
+    )
+    usual = "continuous" if kind.startswith("Float") else "discrete"
+    given = v.causality in ("parameter", "structuralParameter", "input")
+    settable = given or (v.start is not None and v.initial in ("exact", "approx"))
+    return Variable(
+        v.name, v.unit or declared or "", v.valueReference, kind, v.causality or "local",
+        v.variability or usual, dimensions, v.start, settable and v.variability != "constant",
+        v.alias is not None,
+    )  # fmt: skip
+
+
+def _scale(unit: Any) -> Scale | None:
+    base = unit.baseUnit
+    if base is None:
+        return None
+    powers = (base.m, base.s, base.rad, base.kg, base.A, base.K, base.mol, base.cd)
+    return Scale(tuple(map(int, powers)), float(base.factor), float(base.offset))
+
+
+def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, PartitionClock], dict[str, int]]:
+    """Return the input clocks, and the references of the output clocks; FMPy reads neither."""
+    clocks, raised = {}, {}
+    for item in ElementTree.fromstring(archive.read("modelDescription.xml")).iter("Clock"):
+        name, reference = item.get("name", ""), int(item.get("valueReference", 0))
+        if item.get("causality") == "output":
+            raised[name] = reference
+        if item.get("causality") != "input":
+            continue
+        interval, shift, resolution = None, Fraction(0), item.get("resolution")
+        if resolution and (counter := item.get("intervalCounter")):
+            interval = Fraction(int(counter), int(resolution))
+            shift = Fraction(int(item.get("shiftCounter", 0)), int(resolution))
+        elif decimal := item.get("intervalDecimal"):
+            interval, shift = Fraction(decimal), Fraction(item.get("shiftDecimal", "0"))
+        clocks[name] = PartitionClock(
+            name, reference, int(item.get("priority", 0)), item.get("intervalVariability", ""),
+            interval, shift, item.get("supportsFraction") in ("true", "1"),
+        )  # fmt: skip
+    return clocks, raised
+
+
+def _terminals(archive: zipfile.ZipFile, names: list[str]) -> dict[str, dict[str, str]]:
+    """Return the variables of each terminal, by the names of the members."""
+    name = "terminalsAndIcons/terminalsAndIcons.xml"
+    if name not in names:
+        return {}
+    found: dict[str, dict[str, str]] = {}
+    for terminal in ElementTree.fromstring(archive.read(name)).iter("Terminal"):
+        members = found.setdefault(terminal.get("name", ""), {})
+        for member in terminal.findall("TerminalMemberVariable"):
+            variable = member.get("variableName", "")
+            members[member.get("memberName", variable)] = variable
+    return found

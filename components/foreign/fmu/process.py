@@ -1,0 +1,196 @@
+"""Our side of the process in which an FMU runs: starts it, watches it, ends it."""
+
+import os
+import pickle
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from weakref import WeakValueDictionary, finalize
+
+import numpy as np
+
+from dsa_des.text.safe_text import printable, shortened
+
+_WORKER = Path(__file__).with_name("worker.py")
+_LOOK_S = 0.05
+
+
+class FmuError(Exception):
+    """An FMU failed, crashed or did not answer in time."""
+
+    exit_code = 3
+
+
+class FmuProcess:
+    """One process for all instances of one FMU file.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        folder = Path(tempfile.mkdtemp(prefix="dsa_des_fmu_"))
+        try:
+            _extract(path, folder / "fmu")
+            np.zeros(1, dtype=np.int64).tofile(folder / "beat")
+            # Appended to, so that it can be cut off while it is written.
+            with open(folder / "words", "ab") as words:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", str(_WORKER), str(folder), str(os.getpid())],
+                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=words, cwd=folder,
+                )  # fmt: skip
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        self._folder = folder
+        self._beat = np.memmap(folder / "beat", dtype=np.int64, mode="r", shape=(1,))
+        self._count = 0
+        self.close = finalize(self, _end, self._process, folder)
+
+    def open(self, spec: dict[str, Any], deadline_s: float) -> int:
+        """Make an instance; return its number."""
+        self._count += 1
+        self.ask({"do": "open", "instance": self._count, "spec": spec}, max(deadline_s, 10.0))
+        return self._count
+
+    def ask(self, request: dict[str, Any], deadline_s: float) -> dict[str, Any]:
+        """Send a request and return the answer.
+
+        Raises
+        ------
+        FmuError
+            If the FMU refuses, its process ends, or no communication point is done within the
+            deadline. The process is gone then.
+        """
+        content = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
+        watch = _Watch(self._process, self._beat, deadline_s)
+        process: Any = self._process
+        try:
+            watch.start()
+            process.stdin.write(struct.pack("<Q", len(content)) + content)
+            process.stdin.flush()
+            head = process.stdout.read(8)
+            size = struct.unpack("<Q", head)[0] if len(head) == 8 else 0
+            content = process.stdout.read(size)
+        except (OSError, ValueError):  # it is gone
+            head = b""
+        except BaseException:
+            self.close()
+            raise
+        finally:
+            watch.stop()
+        if len(head) < 8 or len(content) < size:
+            raise self._gone(watch, deadline_s)
+        answer: dict[str, Any] = pickle.loads(content)
+        if "failed" in answer:
+            words = self._last_words()
+            self.close()
+            at = "" if answer["at"] is None else f" at {answer['at']:g} s"
+            raise FmuError(f"{self.path.name}{at}: {printable(answer['failed'])}{words}")
+        return answer
+
+    def _gone(self, watch: "_Watch", deadline_s: float) -> FmuError:
+        self._process.kill()
+        code = self._process.wait()
+        words = self._last_words()
+        self.close()
+        if watch.late:
+            why = f"did not answer within {deadline_s:g} s (deadline_s)"
+        elif code < 0:
+            import signal
+
+            why = f"its process was ended by {signal.Signals(-code).name}"
+        else:
+            why = f"its process ended with code {code}"
+        return FmuError(f"{self.path.name}: {why}{words}")
+
+    def _last_words(self) -> str:
+        try:
+            text = (self._folder / "words").read_text(errors="replace")[-2000:]
+        except OSError:
+            return ""
+        lines = [printable(line) for line in text.splitlines() if line.strip()]
+        return f"; it printed: {shortened(' | '.join(lines[-3:]), 300)}" if lines else ""
+
+
+class _Watch:
+    """Kills a process that makes no communication point for too long."""
+
+    _thread: threading.Thread | None = None
+    _all: "set[_Watch]" = set()
+
+    def __init__(self, process: Any, beat: Any, deadline_s: float) -> None:
+        self._process, self._beat, self._deadline_s = process, beat, deadline_s
+        self.late = False
+
+    def start(self) -> None:
+        self._seen, self._since = int(self._beat[0]), time.monotonic()
+        cls = type(self)
+        cls._all.add(self)
+        if cls._thread is None or not cls._thread.is_alive():
+            cls._thread = threading.Thread(target=cls._watch, name="fmu watch", daemon=True)
+            cls._thread.start()
+
+    def stop(self) -> None:
+        type(self)._all.discard(self)
+
+    @classmethod
+    def _watch(cls) -> None:
+        while True:
+            time.sleep(_LOOK_S)
+            for watch in list(cls._all):
+                watch.look()
+
+    def look(self) -> None:
+        """Kill the process if it is late."""
+        beat, now = int(self._beat[0]), time.monotonic()
+        if beat != self._seen:
+            self._seen, self._since = beat, now
+        elif now - self._since > self._deadline_s:
+            self.late = True
+            self._process.kill()
+
+
+def _end(process: Any, folder: Path) -> None:
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        with suppress(OSError):
+            pipe.close()
+    process.wait()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _extract(path: Path, folder: Path) -> None:
+    """Unpack an FMU, nothing of it outside the folder."""
+    with zipfile.ZipFile(path) as archive:
+        root = folder.resolve()
+        for name in archive.namelist():
+            if "\\" in name or not (root / name).resolve().is_relative_to(root):
+                raise FmuError(f"{path.name} holds the path {printable(name)!r}")
+        archive.extractall(folder)
+
+
+_RUNNING: "WeakValueDictionary[tuple[str, int, int], FmuProcess]" = WeakValueDictionary()
+
+
+def process_for(path: Path, *, alone: bool) -> FmuProcess:
+    """Return the process in which instances of an FMU run, a new one where each needs its own."""
+    state = path.stat()
+    key = str(path), state.st_mtime_ns, os.getpid()
+    found = None if alone else _RUNNING.get(key)
+    if found is None or not found.close.alive:
+        found = FmuProcess(path)
+        if not alone:
+            _RUNNING[key] = found
+    return found

@@ -1,0 +1,104 @@
+"""What blocks remember of the runs they serve: columns over things, each of which is of a run."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, IntArray
+
+
+class KeyedTable:
+    """Columns over things of some runs, made anew at every change.
+
+    Parameters
+    ----------
+    **columns : ndarray, shape (..., n)
+        The things are on the last axis; ``replica`` says of which run each is. A column is asked
+        for as an attribute.
+    """
+
+    def __init__(self, **columns: Any) -> None:
+        self.columns = columns
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["columns"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def __len__(self) -> int:
+        return len(self.columns["replica"])
+
+    @classmethod
+    def empty(
+        cls, types: Mapping[str, type], shapes: Mapping[str, tuple[int, ...]] | None = None
+    ) -> Self:
+        """Return no things, of columns of some types; `shapes` are those before the last axis."""
+        shapes = shapes or {}
+        return cls(**{n: np.empty((*shapes.get(n, ()), 0), dtype=t) for n, t in types.items()})
+
+    def take(self, which: IntArray | BoolArray) -> Self:
+        """Return some of them."""
+        if which.dtype == bool:
+            if which.all():
+                return self
+            which = which.nonzero()[0]
+        if len(which) == 0:
+            return type(self)(**{name: v[..., :0] for name, v in self.columns.items()})
+        return type(self)(**{name: v.take(which, axis=-1) for name, v in self.columns.items()})
+
+    def with_columns(self, **columns: Any) -> Self:
+        """Return the same things with other values."""
+        return type(self)(**{**self.columns, **columns})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the things of all parts, one after the other."""
+        filled = [part for part in parts if len(part)] or [parts[0]]
+        if len(filled) == 1:
+            return filled[0]
+        names = filled[0].columns
+        return cls(**{n: np.concatenate([p.columns[n] for p in filled], axis=-1) for n in names})
+
+    def in_order(self) -> Self:
+        """Return them by run, and in their order in it."""
+        if bool((self.replica[1:] >= self.replica[:-1]).all()):
+            return self
+        return self.take(np.argsort(self.replica, kind="stable"))
+
+    def _only_of(self, runs: IntArray) -> bool:
+        """Whether all, which is in order, is of one run, the only one of some: the usual case."""
+        replica = self.columns["replica"]
+        return bool(len(replica) and replica[0] == replica[-1] == runs[0] == runs[-1])
+
+    def of(self, runs: IntArray) -> Self:
+        """Return what there is of some runs, which are in order."""
+        return self if self._only_of(runs) else self.take(np.isin(self.replica, runs))
+
+    def after(self, runs: IntArray, newer: Self, first_run: int) -> Self:
+        """Return `newer` of some runs, and what there is of others but those before the first."""
+        if len(self) == 0 or self._only_of(runs):
+            return newer.in_order()
+        others = (self.replica >= first_run) & ~np.isin(self.replica, runs)
+        return self.joined([self.take(others), newer]).in_order()
+
+    def continued(self, new: Self) -> Self:
+        """Return the row of each run of `new`, as it is there where this holds none."""
+        old = self.of(new.replica)
+        here = np.searchsorted(new.replica, old.replica)
+        columns = {name: values.copy() for name, values in new.columns.items()}
+        for name, values in columns.items():
+            values[..., here] = old.columns[name]
+        return type(self)(**columns)
+
+
+def turns(keys: IntArray) -> list[IntArray]:
+    """Return the first row of every key, then the second ones, and so on."""
+    if len(keys) == 0:
+        return []
+    order = np.argsort(keys, kind="stable")
+    begins = np.append(True, keys[order][1:] != keys[order][:-1])
+    turn = np.empty(len(keys), dtype=np.int64)
+    turn[order] = np.arange(len(keys)) - np.flatnonzero(begins)[np.cumsum(begins) - 1]
+    return np.split(np.argsort(turn, kind="stable"), np.cumsum(np.bincount(turn))[:-1])

@@ -1,0 +1,361 @@
+"""FMUs of other people as blocks of a scene."""
+
+import math
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from covering import covers
+
+from dsa_des.errors import BlockFailure, SceneError, SetupFailure
+
+FMU = ("foreign.fmu",)
+_CHAIN = [
+    "traffic -> transform -> gate",
+    "gate -> radar", "gate -> eo", "gate -> ir",
+    "radar -> fusion", "eo -> fusion", "ir -> fusion",
+    "fusion -> tracker",
+]  # fmt: skip
+
+
+def _values(tables, block, signal, element=0):
+    rows = tables["signals"].to_pylist()
+    chosen = [
+        r for r in rows if (r["block"], r["signal"], r["element"]) == (block, signal, element)
+    ]
+    return np.array([r["time_s"] for r in chosen]), np.array([r["value"] for r in chosen])
+
+
+def _scene(lab, path, text, name="scene.toml", base="first_light.toml", wires=(), duration_s=20):
+    """Write a shipped scene with blocks of our own beside it."""
+    listed = ", ".join(w if w.startswith("{") else f'"{w}"' for w in (*_CHAIN, *wires))
+    file = lab.folder / name
+    file.write_text(
+        f'extends = "{lab.configs / base}"\nduration_s = {duration_s}\nwires = [{listed}]\n'
+        + text.replace("LAG", str(path)),
+        encoding="utf-8",
+    )
+    return file
+
+
+def _left_behind():
+    ours = {p.name for p in Path(tempfile.gettempdir()).glob("dsa_des_fmu_*")}
+    running = set()
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes()
+            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+        except (OSError, ValueError):
+            continue
+        if b"worker.py" in words and parent == os.getpid():
+            running.add(entry.name)
+    return ours, running
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@covers("file", "scan_rate_hz", "offset_s", "start", of=FMU)
+def test_steps_are_those_of_the_closed_form(lab, lag, version):
+    start = "u = [3, 1, 2], " if version == 3 else "u = 6, "
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag(version)}"; scan_rate_hz = "10/3"; offset_s = 0.5; '
+                f'start = {{ {start}gain = 2, x = 1 }}'},
+        [], duration_s=6,
+    )  # fmt: skip
+    time_s, x = _values(lab.run(scene).tables, "lag", "x")
+    assert time_s == pytest.approx(0.5 + 0.3 * np.arange(19))
+    assert x == pytest.approx(12 - 11 * np.exp(0.5 - time_s), rel=1e-12)
+
+
+def test_it_returns_early_and_handles_its_events(lab, lag):
+    text = 'foreign.fmu; file = "{}"; scan_rate_hz = 10; start = {{ u = [1, 1, 1], events = {} }}'
+    plain, eventful = (
+        lab.run(lab.write({"lag": text.format(lag(), events)}, [], duration_s=1.05)).tables
+        for events in (0, 0.025)
+    )
+    _, steps = _values(eventful, "lag", "steps")
+    assert steps[-1] == 40  # four to each communication point
+    assert _values(eventful, "lag", "seen")[1][-1] == 1 + 30  # and one at the start
+    assert _values(plain, "lag", "steps")[1][-1] == 10
+    assert _values(eventful, "lag", "x")[1] == pytest.approx(_values(plain, "lag", "x")[1], 1e-12)
+
+
+@covers("outputs", of=FMU)
+def test_arrays_have_the_length_that_the_scene_says(lab, lag):
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 1; outputs = ["xu", "largest"]; '
+                "start = { n = 2, u = [3, 4], x = 2 }"},
+        [], duration_s=1,
+    )  # fmt: skip
+    rows = lab.run(scene).tables["signals"].to_pylist()
+    assert [(r["signal"], r["element"], r["value"]) for r in rows[:2]] == [
+        ("xu", 1, 6.0), ("xu", 2, 8.0)
+    ]  # fmt: skip
+    assert rows[2]["text"] == str(2**64 - 1)
+
+
+@covers("inputs", of=FMU)
+def test_windows_and_wires_change_nothing(lab, lag):
+    scene = _scene(lab, lag(), """
+[blocks.lag]
+type = "foreign.fmu"
+file = "LAG"
+inputs = { "u[1]" = "traffic.own_alt_m", "u[2]" = "tracker.range_m[crossing]" }
+[blocks.second]
+type = "foreign.fmu"
+file = "LAG"
+scan_rate_hz = 7
+inputs = { "u[3]" = "lag.x" }
+""", wires=["traffic -> lag", "tracker -> lag", "lag -> second"], duration_s=6)  # fmt: skip
+    whole = lab.run(scene).tables
+    for window in (1, 13):
+        for name, table in lab.run(scene, window=window).tables.items():
+            assert table.equals(whole[name]), (name, window)
+    tracks = [r for r in whole["tracks"].to_pylist() if r["target"] == "crossing"]
+    xu = _values(whole, "lag", "xu", 2)
+    x = _values(whole, "lag", "x")
+    at = np.searchsorted(xu[0], tracks[-1]["time_s"])
+    assert xu[1][at] == pytest.approx(x[1][at] * tracks[-1]["range_m"] / 0.3048)
+    assert _values(whole, "lag", "xu", 1)[1] == pytest.approx(x[1] * 1000 / 0.3048)
+    # The second one holds what the first said last.
+    time_s, given = _values(whole, "second", "xu", 3)
+    held = x[1][np.searchsorted(x[0], time_s, side="right") - 1]
+    assert given == pytest.approx(held * _values(whole, "second", "x")[1])
+
+
+_LOOP = """
+[blocks.radar]
+scan_rate_hz = 1
+[blocks.eo]
+scan_rate_hz = 1
+[blocks.ir]
+scan_rate_hz = 1
+[blocks.pilot]
+type = "foreign.fmu"
+file = "LAG"
+outputs = ["x"]
+inputs = { "u[1]" = "tracker.range_m[crossing]" }
+manoeuvre = { turn_rad = "turn", rate_rad_s = "turn_rate" }
+"""
+_BACK = '{ from = "pilot", to = "traffic", delay_s = 0.001, holds = "nothing" }'
+
+
+@covers("manoeuvre", of=FMU)
+def test_one_that_can_be_taken_back_looks_ahead_in_a_loop(lab, lag):
+    wires = ["tracker -> pilot", _BACK]
+    scene = _scene(lab, lag(), _LOOP, wires=wires, duration_s=110)
+    ahead, by_scans = lab.run(scene), lab.run(scene, window=1)
+    assert ahead.simulation.slow == {} and "pilot" in ahead.outcome.windowed
+    for name, table in ahead.tables.items():
+        assert table.equals(by_scans.tables[name]), name
+    turn = [r["turn_rad"] for r in ahead.tables["manoeuvres"].to_pylist()]
+    assert turn and turn[0] == 0.5
+
+
+def test_one_that_cannot_says_so(lab, lag):
+    path = lag(rewindable=False)
+    scene = _scene(lab, path, _LOOP, wires=["tracker -> pilot", _BACK], duration_s=2)
+    said = str(lab.run(scene).simulation.slow)
+    assert "cannot" not in said and "not all blocks can be rewound: " in said and "pilot" in said
+
+
+@covers("ownship", of=FMU)
+def test_traffic_goes_on_with_the_ownship_where_the_fmu_flies_it(lab, lag):
+    text = """
+[blocks.dynamics]
+type = "foreign.fmu"
+file = "LAG"
+start = { x = "500 m", u = ["500 m", 0, 0] }
+ownship = { own_alt_m = "x" }
+"""
+    scene = _scene(lab, lag(), text)
+    wired = scene.read_text("utf-8").replace("traffic ->", "traffic -> dynamics ->")
+    (lab.folder / "flown.toml").write_text(wired, encoding="utf-8")
+    flown = lab.run(lab.folder / "flown.toml").tables["detections"].to_pylist()
+    low = lab.run(
+        lab.configs / "first_light.toml",
+        sets=("blocks.traffic.ownship.alt_m=500", "duration_s=20",
+              "blocks.traffic.intruders[0].up_m=530", "blocks.traffic.intruders[1].up_m=650"),
+    ).tables["detections"].to_pylist()  # fmt: skip
+    radar = [
+        [(r["tick"], r["target"], r["true_elevation_rad"]) for r in rows if r["block"] == "radar"]
+        for rows in (flown, low)
+    ]
+    assert radar[0] and [r[:2] for r in radar[0]] == [r[:2] for r in radar[1]]
+    assert [r[2] for r in radar[0]] == pytest.approx([r[2] for r in radar[1]], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (1, "at 0.6 s: fmi3DoStep returned Error: valve stuck"),
+        (2, "did not answer within 0.5 s"),
+        (3, "ended by SIGABRT; it printed: last words"),
+        (4, "ended with code 0"),
+    ],
+)
+@covers("deadline_s", of=FMU)
+def test_one_clear_error_and_nothing_left(lab, lag, fault, said):
+    before = _left_behind()
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; deadline_s = 0.5; '
+                f"start = {{ fault = {fault} }}"},
+        [], duration_s=2,
+    )  # fmt: skip
+    with pytest.raises(BlockFailure) as caught:
+        lab.run(scene)
+    assert caught.value.exit_code == 3
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+    now = _left_behind()
+    assert now[0] <= before[0] and now[1] <= before[1]
+
+
+def test_one_that_refuses_to_start_cannot_be_used(lab, lag):
+    path = lag()
+    import zipfile
+
+    other = lab.folder / "other.fmu"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(other, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b'Token="lag"', b'Token="x"'))
+    with pytest.raises(SetupFailure) as caught:
+        lab.run(lab.write({"b": f'foreign.fmu; file = "{other}"; scan_rate_hz = 1'}, []))
+    assert caught.value.exit_code == 2 and "cannot be instantiated" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("start = { gian = 1 }", "has no variable 'gian'; did you mean 'gain'"),
+        ("start = { gain = true }", "'gain' is True: a number is needed"),
+        ("start = { u = [1, 2] }", "'u' has 2 values where it needs 3"),
+        ('start = { x = "3 s" }', "is in 'ft', which 's' cannot be made into"),
+        ("start = { fault = 3000000000 }", "it must be from -2147483648 to 2147483647"),
+        ('outputs = ["y"]', "has no variable 'y'"),
+        ('inputs = { "u[4]" = "a.b" }', "'u' has the elements 1 to 3"),
+        ('inputs = { "u[1]" = "traffic" }', "it must be BLOCK.COLUMN"),
+        ('inputs = { x = "a.b" }', "has no input 'x'"),
+        ("clocks = { tick = [1] }", "has no triggered input clock 'tick'"),
+        ('manoeuvre = { turn_rad = "x" }', "is in 'ft', which 'rad' cannot be made into"),
+        ('ownship = { own_alt = "x" }', "there is no 'own_alt'; did you mean 'own_alt_m'"),
+    ],
+)  # fmt: skip
+def test_what_a_scene_says_wrongly(lab, lag, keys, said):
+    path = lag()
+    scene = lab.write({"lag": f'foreign.fmu; file = "{path}"; scan_rate_hz = 1; {keys}'}, [])
+    assert any(said in str(problem) for problem in lab.problems(scene)), lab.problems(scene)
+
+
+def test_other_platforms_and_other_files_are_refused(lab, lag):
+    path = lag(platform="aarch64-darwin")
+    text = 'foreign.fmu; file = "{}"; scan_rate_hz = 1'
+    assert "only for aarch64-darwin" in str(
+        lab.problems(lab.write({"b": text.format(path)}, []))[0]
+    )
+    path.write_bytes(b"no archive")
+    assert "is no FMU that can be read" in str(
+        lab.problems(lab.write({"b": text.format(path)}, []))[0]
+    )
+
+
+def test_a_column_that_is_not_there_is_named_with_the_nearest(lab, lag):
+    text = """
+[blocks.lag]
+type = "foreign.fmu"
+file = "LAG"
+inputs = { "u[1]" = "traffic.own_alt" }
+"""
+    scene = _scene(lab, lag(), text, wires=["traffic -> lag"], duration_s=1)
+    with pytest.raises(BlockFailure, match="no column 'own_alt'; did you mean 'own_alt_m'"):
+        lab.run(scene)
+    scene.write_text(scene.read_text("utf-8").replace("traffic.own_alt", "trafic.own_alt_m"))
+    with pytest.raises(SceneError, match="no wire comes from 'trafic'; did you mean 'traffic'"):
+        lab.run(scene)
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "end"), [("BouncingBall", 100, 3), ("Feedthrough", 10, 2)]
+)
+def test_reference_fmus_give_their_published_output(lab, reference_fmus, name, rate, end):
+    import csv
+
+    file = reference_fmus / f"{name}.fmu"
+    kind = f'foreign.fmu; file = "{file}"; scan_rate_hz = {rate}'
+    scene = lab.write({"a": kind, "b": kind}, [], duration_s=f"{end}.001")
+    rows = lab.run(scene).tables["signals"].to_pylist()
+    got = {(r["block"], round(r["time_s"], 9), r["signal"]): r["text"] or r["value"] for r in rows}
+    with open(reference_fmus / f"{name}_out.csv", encoding="utf-8") as lines:
+        for line in csv.DictReader(lines):
+            time_s = round(float(line.pop("time")), 9)
+            for signal, word in line.items():
+                for block in "ab":
+                    value = got[block, time_s, signal]
+                    if isinstance(value, str):
+                        assert value == word
+                    else:
+                        number = {"true": 1.0, "false": 0.0}.get(word, word)
+                        assert value == pytest.approx(float(number), rel=1e-12, abs=1e-12)
+
+
+@covers("clocks", of=FMU)
+def test_clocks_tick_at_exact_instants(lab, reference_fmus):
+    scene = lab.write(
+        {"c": f'foreign.fmu; file = "{reference_fmus / "Clocks.fmu"}"; '
+              "clocks = { inClock2 = [0, 1, 8, 9] }"},
+        [], duration_s=10,
+    )  # fmt: skip
+    tables = lab.run(scene).tables
+    last = {name: _values(tables, "c", name)[1][-1] for name in (
+        "inClock1Ticks", "inClock2Ticks", "inClock3Ticks", "totalInClockTicks")}  # fmt: skip
+    assert list(last.values()) == [10, 4, 1, 15]
+    time_s, raised = _values(tables, "c", "outClock")
+    assert time_s[raised > 0].tolist() == [2, 6, 9]  # where the ticks are 5, 10 and 15
+    assert not math.isnan(raised[0])
+
+
+def test_one_that_ends_gives_nothing_more(lab, lag):
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; '
+                "start = { events = 0.05, fault = 5 }"},
+        [], duration_s=2,
+    )  # fmt: skip
+    for window in (None, 1):
+        time_s, _ = _values(lab.run(scene, window=window).tables, "lag", "x")
+        assert time_s[-1] == pytest.approx(0.5)  # it asks to at its event at 0.55 s
+
+
+def test_a_terminal_takes_its_members_from_one_message(lab, lag):
+    import zipfile
+
+    path = lag()
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(
+            "terminalsAndIcons/terminalsAndIcons.xml",
+            '<fmiTerminalsAndIcons><Terminals><Terminal name="Nav" matchingRule="plug">'
+            '<TerminalMemberVariable variableName="u" memberName="own_alt_m" '
+            'variableKind="signal"/></Terminal></Terminals></fmiTerminalsAndIcons>',
+        )
+    text = """
+[blocks.lag]
+type = "foreign.fmu"
+file = "LAG"
+start = { n = 1 }
+inputs = { Nav = "traffic" }
+"""
+    tables = lab.run(_scene(lab, path, text, wires=["traffic -> lag"], duration_s=2)).tables
+    x = _values(tables, "lag", "x")[1]
+    assert _values(tables, "lag", "xu", 1)[1] == pytest.approx(x * 1000 / 0.3048)
+    assert x[-1] > 0
+
+
+def test_what_has_no_solver_is_refused(lab, lag):
+    import zipfile
+
+    path, other = lag(), lab.folder / "other.fmu"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(other, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"<CoSimulation", b"<ModelExchange"))
+    scene = lab.write({"b": f'foreign.fmu; file = "{other}"; scan_rate_hz = 1'}, [])
+    assert "made for model exchange only" in str(lab.problems(scene)[0])
