@@ -110,11 +110,11 @@ def test_answers():
     """Each key by its own transponder; counts of 600 scans within four deviations."""
     in_1_s = {"mode_s_in_1_s": 0.3, "mode_c_in_1_s": 0.6}
     for craft, p in (({"mode_s": True}, 0.3), ({"mode_c": True}, 0.6)):
-        count = {
-            replies: len(fleet("surveillance.active", craft, duration_s=600, replies=replies,
-                               **in_1_s))
-            for replies in ("rounds", "certain")
-        }  # fmt: skip
+        count = {}
+        for replies, confidence in (("rounds", p), ("certain", 1.0)):
+            found = fleet("surveillance.active", craft, duration_s=600, replies=replies, **in_1_s)
+            assert {row["confidence"] for row in found} == {confidence}
+            count[replies] = len(found)
         assert count["certain"] == 600
         assert abs(count["rounds"] - 600 * p) < 4.0 * np.sqrt(600 * p * (1.0 - p))
 
