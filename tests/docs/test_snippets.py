@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 from snippets import (
     PAGES,
     ROOT,
@@ -172,3 +173,20 @@ def test_a_page_that_fails_is_seen(tmp_path: Path) -> None:
         play(snippets_of("p.md", "```\ndsa-des check unknown_scene.toml\n```\n"), tmp_path)
     with pytest.raises(NameError):
         play(snippets_of("p.md", "```python\nnobody_defined_this\n```\n"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("page", "scene"), [("README.md", "first_light"), ("docs/tutorial.md", "mine.toml")]
+)
+def test_what_a_page_says_a_run_prints_is_printed(
+    page: str, scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for part in text.split("<!-- file: mine.toml -->\n```toml\n")[1:]:
+        Path("mine.toml").write_text(part.partition("```")[0], encoding="utf-8")
+    done = CliRunner().invoke(main, ["run", scene, "--no-figures"])
+    printed = [line.rstrip() for line in done.stdout.splitlines()]
+    *_, said = (part.partition("```")[0] for part in text.split("```text\n")[1:])
+    lines = [line.rstrip() for line in said.splitlines()]
+    assert lines and all(line in printed for line in lines), lines
