@@ -8,7 +8,6 @@ the text below the title. Sections that are not named keep what the page says.
 import argparse
 import importlib
 import pkgutil
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -83,4 +82,4 @@ def _without_title(text: str) -> str:
 
 if __name__ == "__main__":
     with plain_ending():
-        sys.exit(main())
+        main()
