@@ -36,7 +36,8 @@ def detected(kind, seed, *, targets, duration_s, roll_deg=20.0):
     """Return the columns of what a shipped sensor detects."""
     scene = chain(
         {"sensor": {"extends": str(SENSORS / f"do365_{kind}.toml")}},
-        ownship={**OWNSHIP, "roll_deg": roll_deg}, targets=targets, duration_s=duration_s, seed=seed,
+        ownship={**OWNSHIP, "roll_deg": roll_deg}, targets=targets, duration_s=duration_s,
+        seed=seed,
     )  # fmt: skip
     table = dsa_des.run(scene)["detections"]
     return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}

@@ -25,12 +25,12 @@ distances ten times a second, as it does.
 
 _TRACKED = """
 **Not compared: its tracked radar and tracked active surveillance.** Both state errors of tracks by
-DO-365's Table 2-20, whose formulas have the range in nautical miles. `SC228_TrackedRadarModel.m` (with
-`az_stddev_ft = 125*(10000 - DEGAS.nm2ft) + 250`, and likewise for elevation and both rates) and
-`SC228_TrackedActiveSurveillanceModel.m` put feet in their place: the standard deviation across the line
-of sight comes out as {across_ft:,.0f} ft, where the table's own bound is 250 ft at 1 nmi and 1,375 ft at
-10 nmi. It is an easy slip to make and easily mended; until then these two are no reference, and we leave
-them out. The untracked sensors are not touched by it.
+DO-365's Table 2-20, whose formulas have the range in nautical miles. `SC228_TrackedRadarModel.m`
+(with `az_stddev_ft = 125*(10000 - DEGAS.nm2ft) + 250`, and likewise for elevation and both rates)
+and `SC228_TrackedActiveSurveillanceModel.m` put feet in their place: the standard deviation across
+the line of sight comes out as {across_ft:,.0f} ft, where the table's own bound is 250 ft at 1 nmi
+and 1,375 ft at 10 nmi. It is an easy slip to make and easily mended; until then these two are no
+reference, and we leave them out. The untracked sensors are not touched by it.
 """
 
 
@@ -44,12 +44,12 @@ class Flown(NamedTuple):
 
 
 def flown(truth: Any) -> Flown:
-    """Return the least horizontal distance, and when well clear was lost, of a table of the truth."""
+    """Return the least horizontal distance and the loss of well clear, of a table of truth."""
     is_own = truth["target"].is_null().to_numpy()
     columns = [truth[name].to_numpy() for name in ("lat_deg", "lon_deg", "alt_m", "time_s")]
     *own, time_s = (column[is_own] for column in columns)
     *other, _ = (column[~is_own] for column in columns)
-    azimuth, elevation, range_m = line_of_sight(*own, *other)
+    _, elevation, range_m = line_of_sight(*own, *other)
     level_ft = range_m * np.cos(elevation) / FOOT_M
     apart_ft = np.abs(other[2] - own[2]) / FOOT_M
     nearest = int(np.argmin(level_ft))
