@@ -7,7 +7,7 @@ import numpy as np
 
 import dsa_des
 from components.geometry import line_of_sight
-from docs.make.published.rows import Row, table
+from docs.make.published.rows import PublishedRow, table
 
 TITLE = "DEGAS, from encounter to metric"
 ORDER = 1
@@ -58,14 +58,14 @@ def flown(truth: Any) -> Flown:
     return Flown(float(level_ft[nearest]), float(time_s[nearest]), *lost)
 
 
-def unmitigated() -> list[Row]:
+def unmitigated() -> list[PublishedRow]:
     """Return what happens if nobody gives way."""
     found = flown(dsa_des.run("published/degas_unmitigated")["truth"])
     return [
-        Row("unmitigated: least separation", 684.54, found.least_ft, "ft", 1.0, digits=2),
-        Row("its time", 150.1, found.least_at_s, "s", 0.1, digits=1),
-        Row("well clear lost from", 141.0, found.lost_from_s, "s", 0.1, digits=1),
-        Row("for", 18.0, found.lost_s, "s", 0.1, digits=1),
+        PublishedRow("unmitigated: least separation", 684.54, found.least_ft, "ft", 1.0, digits=2),
+        PublishedRow("its time", 150.1, found.least_at_s, "s", 0.1, digits=1),
+        PublishedRow("well clear lost from", 141.0, found.lost_from_s, "s", 0.1, digits=1),
+        PublishedRow("for", 18.0, found.lost_s, "s", 0.1, digits=1),
     ]
 
 

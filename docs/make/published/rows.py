@@ -14,7 +14,7 @@ _HEAD = (
 
 
 @dataclass(frozen=True)
-class Row:
+class PublishedRow:
     """One published number beside ours.
 
     Parameters
@@ -71,6 +71,6 @@ class Row:
         return "0" if round(off, self.digits) == 0 else f"{off:+.{self.digits}f}"
 
 
-def table(rows: Iterable[Row]) -> str:
+def table(rows: Iterable[PublishedRow]) -> str:
     """Return the table of some rows."""
     return "\n".join([*_HEAD, *(row.line() for row in rows)])

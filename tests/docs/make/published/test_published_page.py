@@ -4,7 +4,7 @@ import pytest
 
 from docs.make.published import __main__ as maker
 from docs.make.published import degas
-from docs.make.published.rows import Row, table
+from docs.make.published.rows import PublishedRow, table
 
 PAGE = maker.PAGE.read_text(encoding="utf-8")
 
@@ -12,12 +12,12 @@ PAGE = maker.PAGE.read_text(encoding="utf-8")
 @pytest.mark.parametrize(
     ("row", "verdict"),
     [
-        (Row("r", 1.0, 1.04, within=0.05), "equal"),
-        (Row("r", 1.0, 1.06, within=0.05), "outside"),
-        (Row("r", 1.0, 1.2, interval=(0.9, 1.5)), "inside"),
-        (Row("r", 1.0, 1.2, interval=(1.1, 1.5)), "outside"),
-        (Row("r", 1.0, 1.2, interval=(1.1, 1.5), within=0.2), "equal"),
-        (Row("r", 1.0, float("nan"), within=0.2), "outside"),
+        (PublishedRow("r", 1.0, 1.04, within=0.05), "equal"),
+        (PublishedRow("r", 1.0, 1.06, within=0.05), "outside"),
+        (PublishedRow("r", 1.0, 1.2, interval=(0.9, 1.5)), "inside"),
+        (PublishedRow("r", 1.0, 1.2, interval=(1.1, 1.5)), "outside"),
+        (PublishedRow("r", 1.0, 1.2, interval=(1.1, 1.5), within=0.2), "equal"),
+        (PublishedRow("r", 1.0, float("nan"), within=0.2), "outside"),
     ],
 )
 def test_verdicts(row, verdict):
@@ -26,7 +26,7 @@ def test_verdicts(row, verdict):
 
 
 def test_a_row_shows_what_it_is_made_of():
-    row = Row("least range", 100.0, 101.25, "ft", interval=(99.0, 103.0), digits=1)
+    row = PublishedRow("least range", 100.0, 101.25, "ft", interval=(99.0, 103.0), digits=1)
     assert row.line() == ("| least range | 100.0 ft | 101.2 ft (99.0 to 103.0) | +1.2 | inside |")
     assert table([row]).count("\n") == 2
 
