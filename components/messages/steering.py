@@ -34,6 +34,11 @@ class Manoeuvre(NamedTuple):
         Change of vertical speed, which is kept then.
     vertical_acceleration_mps2 : float
         Of that change, above 0 where there is one.
+    heading_rad : float
+        Track that is turned to, at up to `rate_rad_s`, in place of a change; where it is eased.
+    eases_rad : float
+        Within so much of that track the rate falls in proportion, and the bank takes its time;
+        above 0 where a track is turned to.
     """
 
     turn_rad: float = 0.0
@@ -44,6 +49,8 @@ class Manoeuvre(NamedTuple):
     acceleration_mps2: float = 0.0
     vertical_speed_mps: float = 0.0
     vertical_acceleration_mps2: float = 0.0
+    heading_rad: float = 0.0
+    eases_rad: float = 0.0
 
 
 @dataclass(eq=False)
@@ -64,6 +71,8 @@ class Manoeuvres(Message):
         Change of ground speed, and how fast.
     vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
         Change of vertical speed, and how fast.
+    heading_rad, eases_rad : (rows,), optional
+        Track that is turned to, and within how much of it the turn is eased; 0 for none.
     """
 
     row_table = "manoeuvres"
@@ -89,6 +98,13 @@ class Manoeuvres(Message):
     )
     vertical_acceleration_mps2: FloatArray = column(
         "m/s²", "", "acceleration of that change", of=PER_ROW, default=None
+    )
+
+    heading_rad: FloatArray = column(
+        "rad", "NED", "track that is turned to, where the turn is eased", of=PER_ROW, default=None
+    )
+    eases_rad: FloatArray = column(
+        "rad", "", "within so much of it the turn is eased; 0 for none", of=PER_ROW, default=None
     )
 
     def __post_init__(self) -> None:
