@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame
-from components.foreign.reported_look import reported_look
+from components.foreign.reported_look import reported_looks
 from components.messages.detections import Detections, SensorOffer
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
@@ -277,7 +277,8 @@ class Process(Component):
             zero = np.zeros(1, dtype=np.int64)
             looks = {n: v[:1] if count else np.full(1, np.nan) for n, v in numbers.items()
                      if n.startswith("own_")}  # fmt: skip
-            return reported_look(tick, zero - 1, numbers, looks, target, roster)
+            offsets = np.array([0, count])
+            return reported_looks(tick, zero - 1, offsets, numbers, looks, target, roster)
         return Tracks(
             tick=tick, offsets=np.array([0, count]), target=target,
             **{column: numbers[column] for column in _LINE},
