@@ -22,7 +22,6 @@ from dsa_des.block.effect import Effect, Verdict
 from dsa_des.errors import Disagreements
 
 
-
 class RadarErrorParameters(ResolutionParameters):
     """Errors of range and range rate, and whether the latter is measured."""
 

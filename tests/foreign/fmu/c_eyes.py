@@ -170,5 +170,7 @@ def _of_two() -> list[str]:
             inner = f'<Real start="0" unit="{unit}"/>'
             lines.append(variable(f"plane[{i}].{name}", base + 6 + k, "input", inner))
         for k, (name, unit) in enumerate(_OUTPUTS):
-            lines.append(variable(f"plane[{i}].{name}", base + k, "output", f'<Real unit="{unit}"/>'))
+            lines.append(
+                variable(f"plane[{i}].{name}", base + k, "output", f'<Real unit="{unit}"/>')
+            )
     return lines

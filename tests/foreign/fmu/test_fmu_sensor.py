@@ -61,9 +61,7 @@ def expected(run):
         me = own[row["tick"]]
         ned = pymap3d.geodetic2ned(*(r[n] for r in (row, me) for n in ("lat_deg", "lon_deg",
                                                                        "alt_m")))  # fmt: skip
-        turn = Rotation.from_euler(
-            "ZYX", [me["heading_rad"], me["pitch_rad"], me["roll_rad"]]
-        )
+        turn = Rotation.from_euler("ZYX", [me["heading_rad"], me["pitch_rad"], me["roll_rad"]])
         x, y, z = turn.inv().apply(ned)
         far = math.sqrt(x * x + y * y + z * z)
         found[row["tick"], row["target"]] = math.atan2(y, x), math.asin(-z / far), far
