@@ -13,7 +13,6 @@ import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.foreign.fmu.model import TEXT_KINDS, FmuModel
-from components.foreign.fmu.units import unit_of_column
 from components.foreign.reported_look import reported_looks
 from components.geometry import wrap_pi
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE

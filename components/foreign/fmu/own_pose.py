@@ -1,4 +1,4 @@
-"""What messages say of the ownship: its pose as believed, and its velocity; held until news come."""
+"""What messages say of the ownship: its pose as believed, its velocity; held until news come."""
 
 from typing import Any
 

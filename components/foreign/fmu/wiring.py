@@ -1,4 +1,4 @@
-"""How a scene wires an FMU: which variables are read and set, in which units, and all that is wrong.
+"""How a scene wires an FMU: which variables are read and set, in which units, and what is wrong.
 
 Nothing here runs; `components.foreign.fmu.block` goes by it.
 """

@@ -13,7 +13,8 @@ _MODEL = r"""
 #include <math.h>
 #define MOST 4
 #define DEG (180.0 / 3.14159265358979323846)
-typedef struct { double t, in[3][MOST], before[MOST], rate[MOST], reach; int n; char label[32]; } Eye;
+typedef struct { double t, in[3][MOST], before[MOST], rate[MOST], reach; int n; char label[32];
+} Eye;
 static Eye *fresh(void) { Eye *m = calloc(1, sizeof(Eye)); m->n = 2; m->reach = 1e9; return m; }
 static void step(Eye *m, double h) {
   for (int i = 0; i < m->n; i++) {

@@ -6,7 +6,7 @@ import numpy as np
 import pymap3d
 import pytest
 from covering import covers
-from crooked import OWNSHIP, TARGETS
+from crooked import TARGETS
 from scipy.spatial.transform import Rotation
 from wired import chain
 
