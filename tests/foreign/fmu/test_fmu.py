@@ -49,7 +49,7 @@ def _left_behind():
             parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
         except (OSError, ValueError):
             continue
-        if b"worker.py" in words and parent == os.getpid():
+        if b"fmu.worker" in words and parent == os.getpid():
             running.add(entry.name)
     return ours, running
 
@@ -191,8 +191,8 @@ ownship = { own_alt_m = "x" }
     [
         (1, "at 0.6 s: fmi3DoStep returned Error: valve stuck"),
         (2, "did not answer within 0.5 s"),
-        (3, "ended by SIGABRT; it printed: last words"),
-        (4, "ended with code 0"),
+        (3, "died of signal 6 (SIGABRT); it printed: last words"),
+        (4, "ended with exit code 0"),
     ],
 )
 @covers("deadline_s", of=FMU)
