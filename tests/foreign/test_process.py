@@ -273,9 +273,21 @@ def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
 
 
 def test_a_program_that_cannot_be_taken_back_says_so(folder):
-    with pytest.raises(BlockFailure, match="cannot hand out its state .* leave out snapshots"):
+    with pytest.raises(BlockFailure, match=r"cannot hand out its state .* leave out snapshots"):
         dsa_des.run(scene(canned("slow", 0, folder), snapshots=True))
     assert gone(folder)
+
+
+def test_a_run_says_which_program_makes_others_go_scan_by_scan(folder):
+    found = scene(canned("slow", 0, folder))
+    notes = dsa_des.run(found, out=folder / "run").info["notes"]
+    (said,) = (note for note in notes if note.startswith("blocks.part: "))
+    assert "foreign.process" in said or "components.foreign.process:Process" in said
+    assert "because of it fusion run scan by scan" in said
+    found["wires"] = [wire for wire in found["wires"] if wire != "eye -> part -> fusion"]
+    found["wires"] += ["eye -> part"]  # nothing is behind it now
+    notes = dsa_des.run(found, out=folder / "run").info.get("notes", [])
+    assert not any("scan by scan" in note for note in notes)
 
 
 def state_tracks(**changes):
