@@ -34,11 +34,18 @@ class Manoeuvre(NamedTuple):
         Change of vertical speed, which is kept then.
     vertical_acceleration_mps2 : float
         Of that change, above 0 where there is one.
+<<<<<<< HEAD
     heading_rad : float
         Track that is turned to, at up to `rate_rad_s`, in place of a change; where it is eased.
     eases_rad : float
         Within so much of that track the rate falls in proportion, and the bank takes its time;
         above 0 where a track is turned to.
+=======
+    bank_rad : float
+        In place of the turn's rate, above 0: the rate is what this bank gives at the speed flown.
+    roll_rate_rad_s : float
+        How fast the bank of the turn is built up; 0 for at once.
+>>>>>>> main
     """
 
     turn_rad: float = 0.0
@@ -49,8 +56,13 @@ class Manoeuvre(NamedTuple):
     acceleration_mps2: float = 0.0
     vertical_speed_mps: float = 0.0
     vertical_acceleration_mps2: float = 0.0
+<<<<<<< HEAD
     heading_rad: float = 0.0
     eases_rad: float = 0.0
+=======
+    bank_rad: float = 0.0
+    roll_rate_rad_s: float = 0.0
+>>>>>>> main
 
 
 @dataclass(eq=False)
@@ -62,7 +74,7 @@ class Manoeuvres(Message):
     turn_rad : (rows,)
         Change of heading, positive to the right; 0 for a climb or descent.
     rate_rad_s : (rows,)
-        Rate of the turn, above 0 where there is one.
+        Rate of the turn, above 0 where there is one that has no bank.
     climb_m : (rows,), optional
         Change of altitude, positive upward; 0 for a turn, and by default.
     climb_rate_mps : (rows,), optional
@@ -71,8 +83,13 @@ class Manoeuvres(Message):
         Change of ground speed, and how fast.
     vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
         Change of vertical speed, and how fast.
+<<<<<<< HEAD
     heading_rad, eases_rad : (rows,), optional
         Track that is turned to, and within how much of it the turn is eased; 0 for none.
+=======
+    bank_rad, roll_rate_rad_s : (rows,), optional
+        Bank in place of the turn's rate, and how fast it is built up; 0 for neither.
+>>>>>>> main
     """
 
     row_table = "manoeuvres"
@@ -98,6 +115,12 @@ class Manoeuvres(Message):
     )
     vertical_acceleration_mps2: FloatArray = column(
         "m/s²", "", "acceleration of that change", of=PER_ROW, default=None
+    )
+    bank_rad: FloatArray = column(
+        "rad", "", "bank of that turn, where it has no rate", of=PER_ROW, default=None
+    )
+    roll_rate_rad_s: FloatArray = column(
+        "rad/s", "", "rate at which the bank is built up; 0: at once", of=PER_ROW, default=None
     )
 
     heading_rad: FloatArray = column(
