@@ -166,22 +166,11 @@ class SteeringPlan(NamedTuple):
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
         """Return it with the parts that a manoeuvre changes, from an altitude; the others stay."""
         plan = self
-<<<<<<< HEAD
+        speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
-            plan = plan._replace(
-                turns=turning.eased(manoeuvre, _mean(self.speeds, 0.0, self.speed_mps))
-            )
+            plan = plan._replace(turns=turning.eased(manoeuvre, speed_now_mps))
         elif manoeuvre.turn_rad != 0.0:
-            rate_deg_s = math.copysign(math.degrees(manoeuvre.rate_rad_s), manoeuvre.turn_rad)
-            angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
-            plan = plan._replace(
-                turns=((angle_rad / abs(math.radians(rate_deg_s)), rate_deg_s, 0.0),)
-            )
-=======
-        if manoeuvre.turn_rad != 0.0:
-            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
-            plan = plan._replace(turns=_turn(manoeuvre, speed_mps))
->>>>>>> main
+            plan = plan._replace(turns=_turn(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
             climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
@@ -328,7 +317,7 @@ def flown_from(
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
             )
-            rate_rad_s = turned_rad / (2.0 * _BASE_S)
+            rate_rad_s = turned_rad / base_s[row]
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             elapsed_s = at_s - earlier.start_time_s

@@ -34,18 +34,15 @@ class Manoeuvre(NamedTuple):
         Change of vertical speed, which is kept then.
     vertical_acceleration_mps2 : float
         Of that change, above 0 where there is one.
-<<<<<<< HEAD
+    bank_rad : float
+        In place of the turn's rate, above 0: the rate is what this bank gives at the speed flown.
+    roll_rate_rad_s : float
+        How fast the bank of the turn is built up; 0 for at once.
     heading_rad : float
         Track that is turned to, at up to `rate_rad_s`, in place of a change; where it is eased.
     eases_rad : float
         Within so much of that track the rate falls in proportion, and the bank takes its time;
         above 0 where a track is turned to.
-=======
-    bank_rad : float
-        In place of the turn's rate, above 0: the rate is what this bank gives at the speed flown.
-    roll_rate_rad_s : float
-        How fast the bank of the turn is built up; 0 for at once.
->>>>>>> main
     """
 
     turn_rad: float = 0.0
@@ -56,13 +53,10 @@ class Manoeuvre(NamedTuple):
     acceleration_mps2: float = 0.0
     vertical_speed_mps: float = 0.0
     vertical_acceleration_mps2: float = 0.0
-<<<<<<< HEAD
-    heading_rad: float = 0.0
-    eases_rad: float = 0.0
-=======
     bank_rad: float = 0.0
     roll_rate_rad_s: float = 0.0
->>>>>>> main
+    heading_rad: float = 0.0
+    eases_rad: float = 0.0
 
 
 @dataclass(eq=False)
@@ -83,13 +77,10 @@ class Manoeuvres(Message):
         Change of ground speed, and how fast.
     vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
         Change of vertical speed, and how fast.
-<<<<<<< HEAD
-    heading_rad, eases_rad : (rows,), optional
-        Track that is turned to, and within how much of it the turn is eased; 0 for none.
-=======
     bank_rad, roll_rate_rad_s : (rows,), optional
         Bank in place of the turn's rate, and how fast it is built up; 0 for neither.
->>>>>>> main
+    heading_rad, eases_rad : (rows,), optional
+        Track that is turned to, and within how much of it the turn is eased; 0 for none.
     """
 
     row_table = "manoeuvres"
