@@ -1,6 +1,6 @@
 """The pictures of the operator's display, from the shipped session in a Chromium.
 
-``python -m docs.make.display docs/images`` makes them; it needs the extra ``view``, the package
+``python -m docs.make.pictures.display docs/images`` makes them; it needs the extra ``view``, the package
 playwright and a Chromium. When a page draws is chance, so no two pictures are the same.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 from dsa_des.terminal.interruption import plain_ending
 
-_SESSION = Path(__file__).parents[2] / "configs" / "operator" / "session.toml"
+_SESSION = Path(__file__).parents[3] / "configs" / "operator" / "session.toml"
 
 
 def pictures(folder: Path) -> None:
