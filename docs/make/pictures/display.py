@@ -1,7 +1,7 @@
 """The pictures of the operator's display, from the shipped session in a Chromium.
 
-``python -m docs.make.pictures.display docs/images`` makes them; it needs the extra ``view``, the package
-playwright and a Chromium. When a page draws is chance, so no two pictures are the same.
+``python -m docs.make.pictures.display docs/images`` makes them; it needs the extra ``view``, the
+package playwright and a Chromium. When a page draws is chance: no two pictures are the same.
 """
 
 import re
@@ -25,7 +25,9 @@ def pictures(folder: Path) -> None:
     with TemporaryDirectory() as place, sync_playwright() as playwright:
         words = [str(_SESSION), "--out", f"{place}/run", "--no-figures", "--realtime", "2"]
         command = [sys.executable, "-m", "dsa_des", "cdti", *words]
-        session = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        session = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
         assert session.stdout is not None
         address = re.findall(r"http\S+", session.stdout.readline())[0]
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
