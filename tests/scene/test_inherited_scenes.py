@@ -211,8 +211,9 @@ def test_a_table_set_at_a_new_name_adds_an_item(write, name):
 
 
 def test_a_table_of_a_name_in_a_list_of_wires_is_refused(write):
-    with pytest.raises(SceneError, match="wires"):
+    with pytest.raises(SceneError, match="wires.*must be a list of wires") as found:
         load_scene(write('[wires.third]\nfrom = "traffic"\n'))
+    assert len(found.value.problems) == 1  # and no block is blamed for missing one
 
 
 def test_nearly_a_known_name_with_a_key_or_two_is_a_slip(write):
