@@ -211,7 +211,7 @@ def test_a_table_set_at_a_new_name_adds_an_item(write, name):
 
 
 def test_a_table_of_a_name_in_a_list_of_wires_is_refused(write):
-    with pytest.raises(SceneError, match="wires.*must be a list of wires") as found:
+    with pytest.raises(SceneError, match=r"wires.*must be a list of wires") as found:
         load_scene(write('[wires.third]\nfrom = "traffic"\n'))
     assert len(found.value.problems) == 1  # and no block is blamed for missing one
 
