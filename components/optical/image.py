@@ -332,13 +332,11 @@ class ImageCamera(ElectroOptical):
         """Return the texture under a patch, as directions over it are linear in its pixels."""
         side = 2 * scene.half
         at = (corner + scene.half) * scene.binned
-        azimuth, elevation = angles_over(
-            *(
-                self._ned_angles(at + side * np.array(by), attitude)
-                for by in ((0, 0), (1, 0), (0, 1))
-            ),
-            (np.arange(side) + 0.5 - scene.half) * (scene.binned / side),
+        ahead, right, down = (
+            self._ned_angles(at + side * np.array(by), attitude) for by in ((0, 0), (1, 0), (0, 1))
         )
+        offset = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
+        azimuth, elevation = angles_over(ahead, right, down, offset)
         replica = int(scene.cells.replica[scene.cell])
 
         def normal(one: IntArray, other: IntArray) -> FloatArray:
