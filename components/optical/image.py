@@ -335,7 +335,7 @@ class ImageCamera(ElectroOptical):
         ahead, right, down = (
             self._ned_angles(at + side * np.array(by), attitude) for by in ((0, 0), (1, 0), (0, 1))
         )
-        offset = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
+        offset: Any = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
         azimuth, elevation = angles_over(ahead, right, down, offset)
         replica = int(scene.cells.replica[scene.cell])
 
