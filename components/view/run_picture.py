@@ -11,7 +11,7 @@ import numpy as np
 
 from components.display.picture import TangentPlane, offset_positions, sights
 from components.display.recorded_run import RecordedTables, read_table
-from components.display.symbols import sensor_marks
+from components.display.symbols import block_marks
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
@@ -102,7 +102,7 @@ def run_picture(folder: Path) -> RunPicture:
     )
     sensors = sorted(set(_text(found["scans"]["block"])) | set(_text(detections["block"])))
     blocks = {name: scene.get("blocks", {}).get(name, {}) for name in sensors}
-    marks = sensor_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
+    marks = block_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
     picture.sensors = [_sensor(name, blocks[name], marks[name]) for name in sensors]
     targets = {name: number for number, name in enumerate(names)}
     picture.tables["own"] = _own_columns(own, plane)

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.display.symbols import sensor_marks
+from components.display.symbols import block_marks
 from components.sensor import marks
 from components.view.command import view
 
@@ -127,7 +127,7 @@ def test_sensors_of_one_kind_differ_in_marker_and_shade():
     types = {f"radar{k}": "radar.swerling" for k in range(3)}
     types |= {"eo0": "optical.eo", "eo1": "optical.projection", "my": "a:B",
               "ir0": "optical.ir", "ir1": "optical.ir"}  # fmt: skip
-    found = sensor_marks(types)
+    found = block_marks(types)
     assert [found[name].colour for name in ("radar0", "eo0", "ir0")] == [
         marks.RADAR.colour, marks.EO.colour, marks.IR.colour
     ]  # fmt: skip
