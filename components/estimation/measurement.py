@@ -23,15 +23,19 @@ _NEAREST_M = 1e-3
 
 @dataclass(frozen=True)
 class Kind:
-    """Which quantities are measured, in this order: azimuth, elevation, range, range rate."""
+    """Which are measured, in this order: azimuth, elevation, range, range rate, velocity.
+
+    The velocity is the target's own, along the axes of the frame; with it goes no range rate.
+    """
 
     has_range: bool = True
     has_range_rate: bool = False
+    has_velocity: bool = False
 
     @property
     def size(self) -> int:
         """How many quantities there are."""
-        return 2 + self.has_range + self.has_range_rate
+        return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
 
 
 def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
@@ -48,6 +52,8 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
         seen[2] = distance
     if kind.has_range_rate:
         seen[-1] = _along(away, _closing(state, pose)) / np.maximum(distance, _NEAREST_M)
+    if kind.has_velocity:
+        seen[-3:] = state[3:6]
     return seen
 
 
@@ -63,7 +69,8 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     seen = np.empty((kind.size, state.shape[-1]))
     np.arctan2(y, x, out=seen[0])
     np.arctan2(-z, level, out=seen[1])
-    jacobian = np.zeros((kind.size, 6 if kind.has_range_rate else 3, state.shape[-1]))
+    moving = kind.has_range_rate or kind.has_velocity
+    jacobian = np.zeros((kind.size, 6 if moving else 3, state.shape[-1]))
     level_square = safe * safe
     steep = z / (safe * square)
     term = np.empty_like(away)
@@ -88,6 +95,10 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
         seen[-1] = rate
         jacobian[-1, :3] = (closing - rate * unit) / distance
         jacobian[-1, 3:6] = unit
+    if kind.has_velocity:
+        seen[-3:] = state[3:6]
+        for axis in range(3):
+            jacobian[axis - 3, 3 + axis] = 1.0
     return seen, jacobian
 
 
