@@ -23,19 +23,19 @@ _NEAREST_M = 1e-3
 
 @dataclass(frozen=True)
 class Kind:
-    """Which are measured, in this order: azimuth, elevation, range, range rate, velocity.
+    """Which are measured, in this order: azimuth, elevation, range, range rate, sinking.
 
-    The velocity is the target's own, along the axes of the frame; with it goes no range rate.
+    How fast the target sinks is along the frame's third axis.
     """
 
     has_range: bool = True
     has_range_rate: bool = False
-    has_velocity: bool = False
+    has_sinking: bool = False
 
     @property
     def size(self) -> int:
         """How many quantities there are."""
-        return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
+        return 2 + self.has_range + self.has_range_rate + self.has_sinking
 
 
 def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
@@ -51,9 +51,10 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
     if kind.has_range:
         seen[2] = distance
     if kind.has_range_rate:
-        seen[-1] = _along(away, _closing(state, pose)) / np.maximum(distance, _NEAREST_M)
-    if kind.has_velocity:
-        seen[-3:] = state[3:6]
+        closing = _closing(state, pose)
+        seen[2 + kind.has_range] = _along(away, closing) / np.maximum(distance, _NEAREST_M)
+    if kind.has_sinking:
+        seen[-1] = state[5]
     return seen
 
 
@@ -69,7 +70,7 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     seen = np.empty((kind.size, state.shape[-1]))
     np.arctan2(y, x, out=seen[0])
     np.arctan2(-z, level, out=seen[1])
-    moving = kind.has_range_rate or kind.has_velocity
+    moving = kind.has_range_rate or kind.has_sinking
     jacobian = np.zeros((kind.size, 6 if moving else 3, state.shape[-1]))
     level_square = safe * safe
     steep = z / (safe * square)
@@ -92,13 +93,13 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     if kind.has_range_rate:
         closing = _closing(state, pose)
         rate = _along(away, closing) / distance
-        seen[-1] = rate
-        jacobian[-1, :3] = (closing - rate * unit) / distance
-        jacobian[-1, 3:6] = unit
-    if kind.has_velocity:
-        seen[-3:] = state[3:6]
-        for axis in range(3):
-            jacobian[axis - 3, 3 + axis] = 1.0
+        row = 2 + kind.has_range
+        seen[row] = rate
+        jacobian[row, :3] = (closing - rate * unit) / distance
+        jacobian[row, 3:6] = unit
+    if kind.has_sinking:
+        seen[-1] = state[5]
+        jacobian[-1, 5] = 1.0
     return seen, jacobian
 
 

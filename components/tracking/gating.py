@@ -254,7 +254,7 @@ def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> Floa
     mine = sensors[one.detection]
     lowest = mine & -mine
     sensor = np.frexp(lowest.astype(float))[1] - 1
-    code = one.kind.has_range + 2 * one.kind.has_range_rate + 4 * one.kind.has_velocity
+    code = one.kind.has_range + 2 * one.kind.has_range_rate + 4 * one.kind.has_sinking
     return np.asarray(rules.log_density[code].take(sensor))
 
 

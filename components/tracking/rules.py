@@ -304,6 +304,6 @@ def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArr
         for code in range(8):
             volume = width * height * (far if code & 1 else 1.0)
             volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
-            volume *= _WHOLE_RATE_M_S**3 if code & 4 else 1.0
+            volume *= _WHOLE_RATE_M_S if code & 4 else 1.0
             density[code, i] = math.log(per_scan / volume)
     return density

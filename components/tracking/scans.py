@@ -47,22 +47,25 @@ class Scans:
         return len(self.row)
 
     def kinds(self, rates_of: int) -> IntArray:
-        """Return the kind of each detection: 1 with a range, 2 more with a range rate, 4 velocity.
+        """Return the kind of each detection: 1 with a range, 2 more with a range rate, 4 sinking.
 
-        What has a velocity has no range rate: that follows from it.
+        Of a velocity that is told, and errs in the same way for minutes, a track takes over all
+        when it is born, and then only how fast the target sinks: what lasts of a velocity's error
+        adds up in the position, which a filter that takes it for new does not know.
         """
         code = (~np.isnan(self.measured[2])).astype(np.int64)
         if rates_of and not np.isnan(self.velocity).all():
             moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
             used = moves & (self.variance[3] > 0.0) & ~np.isnan(self.measured[3])
             code += 2 * (used & (self.contributors & ~rates_of == 0))
-        if rates_of and not (told := ~np.isnan(self.measured[4:]).any(axis=0)).sum() == 0:
+        told = ~np.isnan(self.measured[4:]).any(axis=0)
+        if rates_of and told.any():
             told &= (self.variance[4:] > 0.0).all(axis=0) & (code & 1 > 0)
             code = np.where(told, 5, code)
         return code
 
     def in_frame(self, origin_deg_m: FloatArray) -> Self:
-        """Return the looks with targets' velocities along the axes of frames, (3, looks) origins."""
+        """Return the looks with targets' velocities along the axes of frames with some origins."""
         if np.isnan(self.measured[4:]).all():
             return self
         look = np.repeat(np.arange(len(self)), np.diff(self.offsets))
@@ -135,7 +138,7 @@ def kind_of(code: int) -> tuple[Kind, list[int]]:
     """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
     kind = Kind(bool(code & 1), bool(code & 2), bool(code & 4))
     rows = [*([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
-    return kind, [0, 1, *rows, *([4, 5, 6] if kind.has_velocity else [])]
+    return kind, [0, 1, *rows, *([6] if kind.has_sinking else [])]
 
 
 def scans_of(fused: FusedDetections) -> Scans:
