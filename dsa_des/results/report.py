@@ -56,7 +56,8 @@ font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figu
 img{max-width:100%;height:auto}.note{color:var(--note)}
 nav{position:sticky;top:0;background:var(--paper);padding:.4em 0;
 border-bottom:1px solid var(--line)}
-nav a{margin-right:.8em;color:inherit;display:inline-block;padding:.25em 0}details{margin:.6em 0}summary{cursor:pointer}
+nav a{margin-right:.8em;color:inherit;display:inline-block;padding:.25em 0}
+details{margin:.6em 0}summary{cursor:pointer}
 h2{scroll-margin-top:3em}
 @media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}
 table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
