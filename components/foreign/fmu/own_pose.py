@@ -9,7 +9,7 @@ from components.messages.targets import RelativeTargets, TrafficStates, own_velo
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
-_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+_STATE_OF_OWN = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 
 
@@ -60,10 +60,10 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
     if isinstance(message, TrafficStates):
-        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _BELIEVED]
+        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _STATE_OF_OWN]
         return found
     if message.believed is not None:
-        found[: len(POSE)] = [message.believed[name] for name in _BELIEVED]
+        found[: len(POSE)] = [message.believed[name] for name in _STATE_OF_OWN]
     if moves:
         state: IntArray = message.tick if message.state_tick is None else message.state_tick
         time_s = wake.own_ticks(state) / wake.ticks_per_s
