@@ -1,4 +1,4 @@
-"""What messages say of the ownship: its pose as believed, its velocity; held until news come."""
+"""What messages say of the ownship, held until news come, and where targets truly are."""
 
 from typing import Any
 
@@ -68,4 +68,22 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
         state: IntArray = message.tick if message.state_tick is None else message.state_tick
         time_s = wake.own_ticks(state) / wake.ticks_per_s
         found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
+    return found
+
+
+def true_lines(wake: Wake, port: str, targets: int) -> FloatArray:
+    """Return where targets truly are, (3, rows, targets); NaN where no line of sight came then.
+
+    Azimuth and elevation in the ownship's body axes, and range.
+    """
+    found = np.full((3, len(wake), targets), np.nan)
+    for arrivals in wake.arrivals(port):
+        message = arrivals.message
+        if not isinstance(message, RelativeTargets):
+            continue
+        row, place = np.nonzero(wake.ticks[:, np.newaxis] == arrivals.tick)
+        lines = (message.body_azimuth_rad, message.body_elevation_rad, message.range_m)
+        for k, values in enumerate(lines):
+            seen = np.where(message.present[place], values[place], np.nan)
+            found[k][row[:, np.newaxis], message.columns] = seen
     return found
