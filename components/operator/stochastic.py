@@ -18,7 +18,6 @@ from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvr
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
-from dsa_des.time.timeline import first_scan
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -157,9 +156,9 @@ class StochasticParameters(ConfParameters):
 
 
 class Mind(NamedTuple):
-    """What an operator has in mind, in one replica."""
+    """What an operator has in mind, in one run."""
 
-    replica: int
+    run: int
     decisions: int = 0  # How many there were
     since: int | None = None  # Tick from which on there was an alert
     acts_at: float | None = None  # Tick from which on the latest decision is acted on
@@ -189,7 +188,7 @@ class Stochastic(Component):
         self._response, self._steering, self._pause = map(
             self.stream, ("response", "steering", "pause")
         )
-        #: By replica.
+        #: By run.
         self._minds: dict[int, Mind] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
@@ -197,22 +196,21 @@ class Stochastic(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        highest, replica = alerts.highest(), wake.replica
-        own_ticks = wake.own_ticks(wake.ticks)
+        highest, runs = alerts.highest(), wake.run
         # Without an alert, now or before, there is nothing to do.
         alerted = highest >= self.p.level
         busy = [run for run, mind in self._minds.items() if mind.since is not None]
-        followed = np.isin(replica, np.union1d(replica[alerted], np.array(busy, dtype=np.int64)))
+        followed = np.isin(runs, np.union1d(runs[alerted], np.array(busy, dtype=np.int64)))
         acting: list[tuple[int, Mind]] = []
         for place in np.flatnonzero(followed).tolist():
-            run = int(replica[place])
+            run = int(runs[place])
             mind = self._minds.get(run, Mind(run))
-            mind, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
+            mind, acts = self._followed(mind, int(wake.ticks[place]), int(highest[place]))
             self._minds[run] = mind
             if acts:
                 acting.append((place, mind))
         manoeuvres = self._manoeuvres_at(alerts, acting)
-        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
+        return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
         """Take in the highest level of an instant; return also whether the operator acts at it."""
@@ -234,8 +232,8 @@ class Stochastic(Component):
 
     def _draw(self, mind: Mind, stream: Any, number: int) -> float:
         """Return the draw of a number, of the latest decision."""
-        decision = np.int64(first_scan(mind.replica) + mind.decisions)
-        return float(stream.uniform(np.uint64(0), decision, number))
+        drawn = stream.of_runs(np.int64(mind.run))
+        return float(drawn.uniform(np.uint64(0), np.int64(mind.decisions), number))
 
     def _response_s(self, mind: Mind, highest: int) -> float:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s
