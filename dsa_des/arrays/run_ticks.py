@@ -15,14 +15,15 @@ from dsa_des.arrays.types import BoolArray, IntArray
 
 _ZERO = np.zeros((), dtype=np.int64)
 _ZERO.flags.writeable = False
+#: One number, seen as often as a run may have rows: a slice of it is made in no time.
+_ZEROS: IntArray = np.ndarray((1 << 40,), np.int64, buffer=_ZERO, strides=(0,))
 # Keys stay below this.
 _MOST = 1 << 62
 
 
 def no_runs(rows: int) -> IntArray:
     """Return the runs of rows of a single run: 0, seen `rows` times."""
-    column: IntArray = np.ndarray((rows,), np.int64, buffer=_ZERO, strides=(0,))
-    return column
+    return _ZEROS[:rows]
 
 
 def says_no_runs(run: IntArray) -> bool:
@@ -108,10 +109,7 @@ class RunTicks:
         """Return what puts them in order, those of one instant as they stand; None if they are."""
         if len(self) < 2:
             return None
-        if says_no_runs(self.run):
-            key = self.tick
-        else:
-            (key,) = _keys(self)
+        (key,) = _keys(self)
         if bool((key[1:] >= key[:-1]).all()):
             return None
         return np.argsort(key, kind="stable")
@@ -126,6 +124,8 @@ class RunTicks:
 
     def before(self, run: int, tick: int) -> int:
         """Return how many lie before a tick of a run."""
+        if says_no_runs(self.run):
+            return len(self) if run > 0 else int(np.searchsorted(self.tick, tick))
         first, last = np.searchsorted(self.run, [run, run + 1]).tolist()
         return int(first + np.searchsorted(self.tick[first:last], tick))
 
@@ -141,7 +141,7 @@ def _one_run(parts: Sequence[RunTicks]) -> bool:
 def _keys(*parts: RunTicks) -> list[IntArray]:
     """Return numbers that lie as the instants do, also where these are in no order."""
     filled = [part for part in parts if len(part)]
-    if not filled:
+    if all(says_no_runs(part.run) for part in filled):
         return [part.tick for part in parts]
     first = min(int(part.run.min()) for part in filled)
     runs = max(int(part.run.max()) for part in filled) - first + 1
@@ -160,9 +160,7 @@ def _keys(*parts: RunTicks) -> list[IntArray]:
 
 def union(parts: Sequence[RunTicks]) -> RunTicks:
     """Return every instant once, in order; each part is in order."""
-    if len(parts) == 1:
-        found = parts[0]
-    elif _one_run(parts):
+    if _one_run(parts):
         ticks = sorted_union([part.tick for part in parts])
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         return RunTicks.of_run(run, ticks)
