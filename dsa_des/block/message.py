@@ -134,8 +134,7 @@ class Message:
 
     def __post_init__(self) -> None:
         """Let columns of entries that were not given be null, and whole numbers 0."""
-        if self.run is None:
-            self.run = no_runs(len(self.tick))
+        self.run = self._runs()
         for name, kind in derived(type(self)).optional.items():
             if getattr(self, name) is None:
                 count = int(self.offsets[-1])  # type: ignore[attr-defined]
@@ -145,10 +144,14 @@ class Message:
     def __len__(self) -> int:
         return len(self.tick)
 
+    def _runs(self) -> IntArray:
+        """Return of which run each row is, also where a class has a `__post_init__` of its own."""
+        return no_runs(len(self.tick)) if self.run is None else self.run
+
     @property
     def instants(self) -> RunTicks:
         """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
-        return RunTicks(self.run, self.tick)
+        return RunTicks(self._runs(), self.tick)
 
     @classmethod
     def empty(cls, **others: Any) -> Self:
@@ -168,6 +171,7 @@ class Message:
             With the class, the field, its length and that which it must have.
         """
         rows, (row_names, entry_names) = len(self.tick), _layout(type(self))
+        self.run = self._runs()
         if len(self.run) != rows:
             raise ValueError(f"{_of(self, 'run')} has {len(self.run)} of {rows} rows")
         _check_each(self, row_names, rows, "rows")
@@ -195,8 +199,8 @@ class Message:
         result = copy(self)
         for name in row_names:
             setattr(result, name, _pick(getattr(self, name), rows))
-        nobodys = says_no_runs(self.run)
-        result.run = no_runs(len(result.tick)) if nobodys else self.run[rows]
+        run = self._runs()
+        result.run = no_runs(len(result.tick)) if says_no_runs(run) else run[rows]
         if entry_names or hasattr(self, "offsets"):
             offsets, index = _entries(self.offsets, rows)  # type: ignore[attr-defined]
             result.offsets = offsets  # type: ignore[attr-defined]
@@ -242,7 +246,7 @@ class Message:
         rows = [len(part) for part in parts]
         for name in row_names:
             setattr(result, name, _join([getattr(part, name) for part in parts], rows))
-        result.run = joined_runs([part.run for part in parts])
+        result.run = joined_runs([part._runs() for part in parts])
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
             starts = np.cumsum([0] + [int(o[-1] - o[0]) for o in offsets])
