@@ -56,6 +56,9 @@ class Wake:
         Of which run of the scene each row is, ascending; all 0 by default.
     first_run : int
         The first run that goes on: rows of those before it never come again.
+    clock : callable, optional
+        Given scan numbers and their runs, returns when the scan before each was
+        (`RunClock.before`).
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class Wake:
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
         run: IntArray | None = None,
         first_run: int = 0,
+        clock: Callable[[IntArray, IntArray], IntArray] | None = None,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -77,6 +81,7 @@ class Wake:
         self._demand = demand
         self.run = no_runs(len(ticks)) if run is None else run
         self.first_run = first_run
+        self._clock = clock
 
     def __len__(self) -> int:
         return len(self.ticks)
@@ -85,6 +90,13 @@ class Wake:
     def demand(self) -> Mapping[str, IntArray]:
         """The rows at which each clocked block downstream scans."""
         return {} if self._demand is None else self._demand()
+
+    @cached_property
+    def scans_before(self) -> IntArray:
+        """When the block's scan before each row was, in ticks of its own run; -1 for none."""
+        if self._clock is None:
+            return np.full(len(self), -1)
+        return self._clock(self.scans, self.run)
 
     @property
     def time_s(self) -> FloatArray:

@@ -125,7 +125,11 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         return {block: _within(asked, rows) for block, asked in wake.demand.items()}
 
     ticks, scans = wake.ticks[rows], wake.scans[rows]
-    return Wake(ticks, scans, wake.ticks_per_s, held, arrived, demand)
+
+    def before(scans: IntArray, run: IntArray) -> IntArray:
+        return wake.scans_before[rows]
+
+    return Wake(ticks, scans, wake.ticks_per_s, held, arrived, demand, clock=before)
 
 
 def _arrivals(new: Arrivals, number: int) -> Arrivals | None:

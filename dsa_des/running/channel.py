@@ -361,6 +361,7 @@ class Inputs:
         end: int,
         demand: Callable[[RunTicks], Mapping[str, IntArray]] | None = None,
         *,
+        clock: Callable[[IntArray, IntArray], IntArray] | None = None,
         complete: bool = True,
     ) -> Wake | None:
         """Return what the block sees at some instants, or None if it cannot run at any.
@@ -375,6 +376,8 @@ class Inputs:
             First tick that is no longer seen.
         demand : callable, optional
             Given the instants of the wake, returns what `Wake.demand` is.
+        clock : callable, optional
+            As for `Wake`.
         complete : bool
             Leave out instants at which a required input holds nothing yet.
         """
@@ -401,7 +404,7 @@ class Inputs:
                 arrived.setdefault(port, []).append(came)
         rows = None if demand is None else partial(demand, asked)
         first, per_s = self._time.runs.start, self._ticks_per_s
-        return Wake(asked.tick, scans, per_s, held, arrived, rows, asked.run, first)
+        return Wake(asked.tick, scans, per_s, held, arrived, rows, asked.run, first, clock)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

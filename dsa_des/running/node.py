@@ -231,7 +231,8 @@ class Node:
         return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
 
     def _run(self, instants: RunTicks, scans: IntArray, end: int) -> None:
-        wake = self._inputs.seen(instants, scans, end, self._rows_asked_for)
+        before = None if self.clock is None else self.clock.before
+        wake = self._inputs.seen(instants, scans, end, self._rows_asked_for, clock=before)
         if wake is None:
             return
         ticks = wake.ticks

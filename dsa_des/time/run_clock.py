@@ -71,6 +71,16 @@ class RunClock:
             self._last = start, end, self._between(start, min(end, self._time.run_ticks))
         return self._last[2]
 
+    def before(self, scans: IntArray, run: IntArray) -> IntArray:
+        """Return when the scan before each was, in ticks of its run; -1 before the first."""
+        if self._alike:
+            shift = self._offsets[run] - self._clocks[0].offset
+            return np.where(scans > 0, self._clocks[0].before(scans) + shift, -1)
+        found = np.empty_like(scans)
+        for one in np.unique(run).tolist():
+            found[run == one] = self._clocks[one].before(scans[run == one])
+        return found
+
     def _between(self, start: int, end: int) -> Scans:
         if self._time.replicas == 1:
             scans, ticks = self._clocks[0].between(start, end)
