@@ -149,9 +149,9 @@ and visual range: the nearest, 420 ft² and 6.2 nmi, has {rates} at 200, 300, 40
 {encounters:,} weighted encounters of two aircraft of MIT Lincoln Laboratory's uncorrelated model
 (`uncor_1200code_v1`, BSD-2, not part of the project), a pilot on the left by Andrews's rate in
 clear air, the other as large as a Cessna 172, turns by DAIDALUS 5 s after an alert of whom he has
-seen for 5 s (`configs/published/see_and_avoid.toml`; `dsa-des study see_and_avoid_risk` with a made-up
-airspace). Both looking is not flown, as only the ownship is steered: it is the square of one, as
-if they failed independently.
+seen for 5 s (`configs/published/see_and_avoid.toml`; `dsa-des study see_and_avoid_risk` with a
+made-up airspace). Both looking is not flown, as only the ownship is steered: it is the square of
+one, as if they failed independently.
 
 {risk}
 
