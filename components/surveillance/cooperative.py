@@ -61,6 +61,8 @@ class CooperativeSensor(Sensor):
 
     mark = COOPERATIVE
     measures_range = True
+    #: Where an aircraft says that it is, it is, however the ownship believes to be turned.
+    turned_by_belief = False
     outputs: ClassVar[Any] = {"detections": Output(CooperativeReports, "What was received.")}
     Parameters: ClassVar[Any] = CooperativeParameters
 
