@@ -277,8 +277,8 @@ def compare(**options: Any) -> None:
 def evidence(**options: Any) -> None:
     """Run a CASE from requirement to verdict: a folder that a stranger can run again.
 
-    --set changes a value of the case's file: requirements[0].most=0.2, or set.blocks.radar.range_km=5
-    for one of the system's scene. Exit code 1 where no verdict can be given.
+    --set changes a value of the case's file: requirements[0].most=0.2, or, for one of the system's
+    scene, set.blocks.radar.range_km=5. Exit code 1 where no verdict can be given.
     """
     from dsa_des.commands.evidence import evidence_command
 

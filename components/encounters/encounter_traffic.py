@@ -207,7 +207,7 @@ class ModelParameters(OneEncounter):
         ValueError
             Where edges and proportions do not fit.
         """
-        changes = {}
+        changes: dict[str, Any] = {}
         for name, make in (("horizontal", horizontal_density), ("vertical", vertical_density)):
             if (given := getattr(self, name)) is not None:
                 try:

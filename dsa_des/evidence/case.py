@@ -7,9 +7,9 @@ parameter whose source nobody states, are errors of the file.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import SceneError, did_you_mean
@@ -17,6 +17,7 @@ from dsa_des.results.record import CLASS, Result, as_text
 from dsa_des.scene.keys import key_in
 from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, set_text
@@ -25,28 +26,38 @@ from dsa_des.studies.study_tables import flat_values
 
 #: The name of the study of the system itself, and of the one that changes a parameter at a time.
 ASSESSED, SENSITIVITY = "assessed", "sensitivity"
+#: What the wires of a scene are called among the sources.
+WIRES = "wires"
 #: The axis of that study, and its value where nothing is changed.
 CHANGED, AS_STATED = "changed", "as stated"
-_Text = Field(min_length=1)
+
+
+def _said(text: str) -> str:
+    if not text.strip():
+        raise ValueError("must not be empty")
+    return text
+
+
+_Text = Annotated[str, AfterValidator(_said)]
 
 
 class AssessedSystem(Parameters):
     """What is assessed."""
 
-    name: str = _Text
-    version: str = _Text
+    name: _Text
+    version: _Text
     description: str = ""
 
 
 class CaseRequirement(Parameters):
     """A limit on a result of a study, as somebody asks for it."""
 
-    name: str = _Text
-    text: str = Field(min_length=1, description="What is asked for, in words.")
-    source: str = Field(min_length=1, description="Who asks for it.")
-    result: str = _Text
+    name: _Text
+    text: _Text = Field(description="What is asked for, in words.")
+    source: _Text = Field(description="Who asks for it.")
+    result: _Text
     study: str = ASSESSED
-    unit: str = Field(min_length=1, description="Of the limit.")
+    unit: _Text = Field(description="Of the limit.")
     most: float | None = None
     least: float | None = None
 
@@ -94,37 +105,37 @@ class BesideStudy(Parameters):
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,40}$")
     study: ScenePath
-    about: str = _Text
+    about: _Text
     replicas: int | None = Field(default=None, ge=1)
 
 
 class SampleSource(Parameters):
     """What the encounters are drawn from."""
 
-    model: str = _Text
-    licence: str = _Text
-    weights: str = Field(min_length=1, description="What the weight of an encounter undoes.")
+    model: _Text
+    licence: _Text
+    weights: _Text = Field(description="What the weight of an encounter undoes.")
 
 
 class SensitivityKey(Parameters):
     """A parameter of the system's scene that is changed alone."""
 
-    key: str = _Text
-    unit: str = _Text
+    key: _Text
+    unit: _Text
     values: tuple[Any, ...] = Field(min_length=1, max_length=9)
 
 
 class LeftOutItem(Parameters):
     """What the case leaves out, and why it may."""
 
-    what: str = _Text
-    why: str = _Text
+    what: _Text
+    why: _Text
 
 
 class CaseTables(Parameters):
     """A case as its file states it."""
 
-    title: str = _Text
+    title: _Text
     description: str = ""
     study: ScenePath = Field(description="Of the system: one cell, whose replicas are encounters.")
     set: dict[str, Any] = Field(default={}, description="Changes of the system's scene.")
@@ -286,8 +297,8 @@ def _without_source(case: Case) -> list[Any]:
     sources, scene = case.tables.sources, case.assessed.scene(0)
     for key in flat_values(sources):
         parts = key.removeprefix("blocks.").split(".")
-        if parts[0] not in scene.blocks:
-            hint = did_you_mean(parts[0], scene.blocks)
+        if parts[0] not in {*scene.blocks, WIRES}:
+            hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
             message = f"the scene has no block {parts[0]!r}{hint}"
             found.append(case.file.problem(("sources", key), message))
     for name, block in scene.blocks.items():
@@ -298,11 +309,19 @@ def _without_source(case: Case) -> list[Any]:
                 f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
             )
             found.append(case.file.problem(("sources", name), message))
+    if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
+        message = "is missing: nobody says where delays and losses of wires come from"
+        found.append(case.file.problem(("sources", WIRES), message))
     return found
+
+
+def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
+    """Return the wires of a scene that delay or lose messages, as tables."""
+    whole = [wire for wire in scene.resolved()["wires"] if isinstance(wire, dict)]
+    return [dict(wire) for wire in whole if set(wire) - {"from", "to", "holds"}]
 
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
     """Return where a parameter's value is from: what is said of the key, or else of its block."""
     known = {name.removeprefix("blocks."): str(text) for name, text in flat_values(sources).items()}
     return known.get(f"{block}.{key}", known.get(block))
-

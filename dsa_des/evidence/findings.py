@@ -129,7 +129,7 @@ def counts_of(units: int, over_last: float) -> tuple[list[int], int]:
     start = max(1, math.ceil(units * (1.0 - over_last)))
     way = np.geomspace(min(20, start), start, _ON_THE_WAY)
     end = np.linspace(start, units, _AT_THE_END)
-    counts = sorted({int(round(float(n))) for n in (*way, *end)})
+    counts = sorted({round(float(n)) for n in (*way, *end)})
     return counts, start
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from dsa_des.block.ladder import Verified
 from dsa_des.block.shipped_files import folders
-from dsa_des.evidence.case import Case, source_of, written
+from dsa_des.evidence.case import WIRES, Case, source_of, wires_with_options, written
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
 from dsa_des.studies.draws import file_digest
@@ -29,7 +29,7 @@ class CaseFiles:
     root : Path
         What relative names count from.
     names : dict
-        File → its name below the root; of a file elsewhere its last part alone.
+        File → its name below the root; a shipped one's place among those.
     case : str
         Name of the case's own file.
     """
@@ -40,11 +40,10 @@ class CaseFiles:
 
     def shown(self, text: str) -> str:
         """Return a text that is a path of the case as a name below the root."""
-        path = Path(os.path.abspath(text)) if os.path.isabs(text) else None
-        if path is None:
-            return text
-        known = self.names.get(path)
-        return known if known is not None else path.name
+        path = Path(os.path.abspath(text))
+        if path in self.names:
+            return self.names[path]
+        return path.name if os.path.isabs(text) else text
 
     def digests(self) -> list[dict[str, str]]:
         """Return every file with the SHA-256 of its content, by name."""
@@ -78,11 +77,14 @@ def files_of_case(case: Case) -> CaseFiles:
     home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
     mine = [p for p in found if not any(p.is_relative_to(folder) for folder in shipped)]
     root = home or Path(os.path.commonpath([path.parent for path in mine]))
-    names = {
-        path: path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
-        for path in sorted(found)
-    }
+    names = {path: _below(path, [root, *shipped]) for path in sorted(found)}
     return CaseFiles(root, names, names[own])
+
+
+def _below(path: Path, folders: Iterable[Path]) -> str:
+    """Return a file's name below the first of some folders that holds it, or its last part."""
+    inside = [folder for folder in folders if path.is_relative_to(folder)]
+    return path.relative_to(inside[0]).as_posix() if inside else path.name
 
 
 def _paths(sources: Iterable[str]) -> list[Path]:
@@ -111,6 +113,15 @@ def parameters_of(case: Case, files: CaseFiles) -> list[dict[str, Any]]:
                 "written_in": where,
                 "source": source_of(case.tables.sources, name, key) if where != DEFAULT else None,
             })  # fmt: skip
+    for wire in wires_with_options(scene):
+        way = f"{wire.pop('from')} -> {wire.pop('to')}"
+        rows.append({
+            "key": f"{WIRES}.{way}",
+            "value": ", ".join(f"{key} = {written(value)}" for key, value in wire.items()),
+            "meaning": "What the wire does to messages.",
+            "written_in": files.shown(study.base.source_of((WIRES,))),
+            "source": source_of(case.tables.sources, WIRES, way),
+        })  # fmt: skip
     return rows
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import math
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +12,7 @@ from dsa_des.results.report import PAGE_HEAD, page_environment
 
 _PAGE = (
     PAGE_HEAD
-    + """<h1>{{ title }}</h1>
+    + """<style>table{width:auto}td{min-width:4em}</style><h1>{{ title }}</h1>
 <p class="verdict"><strong>{{ e.verdict.line }}</strong></p>
 <p>{{ e.case.description }}</p>
 <p class="note">Assessed: {{ e.system.name }}, version {{ e.system.version }}. Made by dsa_des \
@@ -19,7 +20,8 @@ _PAGE = (
 <nav><a href="#requirements">Requirements</a> <a href="#beside">Beside it</a> \
 <a href="#encounters">Encounters</a> <a href="#convergence">Convergence</a> \
 <a href="#sensitivity">Sensitivity</a> <a href="#parameters">Parameters</a> \
-<a href="#models">Models</a> <a href="#left_out">Left out</a> <a href="#repeat">To repeat it</a></nav>
+<a href="#models">Models</a> <a href="#left_out">Left out</a> \
+<a href="#repeat">To repeat it</a></nav>
 <h2 id="system">The system</h2><p>{{ e.system.description }}</p>
 <h2 id="requirements">Requirements and evidence</h2>
 {{ table(("requirement", "asked", "found", level + " interval", "verdict"), requirements) }}
@@ -59,7 +61,11 @@ that matters most stands first.</p>
          changes) }}</details>
 {% else %}<p>The case names no parameter to change.</p>{% endif %}
 <h2 id="parameters">Parameters and their sources</h2>
-{{ table(("parameter", "value", "meaning", "source", "written in"), stated) }}
+{% for block, source, rows in stated %}
+<h3>{{ block }}</h3><p>{{ source }}</p>
+<details><summary>{{ rows | length }} stated</summary>
+{{ table(("parameter", "value", "meaning", "source", "written in"), rows) }}</details>
+{% endfor %}
 <details><summary>Parameters at the default of their model ({{ defaults | length }})</summary>
 {{ table(("parameter", "value", "meaning"), defaults) }}</details>
 <h2 id="models">The models and what they were held against</h2>
@@ -82,9 +88,7 @@ that matters most stands first.</p>
 )
 
 
-def evidence_page(
-    e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None
-) -> bytes:
+def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None) -> bytes:
     """Return the page of some evidence and its two pictures.
 
     Parameters
@@ -134,8 +138,7 @@ def evidence_page(
         ],
         convergence=base64.b64encode(convergence).decode(),
         sensitivity=base64.b64encode(sensitivity or b"").decode(),
-        stated=[(p["key"], p["value"], p["meaning"], p["source"] or "", p["written_in"])
-                for p in e["parameters"] if p["written_in"] != DEFAULT],
+        stated=_stated([p for p in e["parameters"] if p["written_in"] != DEFAULT]),
         defaults=[(p["key"], p["value"], p["meaning"])
                   for p in e["parameters"] if p["written_in"] == DEFAULT],
         verified=[
@@ -152,6 +155,23 @@ def evidence_page(
         versions=list(e["versions"].items()),
     )  # fmt: skip
     return page.encode()
+
+
+def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
+    """Return block, the source of most of its values, and its rows, whose own source may differ."""
+    by: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        by.setdefault(row["key"].partition(".")[0], []).append(row)
+    found = []
+    for block, mine in by.items():
+        ((usual, _),) = Counter(str(row["source"]) for row in mine).most_common(1)
+        cells = [
+            (row["key"].partition(".")[2], row["value"], row["meaning"],
+             "" if str(row["source"]) == usual else str(row["source"]), row["written_in"])
+            for row in mine
+        ]  # fmt: skip
+        found.append((block, usual, cells))
+    return found
 
 
 def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:

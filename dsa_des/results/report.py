@@ -72,7 +72,9 @@ table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
 {% endif %}{% endmacro %}
 """
 
-_PAGE = PAGE_HEAD + """{% macro where(scene, first) %}{% if scene.where %}
+_PAGE = (
+    PAGE_HEAD
+    + """{% macro where(scene, first) %}{% if scene.where %}
 <p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
 {% endif %}{% endmacro %}
 <h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
@@ -202,6 +204,7 @@ with the seed, axes and draws that stand in its row of the parts; rows of failed
 <code>command</code>.</p>
 </body></html>
 """
+)
 
 
 def study_report(folder: StudyFolder) -> bytes:
