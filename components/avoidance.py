@@ -137,13 +137,38 @@ class TurnAwayParameters(Parameters):
     rate_deg_s: float = Field(
         default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turn, deg/s."
     )
+    bank_deg: float | None = Field(
+        default=None,
+        gt=0,
+        le=75,
+        description="Bank in place of a rate, deg: the turn is as fast as the speed lets it be.",
+    )
+    roll_rate_deg_s: float | None = Field(
+        default=None,
+        ge=0.5,
+        le=360,
+        description="Rate at which the bank is built up, deg/s; by default it is there at once. "
+        "The turn ends at once in either case.",
+    )
+    direction: Literal["away", "towards", "left", "right"] = Field(
+        default="away",
+        description="Away from the side on which the nearest is, towards it (behind who crosses), "
+        "or always the same way.",
+    )
     pause_s: NonNegativeRational = Field(
         default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
     )
 
+    def without_effect(self) -> list[str]:
+        """Say that a bank leaves no rate to choose."""
+        said = super().without_effect()
+        if self.bank_deg is None:
+            return said
+        return said + self.idle("rate_deg_s", because="bank_deg is given")
+
 
 class TurnAway(Component):
-    """Turns away from the nearest track in range, and then leaves the ownship alone for a while.
+    """Turns for the nearest track in range, and then leaves the ownship alone for a while.
 
     It closes the loop from what is sensed to where the ownship flies; the rule itself is as simple
     as can be. Tracks without a range are not acted on.
@@ -169,7 +194,7 @@ class TurnAway(Component):
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
         row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
-        ticks, turns = [], []
+        manoeuvres: dict[int, Manoeuvre] = {}
         replica = wake.replica
         for place in np.unique(row[near]).tolist():
             tick = int(wake.ticks[place])
@@ -178,11 +203,18 @@ class TurnAway(Component):
                 continue
             entries = np.flatnonzero(near & (row == place))
             nearest = entries[np.argmin(tracks.range_m[entries])]
-            to_the_right = tracks.azimuth_rad[nearest] <= 0.0
-            ticks.append(tick)
-            turns.append(math.radians(self.p.turn_deg) * (1.0 if to_the_right else -1.0))
+            manoeuvres[place] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
             self._free_from[run] = tick + self._pause_ticks
-        if not ticks:
-            return None
-        rate = np.full(len(ticks), math.radians(self.p.rate_deg_s))
-        return Manoeuvres(np.array(ticks, dtype=np.int64), np.array(turns), rate)
+        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
+
+    def _turn(self, *, on_the_left: bool) -> Manoeuvre:
+        """Return the turn for somebody on a side."""
+        to_the_right = {"away": on_the_left, "towards": not on_the_left}
+        right = to_the_right.get(self.p.direction, self.p.direction == "right")
+        bank_deg = self.p.bank_deg or 0.0
+        return Manoeuvre(
+            turn_rad=math.radians(self.p.turn_deg) * (1.0 if right else -1.0),
+            rate_rad_s=0.0 if bank_deg else math.radians(self.p.rate_deg_s),
+            bank_rad=math.radians(bank_deg),
+            roll_rate_rad_s=math.radians(self.p.roll_rate_deg_s or 0.0),
+        )

@@ -65,7 +65,8 @@ def _is_traffic(cls: type[Component]) -> bool:
 
 #: Keys of sensors that need flights, and their values that do not.
 _NEEDS_FLIGHTS: dict[str, bool | str] = {
-    "beam_sweep": False, "measures_range_rate": False, "moving_target_filter": "none"
+    "beam_sweep": False, "measures_range_rate": False, "moving_target_filter": "none",
+    "between_scans": "as_at_scan",
 }  # fmt: skip
 
 

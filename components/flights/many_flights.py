@@ -8,7 +8,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.flights.fleet import LegTable, fleet_of
-from components.flights.steered_flight import AROUND_S, SteeredFlight, SteeredPart, flown_from
+from components.flights.steered_flight import (
+    SteeredFlight,
+    SteeredPart,
+    flown_from,
+    times_around_s,
+)
 from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -107,9 +112,9 @@ class OwnFlights:
 
     def steer(self, ownship: IntArray, time_s: FloatArray, manoeuvres: Sequence[Manoeuvre]) -> None:
         """Let ownships (each once) fly manoeuvres from times on, none before an earlier one."""
-        around = self.each(
-            np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
-        ).reshaped((len(ownship), len(AROUND_S)))
+        times_s = times_around_s(time_s)
+        around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
+        around = around.reshaped(times_s.shape)
         before = [
             self._flown[self._part[own, self.count[own] - 1]] if self.count[own] else None
             for own in ownship.tolist()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
@@ -9,6 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from components.flights.attitude import STANDARD_GRAVITY_MPS2
+from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
@@ -35,11 +38,20 @@ class Trajectory(Protocol):
 _SPEED_STEP_S = 0.5
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
-AROUND_S = np.array([-_BASE_S, 0.0, _BASE_S])
 _SHORTEST_PIECE_S = 1e-9
+# A roll into a turn is flown in so many arcs: at 60 kt to 45 deg of bank it ends 2 cm off.
+_ROLL_PIECES = 16
+# Who is slower banks without turning: no rate is taken of less.
+_SLOWEST_BANKED_MPS = 1.0
 
 #: How long, s, at which mean rate, and how that changes each second; one after the other.
 Pieces = tuple[tuple[float, float, float], ...]
+
+
+def times_around_s(time_s: FloatArray) -> FloatArray:
+    """Return before, at and after each of some times (n,), (n, 3); no flight is known before 0."""
+    ends = [np.maximum(time_s - _BASE_S, np.minimum(time_s, 0.0)), time_s, time_s + _BASE_S]
+    return np.stack(ends, axis=-1)
 
 
 class SteeredFlight:
@@ -73,7 +85,7 @@ class SteeredFlight:
         A turn or a change of altitude begins and ends at once, without a change of speed along the
         path's projection and without acceleration upward; speeds change steadily.
         """
-        around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
+        around = self.at(times_around_s(np.array([time_s])))
         before = self.parts[-1][1] if self.parts else None
         (part,) = flown_from(self.name, around, np.array([time_s]), [manoeuvre], [before])
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
@@ -133,11 +145,8 @@ class SteeringPlan(NamedTuple):
         """Return it with the parts that a manoeuvre changes, from an altitude; the others stay."""
         plan = self
         if manoeuvre.turn_rad != 0.0:
-            rate_deg_s = math.copysign(math.degrees(manoeuvre.rate_rad_s), manoeuvre.turn_rad)
-            angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
-            plan = plan._replace(
-                turns=((angle_rad / abs(math.radians(rate_deg_s)), rate_deg_s, 0.0),)
-            )
+            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
+            plan = plan._replace(turns=_turn(manoeuvre, speed_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
             climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
@@ -179,6 +188,56 @@ class SteeringPlan(NamedTuple):
         return [*legs, Straight(speed_mps=plan.speed_mps, climb_mps=plan.climb_mps)]
 
 
+def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
+    """Return a turn at a ground speed: the pieces in which it rolls in, and its steady rest."""
+    rate_rad_s = manoeuvre.rate_rad_s
+    if manoeuvre.bank_rad:
+        slowest_mps = max(speed_mps, _SLOWEST_BANKED_MPS)
+        rate_rad_s = STANDARD_GRAVITY_MPS2 * math.tan(manoeuvre.bank_rad) / slowest_mps
+    rate_deg_s = math.copysign(math.degrees(rate_rad_s), manoeuvre.turn_rad)
+    angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
+    rolling: Pieces = ()
+    if manoeuvre.roll_rate_rad_s:
+        rolling = _roll_in(angle_rad, rate_rad_s, manoeuvre.roll_rate_rad_s, speed_mps)
+        angle_rad -= math.radians(sum(lasts_s * mean for lasts_s, mean, _ in rolling))
+        sign = math.copysign(1.0, manoeuvre.turn_rad)
+        rolling = tuple((lasts_s, sign * mean, 0.0) for lasts_s, mean, _ in rolling)
+    rest_s = angle_rad / abs(math.radians(rate_deg_s))
+    return (*rolling, (rest_s, rate_deg_s, 0.0)) if rest_s > _SHORTEST_PIECE_S else rolling
+
+
+def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float) -> Pieces:
+    """Return how a turn begins whose bank grows at a steady rate, at mean rates in deg/s.
+
+    With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
+    -g / (v p) ln cos(p t). The first piece is longer where the turn would hardly show in it.
+    """
+    per_rad = speed_mps * roll_rad_s / STANDARD_GRAVITY_MPS2
+    if not per_rad:
+        return ()
+    full_rad = math.atan(rate_rad_s * speed_mps / STANDARD_GRAVITY_MPS2)
+    lasts_s = min(full_rad, math.acos(math.exp(-angle_rad * per_rad))) / roll_rad_s
+    ends_s = [lasts_s * k / _ROLL_PIECES for k in range(_ROLL_PIECES + 1)]
+    turned_rad = [-math.log(math.cos(roll_rad_s * end_s)) / per_rad for end_s in ends_s]
+    first = next(
+        (
+            k
+            for k in range(1, _ROLL_PIECES)
+            if speed_mps * ends_s[k] < 0.5 * LARGEST_TURN_RADIUS_M * turned_rad[k]
+        ),
+        _ROLL_PIECES,
+    )
+    kept = [0, *range(first, _ROLL_PIECES + 1)]
+    return tuple(
+        (
+            ends_s[end] - ends_s[begin],
+            math.degrees((turned_rad[end] - turned_rad[begin]) / (ends_s[end] - ends_s[begin])),
+            0.0,
+        )
+        for begin, end in itertools.pairwise(kept)
+    )
+
+
 def _left(pieces: Pieces, elapsed_s: float) -> Pieces:
     for number, (lasts_s, mean, change) in enumerate(pieces):
         # What rounding leaves of a piece is none.
@@ -212,7 +271,7 @@ def flown_from(
 ) -> list[SteeredPart]:
     """Return what aircraft fly from a manoeuvre on.
 
-    `around` says where each would be without it, (n, 3), `AROUND_S` of its time. Parts of an
+    `around` says where each would be without it, (n, 3), at `times_around_s`. Parts of an
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
@@ -220,6 +279,7 @@ def flown_from(
     ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     north, east, _ = line_of_sight_ned(*middle, *ends)
     found = []
+    base_s = np.ptp(times_around_s(time_s), axis=1).tolist()
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
@@ -227,9 +287,9 @@ def flown_from(
         if earlier is None:
             along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
             heading_deg = math.degrees(math.atan2(along[1], along[0]))
-            speed_mps = math.hypot(*along) / (2.0 * _BASE_S)
+            speed_mps = math.hypot(*along) / base_s[row]
             plan = SteeringPlan(
-                (), (), _own_climb(0.5 * (high - low) / _BASE_S, manoeuvre), (), speed_mps
+                (), (), _own_climb((high - low) / base_s[row], manoeuvre), (), speed_mps
             )
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))

@@ -13,10 +13,11 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
+from components.foreign.process_answers import answered
 from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame
-from components.foreign.reported_look import reported_look
 from components.messages.detections import Detections, SensorOffer
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.state_tracks import StateTracks
+from components.messages.steering import Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import (
@@ -31,16 +32,9 @@ from dsa_des.block.component import (
 )
 from dsa_des.block.message import Message, derived
 from dsa_des.block.wake import Wake
-from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 
 _HELLO, _CALL, _STATE = "hello", "call", "state"
-_LINE = ("azimuth_rad", "elevation_rad", "range_m")
-_NEEDED = {
-    "manoeuvres": ("turn_rad", "rate_rad_s"),
-    "detections": _LINE[:2],
-    "tracks": ("target", *_LINE),
-}
 
 
 def _is_list(value: Any) -> Any:
@@ -69,6 +63,11 @@ class ProcessParameters(Parameters):
     )
     offset_s: NonNegativeRational = Field(Fraction(0), description="Time of the first of them, s.")
     deadline_s: float = Field(10.0, gt=0, description="Longest wall time of one call, s.")
+    snapshots: bool = Field(
+        False,
+        description="Whether the program hands out its state and takes it back, so that its scene "
+        "looks ahead.",
+    )
     on_failure: Literal["stop", "restart"] = Field(
         "stop",
         description="Whether a program that died, hung or sent garbage ends the run, or is started "
@@ -117,9 +116,10 @@ class Process(Component):
     """Runs a program and asks it, over pipes, at every instant at which something comes.
 
     What arrives is sent as the tables that a run records of it, and answers are tables of
-    ``manoeuvres``, ``detections`` or ``tracks`` with the columns of these messages. Docs in
-    docs/foreign.md. A program that dies, hangs or sends garbage ends the run with its last words
-    and exit code 3, or is started again (``on_failure``).
+    ``manoeuvres``, ``detections``, ``tracks`` or ``state_tracks`` with the columns of these
+    messages. Docs in docs/foreign.md. A program that dies, hangs or sends garbage ends the run with
+    its last words and exit code 3, or is started again (``on_failure``). With ``snapshots`` its
+    scene looks ahead.
     """
 
     inputs = {
@@ -128,10 +128,16 @@ class Process(Component):
     outputs = {
         "manoeuvres": Output(Manoeuvres, "What the ownship is to fly."),
         "detections": Output(Detections, "What it detected."),
-        "tracks": Output(Tracks, "What it holds."),
+        "tracks": Output(Tracks, "What it holds of each target."),
+        "state_tracks": Output(StateTracks, "Tracks with states."),
     }
     Parameters = ProcessParameters
     stands_alone = True
+
+    @classmethod
+    def class_for(cls, parameters: Any) -> type[Component]:
+        """Return the class whose state can be taken back, where the program's can."""
+        return RewindableProcess if parameters.snapshots else cls
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -224,7 +230,8 @@ class Process(Component):
             wrong = f"speaks version {said.get('version')!r} of the exchange, and we {VERSION!r}"
         elif type(self).rewindable and said.get("snapshots") != "true":
             wrong = (
-                'cannot hand out its state (snapshots is not "true"): its type is foreign.process'
+                "cannot hand out its state (its hello does not say snapshots = true): leave out "
+                "snapshots in the scene"
             )
         first = [table for about, table in answer[1:] if about.get("table") == _STATE]
         if not wrong and type(self).rewindable and not first:
@@ -246,45 +253,14 @@ class Process(Component):
         for about, table in answer:
             name = about.get("table", "")
             try:
-                if name not in _NEEDED:
-                    raise ValueError(f"no such table is known{did_you_mean(name, _NEEDED)}")
-                for column in _NEEDED[name]:
-                    if column not in table.column_names:
-                        hint = did_you_mean(column, table.column_names)
-                        raise ValueError(f"there is no column {column!r}{hint}")
-                if table.num_rows or name != "manoeuvres":
-                    yield name, self._message(name, table, tick, sent)
+                message = answered(
+                    name, table, tick, self._roster_of(sent), self.name, self.context.ticks_per_s
+                )
             except ValueError as error:
                 self._link.stop()
                 raise ProcessError(f"sent a table {name!r}: {error}") from None
-
-    def _message(self, name: str, table: Any, tick: IntArray, sent: Any) -> Message:
-        numbers = {
-            column: _numbers(table, column) for column in table.column_names if column != "target"
-        }
-        count = table.num_rows
-        if name == "manoeuvres":
-            known = [column for column in Manoeuvre._fields if column in numbers]
-            told = Manoeuvres(
-                np.repeat(tick, count), **{column: numbers[column] for column in known}
-            )
-            if not all(np.isfinite(getattr(told, column)).all() for column in Manoeuvre._fields):
-                raise ValueError("finite numbers are needed")
-            return told
-        roster = self._roster_of(sent)
-        target = _targets(table, roster)
-        if name == "detections":
-            zero = np.zeros(1, dtype=np.int64)
-            looks = {n: v[:1] if count else np.full(1, np.nan) for n, v in numbers.items()
-                     if n.startswith("own_")}  # fmt: skip
-            return reported_look(tick, zero - 1, numbers, looks, target, roster)
-        return Tracks(
-            tick=tick, offsets=np.array([0, count]), target=target,
-            **{column: numbers[column] for column in _LINE},
-            age_s=numbers.get("age_s", np.zeros(count)),
-            contributors=np.zeros(count, dtype=np.int64), roster=roster, sensors=(),
-            ticks_per_s=self.context.ticks_per_s,
-        )  # fmt: skip
+            if table.num_rows or name != "manoeuvres":
+                yield name, message
 
     def _roster_of(self, sent: Any) -> Roster:
         for _, message in sent:
@@ -304,10 +280,7 @@ class Process(Component):
 
 
 class RewindableProcess(Process):
-    """Runs a program that hands out its state and takes it back, so that its scene looks ahead.
-
-    All else is as with ``foreign.process``; docs/foreign.md says what the program has to do.
-    """
+    """A program that hands out its state and takes it back: its scene looks ahead."""
 
     windowed = True
     rewindable = True
@@ -336,26 +309,3 @@ def _batches(message: Message) -> Iterator[tuple[str, Any]]:
     for table, columns in message.tables().items():
         kinds = {n: declared[table][n].kind if n in declared[table] else "int64" for n in columns}
         yield table, to_arrow(columns, kinds)
-
-
-def _numbers(table: Any, column: str) -> Any:
-    import pyarrow as pa
-
-    try:
-        return table.column(column).combine_chunks().cast(pa.float64()).to_numpy(
-            zero_copy_only=False
-        ).copy()  # fmt: skip
-    except pa.ArrowException:
-        kind = table.column(column).type
-        raise ValueError(f"column {column!r} is of {kind}: numbers are needed") from None
-
-
-def _targets(table: Any, roster: Roster) -> IntArray:
-    place = {name: number for number, name in enumerate(roster.names)}
-    if "target" not in table.column_names:
-        return np.full(table.num_rows, -1, dtype=np.int64)
-    names = table.column("target").to_pylist()
-    for name in names:
-        if name is not None and name not in place:
-            raise ValueError(f"target {name!r} is not in the scene{did_you_mean(str(name), place)}")
-    return np.array([place.get(name, -1) for name in names], dtype=np.int64)

@@ -6,17 +6,15 @@ table in its metadata. A call is frames and an empty one (length 0), and so is i
 
 import os
 import selectors
-import signal
 import struct
 import subprocess
-import sys
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from weakref import finalize
 
+from components.foreign.child_process import ChildProcess, how_it_ended
 from dsa_des.text.safe_text import printable, shortened
 
 VERSION = "1"
@@ -24,8 +22,6 @@ _HEAD = struct.Struct("<Q")
 _LARGEST_FRAME = 2**31
 _CHUNK = 2**20
 _LAST_WORDS = 2000
-# Ends the program's group when our end of its pipe closes, however we go.
-_GUARD = "import os,sys\nsys.stdin.read()\ntry: os.killpg(int(sys.argv[1]),9)\nexcept OSError: pass"
 
 
 class ProcessError(Exception):
@@ -61,7 +57,7 @@ class ProcessLink:
     def __init__(self, command: list[str], folder: Path) -> None:
         self._command, self._folder = command, folder
         self._process: Any = None
-        self.close: Any = lambda: None
+        self._child: ChildProcess | None = None
 
     @property
     def runs(self) -> bool:
@@ -72,28 +68,21 @@ class ProcessLink:
         """Start the program in a group of its own, and what ends it when we are gone."""
         self._words = bytearray()
         try:
-            self._process = subprocess.Popen(
-                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE, cwd=self._folder, bufsize=0,
-                start_new_session=os.name == "posix",
+            child = ChildProcess(
+                self._command, self._folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE, bufsize=0,
             )  # fmt: skip
         except OSError as error:
             raise ProcessError(f"cannot be started: {(error.strerror or '').lower()}") from None
-        guard = None
-        with suppress(OSError):
-            guard = subprocess.Popen(
-                [sys.executable, "-I", "-S", "-c", _GUARD, str(self._process.pid)],
-                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )  # fmt: skip
-        self.close = finalize(self, _end, self._process, guard)
+        self._child, self._process = child, child.process
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             os.set_blocking(pipe.fileno(), False)
 
     def stop(self) -> None:
         """End the program, its children with it."""
-        self.close()
-        self._process = None
+        if self._child is not None:
+            self._child.end()
+        self._child = self._process = None
 
     def ask(self, parts: Iterable[Any], deadline_s: float) -> list[tuple[dict[str, str], Any]]:
         """Send frames and return those of the answer: metadata and table of each.
@@ -178,10 +167,7 @@ class ProcessLink:
 
     def _how_it_ended(self) -> str:
         with suppress(subprocess.TimeoutExpired):
-            code = self._process.wait(1.0)
-            if code < 0:
-                return f"died of signal {-code} ({signal.Signals(-code).name})"
-            return f"ended with exit code {code}"
+            return how_it_ended(self._process.wait(1.0))
         return "closed its output"
 
     def _last_words(self) -> str:
@@ -255,19 +241,3 @@ class _Frames:
             about = table.schema.metadata or {}
             found.append(({k.decode(): v.decode() for k, v in about.items()}, table))
         return found
-
-
-def _end(process: Any, guard: Any) -> None:
-    """Kill the program's whole group, and reap what we started."""
-    if os.name == "posix":
-        with suppress(OSError):
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
-    process.wait()
-    if guard is not None:
-        guard.kill()
-        guard.wait()
-        guard.stdin.close()
-    for pipe in (process.stdin, process.stdout, process.stderr):
-        with suppress(OSError):
-            pipe.close()

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
-from components.foreign.reported_look import reported_look
+from components.foreign.reported_look import reported_looks
 from components.formats.measurement_file import Measurements, read_measurements
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.detections import EXTRAS, Detections, SensorOffer
@@ -209,8 +209,8 @@ class RecordedSensor(Component):
             if set(POSE) <= set(entries):
                 more["own_of_entries"] = {name: entries[name] for name in POSE}
         unsaid = set(EXTRAS) - set(self._extras)
-        return reported_look(
-            tick, measured.scan[number : number + 1],
+        return reported_looks(
+            tick, measured.scan[number : number + 1], np.array([0, len(self._target[rows])]),
             {name: values for name, values in entries.items() if name not in unsaid},
             look, self._target[rows], self._roster, **more,
         )  # fmt: skip

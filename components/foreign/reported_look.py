@@ -1,4 +1,4 @@
-"""One look of a sensor out of columns of numbers, of which some may be missing."""
+"""Looks of a sensor out of columns of numbers, of which some may be missing."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,37 +14,39 @@ from dsa_des.arrays.types import IntArray
 _TRUE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
 
 
-def reported_look(
+def reported_looks(
     tick: IntArray,
     scan: IntArray,
+    offsets: IntArray,
     entries: Mapping[str, Any],
     looks: Mapping[str, Any],
     target: IntArray,
     roster: Roster,
     **more: Any,
 ) -> Detections:
-    """Return the message of one row.
+    """Return the message of some looks.
 
     Parameters
     ----------
-    tick, scan : (1,)
+    tick, scan : (rows,)
+    offsets : (rows + 1,)
     entries : mapping of (entries,)
         Columns of ``detections``.
-    looks : mapping of (1,)
+    looks : mapping of (rows,)
         The ownship's pose, by column, where it is known.
     target : (entries,) of int
     roster : Roster
     **more
         Other fields.
     """
-    count, zero = len(target), np.zeros(1, dtype=np.int64)
+    count, zero = len(target), np.zeros(len(tick), dtype=np.int64)
     nothing = np.full(count, np.nan)
     return Detections(
         tick=tick,
         scan=scan,
         evaluated=zero,
         skipped=dict.fromkeys((*SKIP_REASONS, CULLED), zero),
-        offsets=np.array([0, count]),
+        offsets=offsets,
         target=target,
         azimuth_rad=entries["azimuth_rad"],
         elevation_rad=entries["elevation_rad"],

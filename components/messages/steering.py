@@ -34,6 +34,10 @@ class Manoeuvre(NamedTuple):
         Change of vertical speed, which is kept then.
     vertical_acceleration_mps2 : float
         Of that change, above 0 where there is one.
+    bank_rad : float
+        In place of the turn's rate, above 0: the rate is what this bank gives at the speed flown.
+    roll_rate_rad_s : float
+        How fast the bank of the turn is built up; 0 for at once.
     """
 
     turn_rad: float = 0.0
@@ -44,6 +48,8 @@ class Manoeuvre(NamedTuple):
     acceleration_mps2: float = 0.0
     vertical_speed_mps: float = 0.0
     vertical_acceleration_mps2: float = 0.0
+    bank_rad: float = 0.0
+    roll_rate_rad_s: float = 0.0
 
 
 @dataclass(eq=False)
@@ -55,7 +61,7 @@ class Manoeuvres(Message):
     turn_rad : (rows,)
         Change of heading, positive to the right; 0 for a climb or descent.
     rate_rad_s : (rows,)
-        Rate of the turn, above 0 where there is one.
+        Rate of the turn, above 0 where there is one that has no bank.
     climb_m : (rows,), optional
         Change of altitude, positive upward; 0 for a turn, and by default.
     climb_rate_mps : (rows,), optional
@@ -64,6 +70,8 @@ class Manoeuvres(Message):
         Change of ground speed, and how fast.
     vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
         Change of vertical speed, and how fast.
+    bank_rad, roll_rate_rad_s : (rows,), optional
+        Bank in place of the turn's rate, and how fast it is built up; 0 for neither.
     """
 
     row_table = "manoeuvres"
@@ -89,6 +97,12 @@ class Manoeuvres(Message):
     )
     vertical_acceleration_mps2: FloatArray = column(
         "m/s²", "", "acceleration of that change", of=PER_ROW, default=None
+    )
+    bank_rad: FloatArray = column(
+        "rad", "", "bank of that turn, where it has no rate", of=PER_ROW, default=None
+    )
+    roll_rate_rad_s: FloatArray = column(
+        "rad/s", "", "rate at which the bank is built up; 0: at once", of=PER_ROW, default=None
     )
 
     def __post_init__(self) -> None:

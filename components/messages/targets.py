@@ -22,6 +22,8 @@ from dsa_des.block.message import Column, Columns, Message, Text, per_row, stati
 #: Half of the time over which positions are compared for a velocity; a power of two, so that
 #: times differ by it exactly.
 STEP_S = 1.0 / 1024.0
+# The same of the ownship's, as those measure who measure range rates.
+_OWN_STEP_S = 1.0 / 64.0
 # Aircraft and instants worked on together.
 _AT_ONCE = 16384
 
@@ -344,3 +346,29 @@ def _widened(part: Any, columns: IntArray) -> Any:
         }
     result.columns = columns
     return result
+
+
+def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
+    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
+
+    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
+    by the position itself where the flight begins or ends between; NaN where no flights are known.
+    """
+    if targets.revisit is None or not len(targets.roster) or not len(row):
+        return np.full((3, len(row)), np.nan)
+    flights = targets.revisit.take_rows(row)
+    # Where the ownship is does not depend on the target that is asked for with it.
+    anyone = np.zeros(1, dtype=np.int64)
+    own = [
+        {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
+        for at in (time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S)
+    ]
+    here = [own[0][name] for name in _PLACE]
+    moved, span_s = [], np.zeros(len(row))
+    for there in own[1:]:
+        places = [there[name] for name in _PLACE]
+        way = np.stack(line_of_sight_ned(*here, *places, validate=False))
+        moved.append(np.where(there["present"], way, 0.0))
+        span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((moved[1] - moved[0]) / span_s)

@@ -9,10 +9,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.arguments.checks import not_negative, positive
-from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import Detections
-from components.messages.targets import RelativeTargets
+from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.detection.output import measured_snr
 from components.radar.link_budget import wavelength
 from components.radar.resolution import ResolutionParameters
@@ -21,10 +20,6 @@ from components.sensor.parameters import CorrelationTime, ErrorParameters, Glint
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.errors import Disagreements
-
-# Half of the time between two positions; a power of two, so that times differ by it exactly.
-_STEP_S = 1.0 / 64.0
-_PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 
 class RadarErrorParameters(ResolutionParameters):
@@ -351,29 +346,3 @@ class OwnVelocity(Effect):
             return replace(detections, own_velocity=dict(zip(OWN_VELOCITY, of_scans, strict=True)))
 
         return with_velocity
-
-
-def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
-
-    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
-    by the position itself where the flight begins or ends between; NaN where no flights are known.
-    """
-    if targets.revisit is None or not len(targets.roster) or not len(row):
-        return np.full((3, len(row)), np.nan)
-    flights = targets.revisit.take_rows(row)
-    # Where the ownship is does not depend on the target that is asked for with it.
-    anyone = np.zeros(1, dtype=np.int64)
-    own = [
-        {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
-        for at in (time_s, time_s - _STEP_S, time_s + _STEP_S)
-    ]
-    here = [own[0][name] for name in _PLACE]
-    moved, span_s = [], np.zeros(len(row))
-    for there in own[1:]:
-        places = [there[name] for name in _PLACE]
-        way = np.stack(line_of_sight_ned(*here, *places, validate=False))
-        moved.append(np.where(there["present"], way, 0.0))
-        span_s = span_s + np.where(there["present"], _STEP_S, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray((moved[1] - moved[0]) / span_s)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from components.geometry.attitude import body_to_ned, unit_vector
 from components.messages.detections import OwnOfEntries
 from components.messages.reach import farthest_look
-from components.messages.targets import RelativeTargets
+from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.beam import BeamSweep, Sweep
 from components.radar.detection.cfar import Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
@@ -25,7 +25,7 @@ from components.radar.doppler import (
 )
 from components.radar.ground_clutter import BoundaryClutter, Echo, clutter_as_signal, terrain_of
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
-from components.radar.measurement import OwnVelocity, own_velocity
+from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.resolution import Merging, OneReportByCell

@@ -137,7 +137,8 @@ class GlintParameters(ErrorParameters):
         return said
 
 
-def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
+def clockwise_azimuths(value: tuple[float, float]) -> tuple[float, float]:
+    """Return a field of view in azimuth, deg; refuse one that is none."""
     if not all(-360 <= angle <= 360 for angle in value):
         raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
     if value[0] == value[1] or not -360 < value[1] - value[0] <= 360:
@@ -162,7 +163,7 @@ class SensorParameters(ErrorParameters):
     """
 
     enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(_azimuths)] = Field(
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
         default=(-180.0, 180.0),
         description="Field of view in azimuth, clockwise from the first to the second, deg.",
     )

@@ -25,7 +25,6 @@ from dsa_des.running.reports import (
 )
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.examples import chosen_file
-from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
@@ -144,7 +143,6 @@ def check_scene_file(
         simulation = Simulation(loaded)
         _check_grouping(loaded, partial(load, scene, sets, swaps, seed, noted=True))
     say_if_long(simulation)
-    _say_if_slowed(simulation)
     say_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
@@ -196,18 +194,6 @@ def _check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
         message = "gives other results where scans are worked on one by one and together (table "
         message += f"{differ[0]}): what it returns must not depend on how often it is called"
         raise SceneError([loaded.problem(f"blocks.{name}.type", message) for name in strangers])
-
-
-def _say_if_slowed(simulation: Simulation) -> None:
-    """Say which blocks keep a feedback loop from looking ahead."""
-    scene = simulation.scene
-    looped = in_cycles(scene.graph)
-    if not looped or not simulation.slow:
-        return
-    # A window holds all blocks, so one outside of the loop counts as well.
-    say(f"note: the feedback loop of {', '.join(sorted(looped))} runs scan by scan, which is slow:")
-    for name, why in simulation.slow.items():
-        say(f"  {name} ({scene.classes[name].path()}) {why}")
 
 
 _WIDE = 300

@@ -164,7 +164,8 @@ class Grain:
     cut_edges : set of (source, target)
         Over which something may come back.
     slow : dict
-        Where loops run scan by scan: which blocks are the reason, and why each.
+        Where blocks run scan by scan that others keep from looking ahead: which are the reason, and
+        why each.
     queues : dict
         Shared processors that serve a window at once, and the blocks that line up at each.
     ahead : set of str
@@ -204,7 +205,30 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
-    return Grain(scene.look_ahead_blocks(), False, set(), slow, queues)
+    ahead = scene.look_ahead_blocks()
+    return Grain(ahead, False, set(), slow or _holding_back(scene, ahead), queues)
+
+
+def kept_back(scene: Scene, windowed: Collection[str]) -> list[str]:
+    """Return the blocks that could look ahead, but for others."""
+    classes = scene.classes
+    return sorted(n for n in scene.blocks if _takes_windows(classes[n]) and n not in windowed)
+
+
+def _holding_back(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
+    """Return the blocks behind which others run scan by scan, and why each does."""
+    kept = set(kept_back(scene, windowed))
+    return {
+        name: why
+        for name, why in _without_windows(scene).items()
+        if name not in windowed
+        and not _takes_windows(scene.classes[name])
+        and kept & nx.descendants(scene.graph, name)
+    }
+
+
+def _takes_windows(cls: type[Component]) -> bool:
+    return cls.windowed and cls.process is None
 
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.

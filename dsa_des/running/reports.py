@@ -9,7 +9,9 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, attempt
+from dsa_des.running.grain import kept_back
 from dsa_des.running.simulation import Simulation
+from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shortened
@@ -36,7 +38,24 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
             found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
-    return _unacknowledged(scene, found)
+    return _unacknowledged(scene, [*found, *_slowed(simulation)])
+
+
+def _slowed(simulation: Simulation) -> list[str]:
+    """Return which blocks keep others from looking ahead, in a loop or behind them."""
+    scene = simulation.scene
+    looped = sorted(in_cycles(scene.graph))
+    windowed = [name for name, node in simulation.nodes.items() if node.windowed]
+    kept = kept_back(scene, windowed)
+    # A window of a loop holds all blocks, so one outside of the loop counts as well.
+    what = f"the feedback loop of {', '.join(looped)} runs" if looped else (
+        f"{', '.join(kept)} run"
+    )  # fmt: skip
+    return [
+        f"blocks.{name}: {scene.classes[name].path()} {why}: because of it {what} scan by scan, "
+        "which is slow"
+        for name, why in simulation.slow.items()
+    ]
 
 
 def notes_of_loading(scene: Scene) -> list[str]:

@@ -133,7 +133,7 @@ class Simulation:
         self.failure: Failure | None = None
         self._has_run = False
         grain = self.timeline.grain(window)
-        #: Where loops run scan by scan: which blocks are the reason, and why each.
+        #: Where blocks are kept from looking ahead: which ones are the reason, and why each.
         self.slow = grain.slow
         assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
         self.components: Mapping[str, Component] = assembly.components

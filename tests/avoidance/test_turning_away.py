@@ -36,6 +36,13 @@ def turned(azimuth_deg: float, *, range_m: float = 3000.0, duration_s: float = 8
     return manoeuvres, azimuths
 
 
+def in_body_deg(azimuth_deg: float, bank_deg: float) -> float:
+    """Body azimuth of the target, 50 m higher and 3 km away, from an ownship that banks."""
+    azimuth, bank, rise = math.radians(azimuth_deg), math.radians(bank_deg), 50.0 / 3000.0
+    across = math.sin(azimuth) * math.cos(bank) - rise * math.sin(bank)
+    return math.degrees(math.atan2(across, math.cos(azimuth)))
+
+
 @covers("turn_deg", "rate_deg_s", "range_km", "pause_s", of=("avoidance.turn_away",))
 @pytest.mark.parametrize("azimuth_deg", [20.0, -20.0])
 def test_the_ownship_turns_away_as_far_and_as_fast_as_told(azimuth_deg):
@@ -47,7 +54,35 @@ def test_the_ownship_turns_away_as_far_and_as_fast_as_told(azimuth_deg):
     assert manoeuvres[0]["rate_rad_s"] == pytest.approx(math.radians(8.0))
     # Turning to the left moves what is seen to the right; flying on moves it by 3 deg at most.
     assert azimuths[-1] - azimuths[0] == pytest.approx(-side * 24.0, abs=5.0)
-    assert azimuths[2] - azimuths[0] == pytest.approx(-side * 0.9 * 8.0, abs=1.5)
+    bank_deg = side * math.degrees(math.atan(40.0 * math.radians(8.0) / 9.80665))
+    expected = in_body_deg(azimuth_deg - side * 0.9 * 8.0, bank_deg)
+    assert azimuths[2] == pytest.approx(expected, abs=0.5)
+
+
+@covers("bank_deg", "roll_rate_deg_s", of=("avoidance.turn_away",))
+def test_a_bank_turns_as_fast_as_the_speed_lets_it_and_takes_time_to_roll():
+    banked = {"turn_deg": 60.0, "bank_deg": 40.0}
+    (at_once,), azimuths = turned(-20.0, **banked)
+    (rolled,), later = turned(-20.0, **banked, roll_rate_deg_s=10.0)
+    assert at_once["bank_rad"] == rolled["bank_rad"] == pytest.approx(math.radians(40.0))
+    assert (at_once["rate_rad_s"], at_once["roll_rate_rad_s"]) == (0.0, 0.0)
+    # By hand, at 40 m/s: 9.80665 tan 40° / 40 = 11.79 deg/s; 3.9 s of roll turn by 20.3 deg. What
+    # is seen moves by 0.3 to 0.6 deg/s beside.
+    assert azimuths[2] == pytest.approx(in_body_deg(-20.0 - 0.9 * 11.79, 40.0), abs=0.5)
+    rolled_rad = 9.80665 / 40.0 / math.radians(10.0) * -math.log(math.cos(math.radians(39.0)))
+    expected = in_body_deg(-20.0 - math.degrees(rolled_rad), 39.0)
+    assert later[8] == pytest.approx(expected, abs=2.0)
+    assert azimuths[8] - azimuths[0] < -40.0
+
+
+@covers("direction", of=("avoidance.turn_away",))
+@pytest.mark.parametrize(
+    ("direction", "signs"),
+    [("away", (-1, 1)), ("towards", (1, -1)), ("left", (-1, -1)), ("right", (1, 1))],
+)
+def test_it_turns_to_the_side_that_the_scene_says(direction, signs):
+    found = [turned(side, duration_s=1, direction=direction)[0] for side in (20.0, -20.0)]
+    assert [math.copysign(1.0, row["turn_rad"]) for (row,) in found] == list(signs)
 
 
 def test_the_ownship_turns_for_what_is_near_and_not_all_the_time():

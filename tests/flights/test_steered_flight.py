@@ -41,6 +41,59 @@ def test_it_turns_by_the_angle_at_the_rate_without_a_jump(turn_deg):
     assert steps == pytest.approx(60.0, rel=2e-4)
 
 
+@pytest.mark.parametrize(("speed_mps", "turn_deg"), [(31.0, 90.0), (60.0, -20.0), (260.0, 3.0)])
+def test_a_turn_by_bank_rolls_in_at_the_rate(speed_mps, turn_deg):
+    """Against the equations of motion, integrated: ψ' = g tan φ / v, φ = min(p t, bank)."""
+    bank, roll = math.radians(45.0), math.radians(10.0)
+    own = ScriptedTrajectory(
+        "own", lat_deg=-41.0, lon_deg=4.0, alt_m=1000.0, heading_deg=217.0, speed_mps=speed_mps
+    )
+    manoeuvre = Manoeuvre(math.radians(turn_deg), bank_rad=bank, roll_rate_rad_s=roll)
+    flight = SteeredFlight(own).steered(3.0, manoeuvre)
+    step = 1e-3
+    since = np.arange(0.0, 12.0, step)
+    rate = 9.80665 * np.tan(np.minimum(roll * since, bank)) / speed_mps
+    turned = np.minimum(np.cumsum(rate) * step, math.radians(abs(turn_deg)))
+    heading = math.radians(217.0) + math.copysign(1.0, turn_deg) * turned
+    along = np.cumsum([np.cos(heading), np.sin(heading)], axis=1) * step * speed_mps
+    for after_s in (2.0, 4.0, 6.0, 11.0):
+        k = round(after_s / step)
+        state = flight.at(np.array([3.0, 3.0 + after_s]))
+        north, east, _ = line_of_sight_ned(
+            state.lat_deg[:1], state.lon_deg[:1], state.alt_m[:1],
+            state.lat_deg[1:], state.lon_deg[1:], state.alt_m[1:],
+        )  # fmt: skip
+        # A step of the sum is 0.1 to 0.3 m; arcs of one rate in place of a growing one are less.
+        assert np.hypot(north[0] - along[0, k], east[0] - along[1, k]) < 2e-3 * speed_mps + 0.05
+        change = math.remainder(float(state.yaw_rad[1]) - heading[k], 2.0 * math.pi)
+        assert abs(change) < 0.012
+
+
+@pytest.mark.parametrize("time_s", [0.0, 0.1, 0.4])
+def test_a_manoeuvre_at_the_start_keeps_the_speed(time_s):
+    own = ScriptedTrajectory(
+        "own", lat_deg=-41.0, lon_deg=4.0, alt_m=1000.0, heading_deg=217.0, speed_mps=40.0,
+        climb_mps=3.0,
+    )  # fmt: skip
+    rises = Manoeuvre(vertical_speed_mps=2.0, vertical_acceleration_mps2=10.0)
+    for manoeuvre, climb_mps in ((Manoeuvre(0.3, 0.1), 0.0), (rises, 5.0)):
+        state = SteeredFlight(own).steered(time_s, manoeuvre).at(np.array([4.0, 5.0]))
+        north, east, _ = line_of_sight_ned(
+            state.lat_deg[:1], state.lon_deg[:1], state.alt_m[:1],
+            state.lat_deg[1:], state.lon_deg[1:], state.alt_m[1:],
+        )  # fmt: skip
+        assert np.hypot(north[0], east[0]) == pytest.approx(40.0, rel=2e-3)
+        assert state.alt_m[1] - state.alt_m[0] == pytest.approx(climb_mps, abs=1e-3)
+
+
+def test_a_manoeuvre_that_comes_in_a_roll_goes_on_from_there():
+    manoeuvre = Manoeuvre(1.2, bank_rad=0.7, roll_rate_rad_s=0.15)
+    once = SteeredFlight(STRAIGHT).steered(10.0, manoeuvre)
+    climbs = once.steered(12.0, Manoeuvre(climb_m=100.0, climb_rate_mps=5.0))
+    times = np.array([11.0, 13.0, 16.0, 30.0])
+    assert climbs.at(times).yaw_rad == pytest.approx(once.at(times).yaw_rad, abs=1e-5)
+
+
 def test_manoeuvres_follow_each_other_and_the_old_flight_stays():
     once = SteeredFlight(STRAIGHT).steered(10.0, Manoeuvre(0.5, 0.05))
     twice = once.steered(40.0, Manoeuvre(-0.5, 0.05))

@@ -15,6 +15,7 @@ from wired import chain
 
 import dsa_des
 from components.foreign.process_link import ProcessError, ProcessLink, frame
+from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.running.simulation import Simulation
 
@@ -250,11 +251,7 @@ def test_ten_thousand_calls_and_hundreds_of_megabytes(folder):
         ProcessLink(["/no/such"], folder).start()
 
 
-@covers(
-    "command", "folder", "deadline_s", "on_failure", "most_restarts", "scan_rate_hz", "offset_s",
-    of=("foreign.process_with_state",),
-)  # fmt: skip
-@covers("arguments", of=("foreign.process", "foreign.process_with_state"))
+@covers("arguments", "snapshots", of=("foreign.process",))
 def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
     found = scene([sys.executable, str(Path(__file__).with_name("counts.py"))], duration_s=8)
     found["wires"].remove("eye -> part -> fusion")
@@ -262,20 +259,80 @@ def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
         "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
     ]  # fmt: skip
     found["blocks"]["part"] |= {"deadline_s": 20.0, "arguments": {"every": 5}}
-    by_scan = dsa_des.run(found)
-    found["blocks"]["part"]["type"] = "foreign.process_with_state"
+    by_scan, windowed = dsa_des.run(found), []
+    for snapshots in (True, False):
+        found["blocks"]["part"]["snapshots"] = snapshots
+        nodes = Simulation(dsa_des.load_scene(found)).nodes
+        windowed.append(sorted(name for name, node in nodes.items() if node.windowed))
+    assert "part" in windowed[0] and windowed[1] == []
+    found["blocks"]["part"]["snapshots"] = True
     ahead = dsa_des.run(found)
     assert by_scan.manoeuvres.num_rows == 8
     for name in ("manoeuvres", "detections", "scans", "truth"):
         assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
-    said = [
-        sorted(name for name, node in simulation.nodes.items() if node.windowed)
-        for simulation in (
-            Simulation(dsa_des.load_scene({**found, "blocks": {**found["blocks"], "part": part}}))
-            for part in (
-                found["blocks"]["part"],
-                {**found["blocks"]["part"], "type": "foreign.process"},
-            )
-        )
-    ]
-    assert "part" in said[0] and said[1] == []
+
+
+def test_a_program_that_cannot_be_taken_back_says_so(folder):
+    with pytest.raises(BlockFailure, match=r"cannot hand out its state .* leave out snapshots"):
+        dsa_des.run(scene(canned("slow", 0, folder), snapshots=True))
+    assert gone(folder)
+
+
+def test_a_run_says_which_program_makes_others_go_scan_by_scan(folder):
+    found = scene(canned("slow", 0, folder))
+    notes = dsa_des.run(found, out=folder / "run").info["notes"]
+    (said,) = (note for note in notes if note.startswith("blocks.part: "))
+    assert "foreign.process" in said or "components.foreign.process:Process" in said
+    assert "because of it fusion run scan by scan" in said
+    found["wires"] = [wire for wire in found["wires"] if wire != "eye -> part -> fusion"]
+    found["wires"] += ["eye -> part"]  # nothing is behind it now
+    notes = dsa_des.run(found, out=folder / "run").info.get("notes", [])
+    assert not any("scan by scan" in note for note in notes)
+
+
+def state_tracks(**changes):
+    """One track 3 km north of the frame's origin, 1 km east and 500 m above the ownship."""
+    state = dict(zip(("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s"),
+                     (3000.0, 1000.0, -700.0, -40.0, 5.0, 1.0), strict=True))  # fmt: skip
+    own = {"own_north_m": 0.0, "own_east_m": 0.0, "own_down_m": -200.0}
+    origin = {"origin_lat_deg": -41.3, "origin_lon_deg": -179.9997, "origin_alt_m": 2200.0}
+    spread = {name: 100.0 if name[11] == name[12] else 0.0 for name in COVARIANCE.values()}
+    table = {"track": 7, **state, **own, **origin, **spread, "track_status": "coasted"} | changes
+    return {name: [value] for name, value in table.items() if value is not None}
+
+
+def test_a_tracker_of_others_gives_tracks_with_states(folder):
+    write_table(folder, "state_tracks", state_tracks())
+    found = scene(canned("table", 2, folder))
+    found["wires"].remove("eye -> part -> fusion")
+    found["wires"] += ["eye -> part", "part -> together"]
+    found["blocks"]["together"] = {"type": "fusion.covariance_intersection"}
+    run = dsa_des.run(found)
+    (row,) = (row for row in run.state_tracks.to_pylist() if row["block"] == "part")
+    (fused,) = (row for row in run.state_tracks.to_pylist() if row["block"] == "together")
+    assert (fused["north_m"], fused["updated_by"]) == (pytest.approx(3000.0), "part")
+    assert (row["time_s"], row["track"], row["track_status"]) == (0.2, 7, "coasted")
+    assert row["azimuth_rad"] == pytest.approx(np.arctan2(1000, 3000))
+    assert row["elevation_rad"] == pytest.approx(np.arctan2(500, np.hypot(1000, 3000)))
+    # 10 m across at 3162 m, and what is upward at the slant range.
+    assert row["azimuth_variance_rad2"] == pytest.approx(100 / (1000**2 + 3000**2))
+    assert row["elevation_variance_rad2"] == pytest.approx(100 / (1000**2 + 3000**2 + 500**2))
+    assert row["has_range"] and row["updated_by"] == "part" and row["state_s"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"covariance_35_m2_s2": None}, "there is no column 'covariance_35_m2_s2'"),
+        ({"covariance_11_m2": -1.0}, "'covariance_11_m2': a variance of at least 0"),
+        ({"own_north_m": float("nan")}, "'own_north_m': finite numbers"),
+        ({"east_m": float("nan")}, "'azimuth_rad': a track without a state needs a direction"),
+        ({"track": 0}, "'track': whole numbers from 1"),
+        ({"track_status": "confirmd"}, "did you mean 'confirmed'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_tracks_is_said(folder, changes, said):
+    write_table(folder, "state_tracks", state_tracks(**changes))
+    with pytest.raises(BlockFailure, match=said):
+        dsa_des.run(scene(canned("table", 1, folder)))
+    assert gone(folder)

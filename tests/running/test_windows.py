@@ -92,7 +92,7 @@ def test_check_says_which_block_slows_a_loop(lab, end, back, why):
     back = [text.replace('delay = "0.03 s"', "delay_s = 0.03") for text in back]
     said = CliRunner().invoke(main, ["check", str(a_loop(lab, end, back))]).output
     assert ("feedback loop of cue, end runs scan by scan" in said) == bool(why)
-    assert why in said and ("  end (" in said) == bool(why)
+    assert why in said and ("note: blocks.end: " in said) == bool(why)
 
 
 @pytest.mark.parametrize("jitter", ["", ", jitter_s = 0.4, drop_probability = 0.2"])

@@ -10,7 +10,7 @@ RADARS = ("radar.threshold", "radar.swerling", "radar.range_boundary")
 RANGING = (*RADARS, "laser.scanning")
 LINK_BUDGETS = ("radar.threshold", "radar.swerling")
 CAMERAS = ("optical.eo", "optical.ir", "optical.projection")
-SENSORS = (*RADARS, *CAMERAS, "optical.range_boundary", "laser.scanning")
+SENSORS = (*RADARS, *CAMERAS, "optical.range_boundary", "laser.scanning", "visual.acquisition")
 
 
 def covers(*keys: str, of: tuple[str, ...] = ("",)) -> Callable[[Test], Test]:

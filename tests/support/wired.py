@@ -115,6 +115,10 @@ SENSORS: dict[str, dict[str, Any]] = {
         "divergence_mrad": 1.0, "peak_power_w": 1e9, "pulse_ns": 5.0, "aperture_mm": 50.0,
         "noise_equivalent_power_w": 1e-9,
     },
+    "visual.acquisition": {
+        "type": "visual.acquisition", "scan_rate_hz": 1, "azimuth_deg": [-180.0, 180.0],
+        "elevation_deg": [-90.0, 90.0], "beta_per_sr_s": 1e12, "between_scans": "as_at_scan",
+    },
 }  # fmt: skip
 
 

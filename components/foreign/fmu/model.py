@@ -1,6 +1,5 @@
 """What an FMU says of itself: variables, units, clocks; read from its file, nothing is run."""
 
-import math
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Mapping
@@ -10,39 +9,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from components.foreign.fmu.units import Scale, scale_of
 from dsa_des.errors import did_you_mean
 
 _KINDS = {"Real": "Float64", "Integer": "Int32"}
-#: Names of our units: powers of (m, s, rad), and how large each is in SI units.
-_UNITS: dict[str, tuple[tuple[int, int, int], float]] = {
-    "m": ((1, 0, 0), 1.0), "km": ((1, 0, 0), 1e3), "ft": ((1, 0, 0), 0.3048),
-    "m2": ((2, 0, 0), 1.0), "s": ((0, 1, 0), 1.0), "ms": ((0, 1, 0), 1e-3),
-    "rad": ((0, 0, 1), 1.0), "deg": ((0, 0, 1), math.pi / 180),
-    "m/s": ((1, -1, 0), 1.0), "km/h": ((1, -1, 0), 1 / 3.6), "kn": ((1, -1, 0), 1852 / 3600),
-    "m/s2": ((1, -2, 0), 1.0), "rad/s": ((0, -1, 1), 1.0),
-    "deg/s": ((0, -1, 1), math.pi / 180), "Hz": ((0, -1, 0), 1.0), "1/s": ((0, -1, 0), 1.0),
-}  # fmt: skip
-#: How a column's name ends, and its unit; longer endings first.
-_ENDINGS = {
-    "_rad_s": "rad/s", "_deg_s": "deg/s", "_m_s": "m/s", "_mps": "m/s", "_mps2": "m/s2",
-    "_rad": "rad", "_deg": "deg", "_km": "km", "_hz": "Hz", "_db": "dB", "_dbsm": "dBsm",
-    "_rad2": "rad2", "_m2": "m2", "_m": "m", "_s": "s",
-}  # fmt: skip
-
-
-def unit_of_column(name: str) -> str:
-    """Return the unit that a column's name ends with, or nothing."""
-    ending = max((end for end in _ENDINGS if name.endswith(end)), key=len, default="")
-    return _ENDINGS.get(ending, "")
-
-
-@dataclass(frozen=True)
-class Scale:
-    """A unit: powers of m, s, rad, kg, A, K, mol and cd, and x SI = factor x + offset."""
-
-    powers: tuple[int, ...]
-    factor: float
-    offset: float = 0.0
+#: Kinds whose values are no numbers.
+TEXT_KINDS = ("String", "Binary")
 
 
 @dataclass(frozen=True)
@@ -62,6 +34,8 @@ class Variable:
     start : str or None
     settable : bool
         Whether a scene may give its start value.
+    items : tuple of (str, int)
+        Of an enumeration: its names and what they stand for.
     """
 
     name: str
@@ -74,6 +48,17 @@ class Variable:
     start: str | None = None
     settable: bool = False
     alias: bool = False
+    items: tuple[tuple[str, int], ...] = ()
+
+    def item(self, name: str) -> int:
+        """Return what a name of an enumeration stands for; ValueError names the nearest."""
+        known = dict(self.items)
+        if name not in known:
+            raise ValueError(
+                f"{self.name!r} is {name!r}: it must be one of {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
+        return known[name]
 
 
 @dataclass(frozen=True)
@@ -142,22 +127,14 @@ class FmuModel:
         own = variable.unit
         if own in ("", unit) or not unit:
             return 1.0, 0.0
-        to = self.scales.get(own) or _scale_of(own)
-        known = _scale_of(unit)
+        to = self.scales.get(own) or scale_of(own)
+        known = scale_of(unit)
         if known is None or to is None or known.powers != to.powers:
             raise ValueError(
                 f"{variable.name!r} of {self.path.name} is in {own!r}, which {unit!r} cannot be "
                 "made into"
             )
         return known.factor / to.factor, (known.offset - to.offset) / to.factor
-
-
-def _scale_of(unit: str) -> Scale | None:
-    named = unit.replace("²", "2").replace("^", "")
-    if named not in _UNITS:
-        return None
-    powers, factor = _UNITS[named]
-    return Scale((*powers, 0, 0, 0, 0, 0), factor)
 
 
 def read_fmu(path: Path) -> FmuModel:
@@ -239,8 +216,13 @@ def _variable(v: Any, version: int, everything: Any) -> Variable:
     return Variable(
         v.name, v.unit or declared or "", v.valueReference, kind, v.causality or "local",
         v.variability or usual, dimensions, v.start, settable and v.variability != "constant",
-        v.alias is not None,
+        v.alias is not None, _items(v),
     )  # fmt: skip
+
+
+def _items(v: Any) -> tuple[tuple[str, int], ...]:
+    items = (v.declaredType.items if v.type == "Enumeration" and v.declaredType else None) or ()
+    return tuple((item.name, int(item.value)) for item in items)
 
 
 def _scale(unit: Any) -> Scale | None:

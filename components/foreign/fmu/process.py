@@ -10,16 +10,23 @@ import tempfile
 import threading
 import time
 import zipfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from weakref import WeakValueDictionary, finalize
+from weakref import WeakValueDictionary
 
 import numpy as np
 
+from components.foreign.child_process import ChildProcess, how_it_ended
 from dsa_des.text.safe_text import printable, shortened
 
-_WORKER = Path(__file__).with_name("worker.py")
+_ROOT = Path(__file__).parents[3]
+# Ours is looked for last: what runs the FMU finds it where it is not installed, too.
+_WORKER = """
+import sys
+sys.path.append(sys.argv[1])
+from components.foreign.fmu.worker import serve
+serve(sys.argv[2])
+"""
 _LOOK_S = 0.05
 
 
@@ -46,17 +53,17 @@ class FmuProcess:
             np.zeros(1, dtype=np.int64).tofile(folder / "beat")
             # Appended to, so that it can be cut off while it is written.
             with open(folder / "words", "ab") as words:
-                self._process = subprocess.Popen(
-                    [sys.executable, "-P", str(_WORKER), str(folder), str(os.getpid())],
-                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=words, cwd=folder,
+                child = ChildProcess(
+                    [sys.executable, "-P", "-c", _WORKER, str(_ROOT), str(folder)], folder, folder,
+                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=words,
                 )  # fmt: skip
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
-        self._folder = folder
+        self._folder, self._child, self._process = folder, child, child.process
         self._beat = np.memmap(folder / "beat", dtype=np.int64, mode="r", shape=(1,))
         self._count = 0
-        self.close = finalize(self, _end, self._process, folder)
+        self.close = child.end
 
     def open(self, spec: dict[str, Any], deadline_s: float) -> int:
         """Make an instance; return its number."""
@@ -107,12 +114,8 @@ class FmuProcess:
         self.close()
         if watch.late:
             why = f"did not answer within {deadline_s:g} s (deadline_s)"
-        elif code < 0:
-            import signal
-
-            why = f"its process was ended by {signal.Signals(-code).name}"
         else:
-            why = f"its process ended with code {code}"
+            why = f"its process {how_it_ended(code)}"
         return FmuError(f"{self.path.name}: {why}{words}")
 
     def _last_words(self) -> str:
@@ -160,15 +163,6 @@ class _Watch:
         elif now - self._since > self._deadline_s:
             self.late = True
             self._process.kill()
-
-
-def _end(process: Any, folder: Path) -> None:
-    process.kill()
-    for pipe in (process.stdin, process.stdout):
-        with suppress(OSError):
-            pipe.close()
-    process.wait()
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _extract(path: Path, folder: Path) -> None:

@@ -194,37 +194,44 @@ _DESCRIPTION2 = """<?xml version="1.0" encoding="UTF-8"?>
 
 def lag_fmu(folder: Path, version: int = 3, *, rewindable: bool = True, platform: str = "") -> Path:
     """Build a low pass as an FMU; a test that needs it is left out where there is no compiler."""
+    said = (_DESCRIPTION3 if version == 3 else _DESCRIPTION2).format(
+        rewindable=str(rewindable).lower(), units=_UNITS
+    )
+    source = _MODEL + (_FMI3 if version == 3 else _FMI2)
+    return packed(folder / "lag.fmu", said, source, version, platform)
+
+
+def packed(
+    path: Path, said: str, source: str, version: int, platform: str = "", **resources: str
+) -> Path:
+    """Compile a source and write it as an FMU, with files among its resources."""
     if COMPILER is None or sys.platform != "linux":
         pytest.skip("needs a C compiler")
     import fmpy
 
-    library = _library(version)
-    said = (_DESCRIPTION3 if version == 3 else _DESCRIPTION2).format(
-        rewindable=str(rewindable).lower(), units=_UNITS
-    )
     name = platform or (fmpy.platform_tuple if version == 3 else fmpy.platform)
-    path = folder / "lag.fmu"
+    identifier = re.findall(r'modelIdentifier="(\w+)"', said)[0]
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", said)
-        archive.writestr(f"binaries/{name}/lag.so", library)
+        archive.writestr(f"binaries/{name}/{identifier}.so", _library(source, version))
+        for file, text in resources.items():
+            archive.writestr(f"resources/{file}.txt", text)
     return path
 
 
 @cache
-def _library(version: int) -> bytes:
+def _library(source: str, version: int) -> bytes:
     """Return the compiled library, in which what the model has no function for returns an error."""
     import tempfile
 
     from fmpy import fmi2, fmi3
 
-    slave, source = (
-        (fmi3.FMU3Slave, _MODEL + _FMI3) if version == 3 else (fmi2.FMU2Slave, _MODEL + _FMI2)
-    )
+    slaves = [fmi3.FMU3Slave, fmi3.FMU3ScheduledExecution] if version == 3 else [fmi2.FMU2Slave]
     written = set(re.findall(r"\bfmi[23]\w+", source))
-    names = [n for n in dir(slave) if re.match(r"fmi[23][A-Z]", n) and n not in written]
-    source += "".join(f"int {name}(void) {{ return 3; }}\n" for name in names)
+    known = {name for slave in slaves for name in dir(slave) if re.match(r"fmi[23][A-Z]", name)}
+    source += "".join(f"int {name}(void) {{ return 3; }}\n" for name in sorted(known - written))
     with tempfile.TemporaryDirectory() as folder:
-        file, library = Path(folder, "lag.c"), Path(folder, "lag.so")
+        file, library = Path(folder, "model.c"), Path(folder, "model.so")
         file.write_text(source)
         assert COMPILER is not None
         command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", str(library), str(file), "-lm"]

@@ -1,0 +1,71 @@
+"""What messages say of the ownship: its pose as believed, its velocity; held until news come."""
+
+from typing import Any
+
+import numpy as np
+
+from components.messages.columns import OWN_VELOCITY, POSE
+from components.messages.targets import RelativeTargets, TrafficStates, own_velocity
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.wake import Wake
+
+_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+_LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
+
+
+def own_columns(
+    wake: Wake, port: str, held: dict[tuple[int, str], FloatArray], *, moves: bool
+) -> tuple[FloatArray, dict[tuple[int, str], FloatArray]]:
+    """Return the ownship at each row of a wake, and what is held of each source from now on.
+
+    What a line of sight was made with (the belief) goes before the traffic's truth.
+
+    Parameters
+    ----------
+    wake : Wake
+    port : str
+        Over which the messages come.
+    held : dict of (9,)
+    moves : bool
+        Whether the velocity is wanted as well.
+
+    Returns
+    -------
+    own : (9, rows)
+        `POSE` and `OWN_VELOCITY`; NaN where nothing has come yet.
+    held : dict of (9,)
+    """
+    came = {}
+    for arrivals in wake.arrivals(port):
+        trust = next(
+            (k for k, kind in enumerate(_LEVEL_OF_TRUST) if isinstance(arrivals.message, kind)), -1
+        )
+        if trust >= 0 and len(arrivals.message):
+            came[trust, arrivals.source] = arrivals
+    found = np.full((len(POSE) + len(OWN_VELOCITY), len(wake)), np.nan)
+    after = dict(held)
+    for key in sorted({*came, *held}):
+        mine = np.repeat(held.get(key, np.full(len(found), np.nan))[:, np.newaxis], len(wake), 1)
+        if key in came:
+            place = np.searchsorted(came[key].tick, wake.ticks, side="right") - 1
+            said = _said(came[key].message, wake, moves)
+            mine[:, place >= 0] = said[:, place[place >= 0]]
+        after[key] = mine[:, -1].copy()
+        found = np.where(np.isnan(mine), found, mine)
+    return found, after
+
+
+def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
+    """Return what each row of a message says, (9, rows)."""
+    rows = len(message)
+    found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
+    if isinstance(message, TrafficStates):
+        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _BELIEVED]
+        return found
+    if message.believed is not None:
+        found[: len(POSE)] = [message.believed[name] for name in _BELIEVED]
+    if moves:
+        state: IntArray = message.tick if message.state_tick is None else message.state_tick
+        time_s = wake.own_ticks(state) / wake.ticks_per_s
+        found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
+    return found

@@ -1,0 +1,118 @@
+"""What a scene says of an FMU, and when it communicates."""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from components.foreign.fmu.model import FmuModel, read_fmu
+from components.foreign.fmu.wiring import Wiring
+from dsa_des.block.component import (
+    NonNegativeRational,
+    Parameters,
+    PositiveRational,
+    Rational,
+    ScenePath,
+)
+from dsa_des.errors import Disagreements
+from dsa_des.time.clock import ClockSpec
+
+
+class FmuParameters(Parameters):
+    """Parameters of an FMU."""
+
+    file: ScenePath = Field(description="The FMU: FMI 2 or 3, co-simulation or, FMI 3, scheduled.")
+    scan_rate_hz: PositiveRational | None = Field(
+        default=None,
+        description="Communication points per second. By default they are the instants at which "
+        "something arrives, and without wires the FMU's own step.",
+    )
+    offset_s: NonNegativeRational = Field(
+        default=Fraction(0), description="Time of the first communication point, s."
+    )
+    start: dict[str, Any] = Field(
+        default={},
+        description='Start values by variable, in its own unit or as "5 km/h"; of an enumeration '
+        "also by name.",
+    )
+    inputs: dict[str, str] = Field(
+        default={},
+        description='Where inputs come from: "BLOCK.COLUMN", "BLOCK.COLUMN[TARGET]", and of '
+        'another FMU "BLOCK.VARIABLE"; a whole terminal as "BLOCK" or "BLOCK[TARGET]".',
+    )
+    outputs: list[str] | None = Field(
+        default=None, description="Variables that are sent and recorded; by default all outputs."
+    )
+    clocks: dict[str, list[Rational] | str] = Field(
+        default={},
+        description="When triggered clocks tick: at times, s, or whenever the block of a name "
+        "sends.",
+    )
+    ownship: dict[str, str] = Field(
+        default={},
+        description="Fields of the ownship's state (own_alt_m) by output: traffic that comes in "
+        "goes out with them.",
+    )
+    manoeuvre: dict[str, str] = Field(
+        default={}, description="Fields of a manoeuvre (turn_rad) by output that commands it."
+    )
+    detections: dict[str, float | str | list[str]] = Field(
+        default={},
+        description='Columns of detections (azimuth_rad, range_m, "detected") by output: an array, '
+        '"plane[*].range" for all that there are, or a list has a value for each detection; a '
+        "number is the same for all.",
+    )
+    targets: list[str] = Field(
+        default=[],
+        description="Names of the targets that these are, one by one; without, trackers decide.",
+    )
+    deadline_s: float = Field(
+        default=10.0, gt=0, description="Longest time for one communication point, s."
+    )
+    _model: Any = PrivateAttr(None)
+    _wiring: Any = PrivateAttr(None)
+
+    @property
+    def model(self) -> FmuModel:
+        """What the FMU says of itself."""
+        found: FmuModel = self._model
+        return found
+
+    @property
+    def wiring(self) -> Wiring:
+        """How its variables are read and set."""
+        found: Wiring = self._wiring
+        return found
+
+    @model_validator(mode="after")
+    def _fits(self) -> "FmuParameters":
+        try:
+            self._model = read_fmu(self.file)
+        except ValueError as error:
+            raise Disagreements([f"file: {error}"]) from error
+        wiring = Wiring(self)
+        Disagreements.refuse(wiring.wrong)
+        self._wiring = wiring
+        return self
+
+    def clock_spec(self) -> ClockSpec | None:
+        """Return when it communicates, if that does not follow from what arrives."""
+        if self.model.kind == "se":
+            step = _common(self.wiring.instants)
+            return ClockSpec(1 / step) if step else None
+        if self.scan_rate_hz is not None:
+            return ClockSpec(self.scan_rate_hz, self.offset_s)
+        if not self.wiring.sources and not self.ownship:
+            return ClockSpec(1 / (self.model.step_s or Fraction(1, 100)), self.offset_s)
+        return None
+
+
+def _common(instants: Sequence[Fraction]) -> Fraction:
+    """Return the largest step of which all instants are multiples."""
+    step = Fraction(0)
+    for instant in instants:
+        denominator = math.lcm(step.denominator, instant.denominator)
+        step = Fraction(math.gcd(int(step * denominator), int(instant * denominator)), denominator)
+    return step

@@ -1,0 +1,1 @@
+"""Observers who look out: models of visual acquisition, and the block."""

@@ -1,0 +1,207 @@
+"""Visual acquisition: Andrews's rate, its integral, and a search that comes round.
+
+The rate at which somebody who looks out first sees an aircraft goes with the solid angle that it
+subtends, β A / r², less what the air takes of its contrast: J. W. Andrews, Modeling of air-to-air
+visual acquisition, The Lincoln Laboratory Journal 2, 1989, and Air-to-air visual acquisition
+handbook, MIT Lincoln Laboratory ATC-151, 1991. Acquisitions are a Poisson process of that rate.
+Pure functions; the block draws with its own keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+#: Per steradian and second, of pilots whom nothing has told where to look (ATC-152, 1991).
+UNALERTED_PER_SR_S = 17_000.0
+#: Optical depth of a path as long as the visual range of the handbook: 5 % of contrast are left.
+VISUAL_RANGE_DEPTH = 2.996
+
+# Parts of an interval at whose ends it is asked whether something shows.
+_SUBINTERVALS = 4
+# An end of what shows is found to 2^-30 of a part.
+_HALVINGS = 30
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+#: Of some cells at some seconds later each: what is wanted.
+AtInstants = Callable[[IntArray, FloatArray], Any]
+
+
+def acquisition_rate(
+    area_m2: ArrayLike,
+    range_m: ArrayLike,
+    *,
+    beta_per_sr_s: ArrayLike = UNALERTED_PER_SR_S,
+    extinction_per_m: ArrayLike = 0.0,
+) -> Any:
+    """Return Andrews's rate of acquisition, β A / r² · exp(-extinction · r).
+
+    Parameters
+    ----------
+    area_m2, range_m : array_like
+        Projected area of what is looked for, 0 or more, and its distance, above 0.
+    beta_per_sr_s : array_like
+        How well is searched, 1/(sr s).
+    extinction_per_m : array_like
+        Of the air; 2.996 over the visual range (5 % of contrast), or 3.912 over the visibility
+        (2 %).
+
+    Returns
+    -------
+    array of the broadcast shape, 1/s
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+    """
+    shape, (area, distance, beta, extinction) = broadcast_flat(
+        area_m2=not_negative("area_m2", area_m2),
+        range_m=positive("range_m", range_m),
+        beta_per_sr_s=not_negative("beta_per_sr_s", beta_per_sr_s),
+        extinction_per_m=not_negative("extinction_per_m", extinction_per_m),
+    )
+    with np.errstate(under="ignore"):
+        return unflatten(beta * area / distance**2 * np.exp(-extinction * distance), shape)
+
+
+def closing_opportunity(
+    area_m2: float,
+    closing_mps: float,
+    *,
+    from_m: float,
+    to_m: float,
+    beta_per_sr_s: float = UNALERTED_PER_SR_S,
+    extinction_per_m: float = 0.0,
+) -> float:
+    """Return the integral of the rate on a straight collision course, in closed form.
+
+    β A / V · (E2(k r)/r at `to_m` less that at `from_m`) with the extinction k and E2 the
+    exponential integral; `from_m` may be infinite. The probability of acquisition is
+    1 - exp(-integral).
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or `from_m` is nearer than `to_m`.
+    """
+    from scipy.special import expn
+
+    nearest = float(positive("to_m", to_m))
+    if not from_m >= nearest:
+        raise ValueError(f"from_m is {from_m:g}: it must be at least to_m, {nearest:g}")
+    extinction = float(not_negative("extinction_per_m", extinction_per_m))
+
+    def beyond(range_m: float) -> float:
+        return float(expn(2, extinction * range_m)) / range_m if range_m < np.inf else 0.0
+
+    scale = float(not_negative("beta_per_sr_s", beta_per_sr_s))
+    scale *= float(not_negative("area_m2", area_m2)) / float(positive("closing_mps", closing_mps))
+    return scale * (beyond(nearest) - beyond(from_m))
+
+
+def round_share(
+    closing_mps: float, *, from_m: float, to_m: float, round_s: float, looking: float = 1.0
+) -> float:
+    """Return the probability that a search which comes round meets a closing aircraft, in time.
+
+    The place of the aircraft is looked at once in `round_s`, at a phase that is as likely as any
+    other; it shows from `from_m` on and must be seen by `to_m`. `looking` is the probability that
+    somebody looks out at all.
+    """
+    shows_s = max(from_m - to_m, 0.0) / float(positive("closing_mps", closing_mps))
+    return looking * min(shows_s / float(positive("round_s", round_s)), 1.0)
+
+
+def angular_size_rad(area_m2: FloatArray, range_m: FloatArray) -> FloatArray:
+    """Return the diameter of the disc that has an area, as it is seen from afar."""
+    size: FloatArray = np.sqrt(area_m2 * (4.0 / np.pi)) / range_m
+    return size
+
+
+def farthest_shown_m(area_m2: float, smallest_rad: float) -> float:
+    """Return from where a disc of an area has the smallest angular size that shows."""
+    return float(np.sqrt(area_m2 * (4.0 / np.pi)) / smallest_rad) if smallest_rad else np.inf
+
+
+def integral_where_shown(before_s: FloatArray, shown: AtInstants, rate: AtInstants) -> FloatArray:
+    """Return the integral of a rate over the interval before each cell, while it shows.
+
+    Whether something shows is asked at the ends of four parts of each interval; where it begins or
+    ends to show within one, that instant is found by halving. Over each stretch the rate is
+    integrated by Gauss and Legendre's rule of eight nodes.
+
+    Parameters
+    ----------
+    before_s : (n,)
+        Length of the interval that ends with each cell, s.
+    shown, rate : callable
+        Given cells (m,) and seconds after them (m,), 0 or less: which show, and the rate, 1/s.
+
+    Returns
+    -------
+    (n,) array
+    """
+    cell, begin, end = _stretches(before_s, shown)
+    integral = np.zeros(len(before_s))
+    if not len(cell):
+        return integral
+    half = 0.5 * (end - begin)
+    nodes = (0.5 * (begin + end))[:, np.newaxis] + half[:, np.newaxis] * _NODES
+    values = rate(np.repeat(cell, len(_NODES)), nodes.reshape(-1)).reshape(nodes.shape)
+    # Node by node, so that no sum depends on how many cells there are.
+    total = np.zeros(len(cell))
+    for column, weight in zip(values.T, _WEIGHTS, strict=True):
+        total += weight * column
+    np.add.at(integral, cell, half * total)
+    return integral
+
+
+def _stretches(before_s: FloatArray, shown: AtInstants) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the stretches of the intervals in which something shows: cell, begin and end."""
+    count = len(before_s)
+    part = before_s / _SUBINTERVALS
+    ends = [-before_s + k * part for k in range(_SUBINTERVALS)] + [np.zeros(count)]
+    everyone = np.arange(count)
+    shows = [np.asarray(shown(everyone, at), dtype=bool) for at in ends]
+    always = np.logical_and.reduce(shows) & (before_s > 0.0)
+    cells, begins, stops = [np.flatnonzero(always)], [-before_s[always]], [np.zeros(always.sum())]
+    for k in range(_SUBINTERVALS):
+        some = np.flatnonzero((shows[k] | shows[k + 1]) & ~always & (before_s > 0.0))
+        if not len(some):
+            continue
+        left, right = ends[k][some], ends[k + 1][some]
+        first, last = shows[k][some], shows[k + 1][some]
+        edge = _edge(some, left, right, first, shown, first != last)
+        cells.append(some)
+        begins.append(np.where(first, left, edge))
+        stops.append(np.where(last, right, edge))
+    return np.concatenate(cells), np.concatenate(begins), np.concatenate(stops)
+
+
+def _edge(
+    cell: IntArray,
+    left: FloatArray,
+    right: FloatArray,
+    first: BoolArray,
+    shown: AtInstants,
+    changes: BoolArray,
+) -> FloatArray:
+    """Return when what shows changes between two instants of some cells; the right one if not."""
+    edge = right.copy()
+    (which,) = np.nonzero(changes)
+    if not len(which):
+        return edge
+    low, high = left[which], right[which]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        as_first = np.asarray(shown(cell[which], middle), dtype=bool) == first[which]
+        low, high = np.where(as_first, middle, low), np.where(as_first, high, middle)
+    edge[which] = high
+    return edge

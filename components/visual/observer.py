@@ -1,0 +1,399 @@
+"""An observer who looks out of the window (``visual.acquisition``), and its ladder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from components.aircraft.known_targets import known_targets
+from components.atmosphere.visibility import KOSCHMIEDER
+from components.geometry import FieldOfView
+from components.messages.reach import Reach
+from components.optical.area_of_cells import area_of_cells
+from components.optical.weather_effects import Night, scene_visibility_m
+from components.sensor.ladder_values import over_cells
+from components.sensor.look import Cells, Look
+from components.sensor.marks import EYES
+from components.sensor.parameters import (
+    CorrelationTime,
+    ErrorParameters,
+    SensorParameters,
+    clockwise_azimuths,
+    rising_elevations,
+)
+from components.sensor.sensor import Sensor
+from components.visual.acquisition import (
+    UNALERTED_PER_SR_S,
+    acquisition_rate,
+    angular_size_rad,
+    farthest_shown_m,
+    integral_where_shown,
+)
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.effect import Effect
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.wake import Wake
+from dsa_des.time.clock import NANOSECONDS
+from dsa_des.time.timeline import first_scan
+
+_PROBABILITY = Quantity("acquisition_probability", "P")
+_NEVER = np.iinfo(np.int64).max
+# Covers the rounding of ranges and areas many times over.
+_MARGIN, _MARGIN_M = 1.0 + 1e-9, 1.0
+_ARCMIN_RAD = math.radians(1.0 / 60.0)
+
+
+class LookoutParameters(SensorParameters):
+    """Parameters of one or two observers; the defaults are the left pilot of Andrews's model."""
+
+    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
+
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
+        default=(-110.0, 90.0),
+        description="Field of view of who sits on the left, clockwise from the first to the "
+        "second, deg; that of who sits on the right is its mirror image.",
+    )
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+        default=(-20.0, 35.0), description="Field of view in elevation, lowest and highest, deg."
+    )
+    left_looking: float = Field(
+        default=1.0, ge=0, le=1, description="Share of time that who sits on the left looks out."
+    )
+    right_looking: float = Field(
+        default=0.0, ge=0, le=1, description="The same of who sits on the right; 0: nobody."
+    )
+    looking: Literal["glances", "spells"] = Field(
+        default="glances",
+        description="Whether the share is of short glances, which scale the search, or of spells "
+        "longer than an approach: each looks out through all of a run with that probability.",
+    )
+    search: Literal["random", "round"] = Field(
+        default="random",
+        description="Whether an aircraft is found at Andrews's rate, or at the first look at its "
+        "place of a search that comes round.",
+    )
+    beta_per_sr_s: float = Field(
+        default=UNALERTED_PER_SR_S,
+        gt=0,
+        description="Rate of acquisition per solid angle of the aircraft, 1/(sr s); 17,000 is of "
+        "pilots whom nothing alerts.",
+    )
+    round_s: float = Field(default=36.0, gt=0, description="Time in which a search comes round, s.")
+    smallest_arcmin: float = Field(
+        default=1.0,
+        ge=0,
+        description="Angular size of the smallest disc that is seen; an aircraft counts as the "
+        "disc of its projected area.",
+    )
+    between_scans: Literal["as_at_scan", "integral"] = Field(
+        default="integral",
+        description="Whether the search since the last scan is taken to be as at the scan, or is "
+        "integrated along the flights.",
+    )
+    judges_range: bool = Field(
+        default=False, description="Whether the range is judged too, with range_error_m."
+    )
+    range_error_m: float = Field(
+        default=0.0, ge=0, description="Standard deviation of judged range, m."
+    )
+    range_bias_m: float = Field(default=0.0, description="Bias of judged range, m; see biases.")
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
+    )
+
+    @model_validator(mode="after")
+    def _somebody_sits_there(self) -> Self:
+        low, high = self.azimuth_deg
+        if self.right_looking and not (-180.0 <= low < 0.0 < high <= 180.0):
+            raise ValueError(
+                f"azimuth_deg is [{low:g}, {high:g}]: with somebody on the right it must hold "
+                "straight ahead, from [-180, 0) to (0, 180]"
+            )
+        return self
+
+    def reach(self) -> Reach:
+        """Return the reach of all who look out."""
+        reach = super().reach()
+        low, high = reach.azimuth_rad
+        fields = [
+            edges
+            for share, edges in (
+                (self.left_looking, (low, high)), (self.right_looking, (-high, -low)),
+            )
+            if share > 0.0
+        ]  # fmt: skip
+        if not fields:
+            return replace(reach, enabled=False)
+        both = min(low for low, _ in fields), max(high for _, high in fields)
+        return replace(reach, azimuth_rad=both)
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to another search, or to a range that nobody judges."""
+        said = super().without_effect()
+        other = "round_s" if self.search == "random" else "beta_per_sr_s"
+        said += self.idle(other, because=f"search is '{self.search}'")
+        if not self.judges_range:
+            said += self.idle(
+                "range_error_m", "range_bias_m", "range_correlation_time_s",
+                because="judges_range is false",
+            )  # fmt: skip
+        if not (self.left_looking or self.right_looking):
+            said.append("left_looking and right_looking are 0: nobody looks out")
+        return said
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability of acquisition since the last scan at every (scan, target)."""
+    observer: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {_PROBABILITY.name: observer.acquisition_probability(cells)}
+
+    found: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
+    return found
+
+
+BETWEEN_SCANS = Ladder(
+    "between scans",
+    (
+        Rung("as_at_scan", "the rate at the scan, times the period",
+             parameters={"between_scans": "as_at_scan"}),
+        Rung("integral", "the rate integrated along the flights",
+             parameters={"between_scans": "integral"}),
+    ),
+    "integral",
+    (_PROBABILITY,),
+    measure,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Seat:
+    """Who looks out from where: a field of view in the sensor's axes, and a share of the time."""
+
+    number: int
+    field: FieldOfView
+    share: float
+
+
+class _SeenBefore:
+    """What is seen of some cells at instants of their own, in place of `Cells`."""
+
+    def __init__(self, cells: Cells, which: IntArray, ahead_s: FloatArray) -> None:
+        self.seen: Mapping[str, AnyArray] = cells.seen_at(which, ahead_s)
+        self.roster, self.craft = cells.roster, cells.craft[which]
+
+    def __len__(self) -> int:
+        return len(self.craft)
+
+    def __getattr__(self, name: str) -> AnyArray:
+        return self.seen[name]
+
+    def of_target(self, column: FloatArray) -> AnyArray:
+        """Return a column of the roster for each."""
+        return column[self.craft]
+
+
+class Lookout(Sensor):
+    """Somebody who looks out: sees an aircraft from its acquisition on, while it is in view.
+
+    With ``search = "random"`` acquisitions are a Poisson process whose rate is Andrews's; with
+    ``"round"`` the place of an aircraft is looked at once a round, at a phase drawn for each run
+    and aircraft. What happens between scans counts at the next scan, if the aircraft is in view
+    then; what came before the run began does not. Confidence is the angular size over the smallest
+    that is seen, less 1. Haze is ``[weather] visibility_km`` (3.912 over it; a visual range of 5 %
+    contrast is 0.766 of that visibility).
+    """
+
+    mark = EYES
+    Parameters = LookoutParameters
+    lockstep = True
+    hooks = {"darkness": "whether it is too dark to see anything"}
+    effects: ClassVar[tuple[Effect, ...]] = (Night(),)
+    ladders = (BETWEEN_SCANS,)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.measures_range = bool(parameters.judges_range)
+        self._smallest_rad = parameters.smallest_arcmin * _ARCMIN_RAD
+        self._period_s = 1.0 / float(parameters.scan_rate_hz)
+        self._finds = self.stream("acquisition")
+        self._phases, self._attends = self.stream("phase"), self.stream("attention")
+        #: The first scan at which each target is seen: of the first replica, the second, and so on.
+        self._first_seen: IntArray = np.empty(0, dtype=np.int64)
+
+    def setup(self) -> None:
+        """Look no farther than the largest aircraft shows, and not in the dark."""
+        visibility_m = scene_visibility_m(self.context.sections["weather"])
+        self._extinction_per_m = 0.0 if visibility_m is None else KOSCHMIEDER / visibility_m
+        if any(self.built("darkness")):
+            self.reach = replace(self.reach, enabled=False)
+        rosters = known_targets(self.context)
+        if rosters and self._smallest_rad and not self.context.simulate_everything:
+            bodies = [rosters[0].column(f"eo.{n}_m2") for n in ("front", "side", "horizontal")]
+            largest_m2 = float(np.sum(bodies, axis=0).max(initial=0.0))
+            farthest_m = farthest_shown_m(largest_m2, self._smallest_rad) * _MARGIN + _MARGIN_M
+            nearer_m = min(self.reach.range_max_m, farthest_m)
+            self.reach = replace(self.reach, range_max_m=nearer_m)
+
+    def request(self, port: str) -> Any:
+        """Ask for the flights too: aircraft are found between scans."""
+        reach = super().request(port)
+        along = self.p.enabled and self.p.between_scans == "integral"
+        return replace(reach, lasts_s=self._period_s) if along else reach
+
+    @cached_property
+    def _seats(self) -> list[_Seat]:
+        low, high = (math.radians(angle) for angle in self.p.azimuth_deg)
+        elevation = self.reach.elevation_rad
+        sides = ((self.p.left_looking, (low, high)), (self.p.right_looking, (-high, -low)))
+        return [
+            _Seat(number, FieldOfView(edges, elevation), share)
+            for number, (share, edges) in enumerate(sides)
+            if share > 0.0
+        ]
+
+    def look(self, cells: Cells) -> Look:
+        """See whoever is found since the last scan, or was before."""
+        who = cells.replica * len(cells.roster.names) + cells.target
+        missing = int(who.max(initial=-1)) + 1 - len(self._first_seen)
+        if missing > 0:
+            never = np.full(missing, _NEVER)
+            self._first_seen = np.concatenate([self._first_seen, never])
+        size = angular_size_rad(self._area(cells), cells.range_m)
+        limit = self._smallest_rad or _ARCMIN_RAD
+        confidence = size / limit - 1.0
+        extras: dict[str, AnyArray] = {}
+        if self._says_looks:
+            extras["detection_probability"] = self.acquisition_probability(cells)
+        searched = np.flatnonzero(self._first_seen[who] > cells.scan)
+        found = searched[self._found(cells, searched)]
+        first = self._first_seen.copy()
+        np.minimum.at(first, who[found], cells.scan[found])
+        self._first_seen = first
+        seen = (first[who] <= cells.scan) & (size >= self._smallest_rad)
+        return Look(seen, confidence, extras)
+
+    def acquisition_probability(self, cells: Cells) -> FloatArray:
+        """Return with which probability each cell's aircraft is found since the last scan.
+
+        For who was not found before. A search that comes round finds it with the share of a round
+        for which it showed, over all phases.
+        """
+        which = np.arange(len(cells))
+        total = np.zeros(len(cells))
+        for seat in self._seats:
+            share = self._share(seat, cells, which)
+            total += share * self._searched(seat, cells, which)
+        if self.p.search == "round":
+            return np.minimum(total, 1.0)
+        return -np.expm1(-total)
+
+    def _found(self, cells: Cells, which: IntArray) -> BoolArray:
+        """Return which of some cells' aircraft are found since the last scan."""
+        if self.p.search == "random":
+            total = np.zeros(len(which))
+            for seat in self._seats:
+                total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+            drawn = self._finds.uniform(
+                cells.roster.keys_of(cells.target[which]), cells.scan[which]
+            )
+            return np.asarray(drawn < -np.expm1(-total))
+        found = np.zeros(len(which), dtype=bool)
+        for seat in self._seats:
+            found |= self._meets(seat, cells, which)
+        return found
+
+    def _searched(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
+        """Return the integral of the rate since the last scan, or how many rounds it showed."""
+        before_s = self._before_s(cells, which)
+        if not len(which):
+            return before_s
+        if self.p.between_scans == "as_at_scan":
+            now = np.where(self._shows(seat, cells)[which], before_s, 0.0)
+            if self.p.search == "round":
+                return now / self.p.round_s
+            return now * self._rate(cells)[which]
+
+        def shown(some: IntArray, ahead_s: FloatArray) -> BoolArray:
+            return self._shows(seat, _SeenBefore(cells, which[some], ahead_s))
+
+        def rate(some: IntArray, ahead_s: FloatArray) -> FloatArray:
+            if self.p.search == "round":
+                return np.full(len(some), 1.0 / self.p.round_s)
+            return self._rate(_SeenBefore(cells, which[some], ahead_s))
+
+        return integral_where_shown(before_s, shown, rate)
+
+    def _meets(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
+        """Return at which cells a search that comes round met its aircraft since the last scan."""
+        share = self._share(seat, cells, which)
+        looks = np.flatnonzero(share > 0.0)
+        mine, share = which[looks], share[looks]
+        keys, begin = self._of_run(cells, mine)
+        round_s = self.p.round_s / share
+        phase_s = round_s * self._phases.uniform(keys, begin, seat.number)
+        now_s = cells.state_ns[mine] / NANOSECONDS
+        # The last instant up to now at which the search was at its place, in (last scan, now].
+        ahead_s = -np.remainder(now_s - phase_s, round_s)
+        in_time = np.flatnonzero(-ahead_s < self._before_s(cells, mine))
+        met = np.zeros(len(which), dtype=bool)
+        if len(in_time):
+            there: Any = cells
+            if self.p.between_scans == "integral":
+                there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
+                met[looks[in_time]] = self._shows(seat, there)
+            else:
+                met[looks[in_time]] = self._shows(seat, there)[mine[in_time]]
+        return met
+
+    def _before_s(self, cells: Cells, which: IntArray) -> FloatArray:
+        """Return how long since the last scan, or since the run began; as at the scan, a period."""
+        if self.p.between_scans == "as_at_scan":
+            return np.full(len(which), self._period_s)
+        return np.minimum(self._period_s, cells.state_ns[which] / NANOSECONDS)
+
+    def _share(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
+        """Return the share of time that somebody looks out; in spells, all or nothing of a run."""
+        if self.p.looking == "glances":
+            return np.full(len(which), seat.share)
+        keys, begin = self._of_run(cells, which)
+        drawn = self._attends.uniform(np.zeros_like(keys), begin, seat.number)
+        return np.where(drawn < seat.share, 1.0, 0.0)
+
+    def _of_run(self, cells: Cells, which: IntArray) -> tuple[AnyArray, IntArray]:
+        """Return keys of some cells' targets, and the number that stands for their run."""
+        return cells.roster.keys_of(cells.target[which]), first_scan(1) * cells.replica[which]
+
+    def _area(self, view: Any) -> FloatArray:
+        return area_of_cells(view, "eo", "convex_hull")
+
+    def _rate(self, view: Any) -> FloatArray:
+        """Return Andrews's rate for each cell of a view."""
+        rate: FloatArray = acquisition_rate(
+            self._area(view),
+            np.maximum(view.range_m, 1.0),
+            beta_per_sr_s=self.p.beta_per_sr_s,
+            extinction_per_m=self._extinction_per_m,
+        )
+        return rate
+
+    def _shows(self, seat: _Seat, view: Any) -> BoolArray:
+        """Return which cells of a view show to somebody."""
+        azimuth, elevation = self.axes(view.body_azimuth_rad, view.body_elevation_rad)
+        shows = seat.field.holds(azimuth, elevation)
+        shows &= view.range_m <= self.reach.range_max_m
+        if self._smallest_rad:
+            shows &= angular_size_rad(self._area(view), view.range_m) >= self._smallest_rad
+        if isinstance(view, _SeenBefore):
+            shows &= view.present
+            if "hidden" in view.seen:
+                shows &= ~view.hidden
+        return np.asarray(shows)
