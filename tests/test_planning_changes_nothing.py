@@ -19,7 +19,7 @@ from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
 
 CONFIGS = Path(__file__).parent.parent / "configs"
-PARTS = ("aircraft", "obstacles", "sensors", "studies")
+PARTS = ("aircraft", "evidence", "obstacles", "sensors", "studies")
 #: Chains and sets of intruders that other scenes extend; they cannot run by themselves.
 UNFINISHED = {
     "detect_and_sense.toml",
@@ -36,6 +36,7 @@ ENDS_S = {
     "avoidance/crossing_seen_late.toml": 110,
     "avoidance/crossing_tracked.toml": 55,
     "avoidance/crossing_tracked_late.toml": 105,
+    "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
     "operator/session.toml": 15,
     "optical/pictures.toml": 10,

@@ -152,7 +152,7 @@ class CaseTables(Parameters):
 
 
 @dataclass(frozen=True)
-class Case:
+class EvidenceCase:
     """A checked case.
 
     Parameters
@@ -180,7 +180,7 @@ class Case:
         return self.studies[ASSESSED]
 
 
-def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None) -> Case:
+def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None) -> EvidenceCase:
     """Read and check a case with all its studies.
 
     `replicas` takes the place of those that the system's study and those beside it state.
@@ -208,7 +208,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     if tables.sensitivity:
         varied, studies[SENSITIVITY] = _sensitivity(file, tables, studies[ASSESSED])
     results = {name: {r.name: r for r in results_of(study)} for name, study in studies.items()}
-    case = Case(file, tables, studies, results, varied)
+    case = EvidenceCase(file, tables, studies, results, varied)
     problems = [*_unknown_results(case), *_without_source(case)]
     if problems:
         raise SceneError(problems)
@@ -266,7 +266,7 @@ def written(value: Any) -> str:
     return set_text(value) if isinstance(value, list | dict) else as_text(value)
 
 
-def _unknown_results(case: Case) -> list[Any]:
+def _unknown_results(case: EvidenceCase) -> list[Any]:
     """Return a problem for every result that no study gives."""
     found = []
     named = [
@@ -291,7 +291,7 @@ def _unknown_results(case: Case) -> list[Any]:
     return found
 
 
-def _without_source(case: Case) -> list[Any]:
+def _without_source(case: EvidenceCase) -> list[Any]:
     """Return a problem for every block whose scene states a value that no source covers."""
     found = []
     sources, scene = case.tables.sources, case.assessed.scene(0)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dsa_des.evidence.findings import Change, Finding
+from dsa_des.evidence.findings import Finding, ParameterChange
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 
 _BAND, _LINE, _LIMIT, _RULE = "#56B4E9", "#0072B2", "#D55E00", "#999999"
@@ -46,7 +46,7 @@ def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
     return drawn.getvalue()
 
 
-def draw_sensitivity(changes: Sequence[Change]) -> bytes:
+def draw_sensitivity(changes: Sequence[ParameterChange]) -> bytes:
     """Return a PNG: the paired difference that every change makes, one panel per result."""
     drawn = io.BytesIO()
     results = list(dict.fromkeys(one.result for one in changes))

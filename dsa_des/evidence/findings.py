@@ -13,8 +13,8 @@ from dsa_des.evidence.case import (
     ASSESSED,
     CHANGED,
     SENSITIVITY,
-    Case,
     CaseRequirement,
+    EvidenceCase,
     written,
 )
 from dsa_des.results.record import Result
@@ -76,7 +76,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterChange:
     """What one value of one parameter does to one result, paired on the same units."""
 
     key: str
@@ -89,7 +89,7 @@ class Change:
     in_limits: float
 
 
-def findings_of(case: Case, tables: Mapping[str, Tables]) -> list[Finding]:
+def findings_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Finding]:
     """Return what every requirement comes to."""
     found = []
     for one in case.tables.requirements:
@@ -101,7 +101,7 @@ def findings_of(case: Case, tables: Mapping[str, Tables]) -> list[Finding]:
 
 
 def convergence_of(
-    case: Case, tables: Tables, result: Result, asked: CaseRequirement
+    case: EvidenceCase, tables: Tables, result: Result, asked: CaseRequirement
 ) -> Convergence:
     """Return the running estimate of a result in order of the replicas, by the case's rule."""
     rule, rows, record = case.tables.convergence, tables.rows, tables.record
@@ -133,7 +133,7 @@ def counts_of(units: int, over_last: float) -> tuple[list[int], int]:
     return counts, start
 
 
-def changes_of(case: Case, tables: Mapping[str, Tables]) -> list[Change]:
+def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[ParameterChange]:
     """Return what every changed parameter does, the parameter that matters most first."""
     if SENSITIVITY not in tables:
         return []
@@ -148,7 +148,7 @@ def changes_of(case: Case, tables: Mapping[str, Tables]) -> list[Change]:
         key, _ = labels[item.value]
         difference = item.difference.paired
         found.append(
-            Change(
+            ParameterChange(
                 key.key, key.unit, stated[key.key], str(item.value).partition(" = ")[2],
                 item.result.name, difference,
                 abs(difference.value) / abs(asked[item.result.name].limit or 1.0),
@@ -161,7 +161,7 @@ def changes_of(case: Case, tables: Mapping[str, Tables]) -> list[Change]:
     return sorted(found, key=lambda one: -largest[one.key])
 
 
-def _stated(case: Case) -> dict[str, str]:
+def _stated(case: EvidenceCase) -> dict[str, str]:
     """Return the value of every changed parameter as the case states it."""
     study = case.studies[SENSITIVITY]
     (axis,) = [axis for axis in study.axes if axis.key == CHANGED]

