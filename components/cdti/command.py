@@ -30,6 +30,13 @@ from dsa_des.commands.group import plain_errors, scene_options
     show_default=True,
     help="Its port; 0 takes a free one.",
 )
+@click.option(
+    "--units",
+    type=click.Choice(["nautical", "metric"]),
+    default="nautical",
+    show_default=True,
+    help="What the display begins with: nmi, ft and kt, or km, m and m/s.",
+)
 @click.option("--no-wait", is_flag=True, help="Begin before an operator is there and ready.")
 @click.option("--no-figures", is_flag=True, help="Draw nothing; results are the same.")
 @plain_errors

@@ -16,9 +16,9 @@ from components.cdti.page import (
     Ready,
     Turned,
 )
-from components.cdti.scope import Scope
+from components.cdti.scope import Heard, Scope
 from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
-from components.operator.human import Desk, PendingDecision
+from components.operator.human import Desk, PendingDecision, Taken
 from dsa_des.running.pacing import Pacer
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
@@ -112,9 +112,17 @@ class SessionControl:
     """
 
     def __init__(
-        self, scene: Scene, desk: Desk, console: str | None, factor: float, *, waits: bool
+        self,
+        scene: Scene,
+        desk: Desk,
+        console: str | None,
+        factor: float,
+        units: str,
+        *,
+        waits: bool,
     ) -> None:
         self._scene, self._desk, self._console, self._factor = scene, desk, console, factor
+        self._units = units
         self._pauses = False
         if console is not None:
             parameters: Any = scene.blocks[console].parameters
@@ -124,7 +132,8 @@ class SessionControl:
         self._began = False
         self._gone_at: float | None = None
         self.scope: Scope | None = None
-        self._now = (0.0, 0.0)
+        #: How far the run has come, its lag, and what was heard by then.
+        self._now: tuple[float, float, Heard | None] = (0.0, 0.0, None)
         self._shown_at = -math.inf
         self._named = 0
         #: How long the last picture took to be made, s, and the one of which instant it was.
@@ -152,7 +161,7 @@ class SessionControl:
 
     def came_to(self, time_s: float, lag_s: float) -> None:
         """Take note of how far the run has come, and show it."""
-        self._now = time_s, lag_s
+        self._now = time_s, lag_s, None if self.scope is None else self.scope.heard()
         if self._gone_at is not None:
             self.holds()
         if self.scope is not None and len(self.scope.names) != self._named:
@@ -167,6 +176,26 @@ class SessionControl:
         """Return what was decided, for the terminal."""
         taken = sum(answer["type"] == "taken" for answer in self._answers.values())
         return f"{taken} decisions taken in, up to {self._now[0]:.1f} s"
+
+    def _told(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
+        """Return what pages are told of a decision that was taken in: of its time, s, the alert's
+        level, where a command leads to, until when, and what it replaces."""
+        assert self.scope is not None
+        told: dict[str, Any] = {
+            "time": round(taken.time_s, 6), "level": self.scope.level_of(message.target)
+        }  # fmt: skip
+        if isinstance(message, Judged) or not math.isfinite(taken.ends_s):
+            return told
+        told["to"] = self.scope.led_to(message.decision, message.value)
+        told["ends"] = round(taken.ends_s, 6)
+        if math.isfinite(taken.replaces_s):
+            replaced = next(
+                one
+                for one in reversed(self._log)
+                if one["decision"] == message.decision and one["time"] == round(taken.replaces_s, 6)
+            )
+            told["replaces"] = {name: replaced[name] for name in ("time", "value")}
+        return told
 
     # -- the thread of the server ------------------------------------------------------------------
 
@@ -189,6 +218,7 @@ class SessionControl:
             "title": printable(self._scene.title),
             "duration": None if duration is None else float(duration),
             "factor": self._factor,
+            "units": self._units,
             "sensors": [] if scope is None else scope.sensors,
             "names": [] if scope is None else scope.names,
             "console": self._console is not None,
@@ -202,9 +232,9 @@ class SessionControl:
         if scope is None:
             return None
         began = time.thread_time()
-        time_s, lag_s = self._now
+        time_s, lag_s, heard = self._now
         if self._made is None or self._made[0] != time_s:
-            self._made = time_s, scope.picture(time_s)
+            self._made = time_s, scope.picture(time_s, heard)
         picture = self._made[1]
         content = {
             "type": "frame",
@@ -273,8 +303,8 @@ class SessionControl:
         }
         self._answers[message.id] = {"type": "waits"}
 
-        def taken(time_s: float) -> None:
-            answer = {"type": "taken", **content, "time": round(time_s, 6)}
+        def taken(one: Taken) -> None:
+            answer = {"type": "taken", **content, **self._told(message, one)}
             self._answers[message.id] = answer
             self._log.append(answer)
             self._server.tell(answer)

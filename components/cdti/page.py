@@ -11,7 +11,10 @@ from components.view.page import page_filled, page_part, page_program
 
 _PACKAGE = "components.cdti"
 #: The program's parts, in the order in which they need each other.
-SCRIPTS = ("link.js", "symbols.js", "scope.js", "camera.js", "sound.js", "panel.js", "app.js")
+SCRIPTS = (
+    "link.js", "units.js", "symbols.js", "rose.js", "scope.js", "tapes.js", "legend.js",
+    "camera.js", "sound.js", "panel.js", "app.js",
+)  # fmt: skip
 OPERATOR, WATCHER = "operator", "watcher"
 #: A message is a line of text; this is some ten times the longest that a page sends, bytes.
 LARGEST_BYTES = 2048

@@ -12,17 +12,27 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
 from components.cdti.camera import CameraSights
-from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines, contacts_of_states
-from components.messages.alerts import BAND_REGIONS, AlertLevels, GuidanceBands, contact_name
+from components.cdti.contacts import (
+    Contacts,
+    OwnFlight,
+    OwnNow,
+    contacts_of_lines,
+    contacts_of_states,
+)
+from components.cdti.loss_area import lost_area
+from components.messages.alerts import (
+    BAND_KINDS,
+    BAND_REGIONS,
+    AlertLevels,
+    GuidanceBands,
+    contact_name,
+)
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.sensor.marks import IR
-from components.well_clear.detection import detection_span
-from components.well_clear.tcas import TcasAdvisory
-from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -36,9 +46,6 @@ BANDS_LAST_S = 1.5
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
-#: Directions that are looked at, all around the ownship.
-STEP_RAD = math.radians(3.0)
-DIRECTIONS_RAD = np.arange(0.0, 2.0 * math.pi - 0.5 * STEP_RAD, STEP_RAD)
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,19 @@ class _Alerts:
     closest_m: Any
 
 
+class Heard(NamedTuple):
+    """What a display has heard up to an instant; nothing of it changes."""
+
+    own: OwnNow | None
+    contacts: Contacts | None
+    alerts: _Alerts | None
+    #: Since when each alert is on, s.
+    since: dict[int, float]
+    #: Altitude and rate of climb that targets report themselves, m and m/s, and when.
+    reported: dict[int, tuple[float, float, float]]
+    bands: tuple[float, GuidanceBands] | None
+
+
 class Scope:
     """The state of the display."""
 
@@ -65,7 +85,6 @@ class Scope:
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
-        #: Altitude and rate of climb that targets report themselves, m and m/s, and when.
         self._reported: dict[int, tuple[float, float, float]] = {}
         self._bands: tuple[float, GuidanceBands] | None = None
         #: What was made of the latest alerts, for as long as they are the latest.
@@ -167,24 +186,44 @@ class Scope:
         """Return a contact's name as the run has it; empty for none, None if there is none."""
         return contact_name(self._names, contact)
 
-    def picture(self, time_s: float) -> dict[str, Any]:
-        """Return what is shown at an instant, for JSON: m, deg, s; from the ownship."""
+    def heard(self) -> Heard:
+        """Return what was heard until now: asked for between two windows, it is of one instant."""
+        return Heard(
+            self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands
+        )
+
+    def level_of(self, contact: int) -> int:
+        """Return the level of the alert on a contact, 0 without one."""
+        if self._alerts is None:
+            return 0
+        levels = self._alerts.level[self._alerts.target == contact]
+        return int(levels.max(initial=0))
+
+    def led_to(self, decision: str, value: float) -> float:
+        """Return the heading that a turn leads to, deg, or the altitude that a climb does, m."""
         own = self._own.now
+        assert own is not None
+        if decision == "turn":
+            return round((math.degrees(own.heading_rad) + value) % 360.0, 1)
+        return round(own.alt_m + value, 1)
+
+    def picture(self, time_s: float, heard: Heard | None = None) -> dict[str, Any]:
+        """Return what is shown at an instant of what was heard, for JSON: m, deg, s."""
+        own, contacts, alerts, since, reported, bands = self.heard() if heard is None else heard
         if own is None:
-            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": []}
-        alerts, contacts = self._alerts, self._contacts
+            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": {}}
         shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
         if alerts is not None:
             if self._looked is None or self._looked[0] is not alerts:
-                self._looked = alerts, _flights(alerts), self._said(alerts), self._area(alerts)
+                self._looked = alerts, _flights(alerts), _said(alerts, since), self._area(alerts)
             _, flights, said, area = self._looked
         level = {one["target"]: one["level"] for one in said}
         for one in shown:
             flight = [*flights.get(one[0], _UNKNOWN)]
-            alt_m, climb, seen_s = self._reported.get(one[0], (math.nan, math.nan, -math.inf))
+            alt_m, climb, seen_s = reported.get(one[0], (math.nan, math.nan, -math.inf))
             if time_s - seen_s < FORGOTTEN_S and one[3] is not None:
                 one[3] = round(alt_m - own.alt_m, 2)
                 flight[2] = round(climb, 2) if math.isfinite(climb) else flight[2]
@@ -200,7 +239,7 @@ class Scope:
             "contacts": shown,
             "alerts": said,
             "area": area,
-            "bands": self._directions(time_s),
+            "bands": _bands_at(bands, time_s),
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
@@ -219,16 +258,6 @@ class Scope:
             chosen = first[0]
         return self._sights.picture(chosen, self._toward(chosen), time_s, own)
 
-    def _directions(self, time_s: float) -> list[list[Any]]:
-        """Return the bands of direction as [from, to, region], deg clockwise from north."""
-        if self._bands is None or time_s - self._bands[0] > BANDS_LAST_S:
-            return []
-        bands = self._bands[1]
-        there = np.flatnonzero(np.isfinite(bands.low_rad))
-        ends = np.round(np.degrees([bands.low_rad[there], bands.high_rad[there]]), 1)
-        regions = [BAND_REGIONS[region] for region in bands.region[there].tolist()]
-        return [[*pair, region] for pair, region in zip(ends.T.tolist(), regions, strict=True)]
-
     def _toward(self, contact: int) -> tuple[float, float] | None:
         """Return the bearing and elevation of a contact as it was seen last, rad."""
         contacts = self._contacts
@@ -239,23 +268,6 @@ class Scope:
             return None
         bearing, elevation = contacts.toward[place[0]].tolist()
         return bearing, elevation
-
-    def _said(self, alerts: _Alerts) -> list[dict[str, Any]]:
-        """Return the alerts that are on, the most urgent first."""
-        found = []
-        since = self._since
-        for place in np.flatnonzero(alerts.level > 0).tolist():
-            target = int(alerts.target[place])
-            to_loss = float(alerts.to_loss_s[place])
-            found.append({
-                "target": target,
-                "level": int(alerts.level[place]),
-                "since": since.get(target, alerts.time_s),
-                "at": alerts.time_s,
-                "to_loss": round(to_loss, 2) if math.isfinite(to_loss) else None,
-                "closest": round(float(alerts.closest_m[place]), 1),
-            })  # fmt: skip
-        return sorted(found, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
 
     def _area(self, alerts: _Alerts) -> list[list[float]]:
         on = np.flatnonzero(alerts.level > 0)
@@ -273,6 +285,43 @@ class Scope:
                 degrees.tolist(), found.near_m.tolist(), found.far_m.tolist(), strict=True
             )
         ]
+
+
+def _bands_at(
+    heard: tuple[float, GuidanceBands] | None, time_s: float
+) -> dict[str, list[list[Any]]]:
+    """Return bands by kind as [from, to, region]: deg clockwise from north, m, m/s."""
+    found: dict[str, list[list[Any]]] = {kind: [] for kind in BAND_KINDS}
+    if heard is None or time_s - heard[0] > BANDS_LAST_S:
+        return found
+    bands = heard[1]
+    ends = {
+        "direction": np.degrees([bands.low_rad, bands.high_rad]),
+        "altitude": np.array([bands.low_m, bands.high_m]),
+        "speed": np.array([bands.low_mps, bands.high_mps]),
+    }
+    rows = zip(bands.band.tolist(), bands.region.tolist(), strict=True)
+    for place, (kind, region) in enumerate(rows):
+        name = BAND_KINDS[kind]
+        found[name].append([*np.round(ends[name][:, place], 1).tolist(), BAND_REGIONS[region]])
+    return found
+
+
+def _said(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, Any]]:
+    """Return the alerts that are on, the most urgent first."""
+    found = []
+    for place in np.flatnonzero(alerts.level > 0).tolist():
+        target = int(alerts.target[place])
+        to_loss = float(alerts.to_loss_s[place])
+        found.append({
+            "target": target,
+            "level": int(alerts.level[place]),
+            "since": since.get(target, alerts.time_s),
+            "at": alerts.time_s,
+            "to_loss": round(to_loss, 2) if math.isfinite(to_loss) else None,
+            "closest": round(float(alerts.closest_m[place]), 1),
+        })  # fmt: skip
+    return sorted(found, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
 
 
 def _flights(alerts: _Alerts) -> dict[int, list[float]]:
@@ -308,38 +357,3 @@ def _sensor(name: str, component: Component) -> dict[str, Any]:
     low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
     far = getattr(component, "reach", reach).range_max_m
     return {**found, "range": round(far, 1) if math.isfinite(far) else None, "azimuth": [low, high]}
-
-
-class Reached(NamedTuple):
-    """How far from the ownship an area begins and ends, by direction clockwise from north."""
-
-    direction_rad: FloatArray
-    near_m: FloatArray
-    far_m: FloatArray
-
-
-def lost_area(
-    volume: Volume | TcasAdvisory,
-    own_alt_m: float,
-    own_mps: FloatArray,
-    relative: FloatArray,
-    lookahead_s: float,
-) -> Reached:
-    """Return where the ownship would be in a volume about other aircraft, were it to turn at once.
-
-    It keeps its speed and its vertical speed, and the others their flights; how long it takes to
-    turn is left out. What an operator sees is where not to fly to, as the thesis has it (section
-    2.2: the area where the loss of separation occurs).
-    Velocities are east, north and upward; `relative` (6, targets) is east, north, up in m and their
-    rates, ownship less target. There is one entry for each target and direction with a loss.
-    """
-    speed_mps = math.hypot(own_mps[0], own_mps[1])
-    east = speed_mps * np.sin(DIRECTIONS_RAD)[:, np.newaxis] - own_mps[0]
-    north = speed_mps * np.cos(DIRECTIONS_RAD)[:, np.newaxis] - own_mps[1]
-    turned = [*relative[:3], relative[3] + east, relative[4] + north, relative[5]]
-    parts = [part.reshape(-1) for part in np.broadcast_arrays(*turned)]
-    own_up = np.full(len(parts[0]), own_alt_m), np.full(len(parts[0]), own_mps[2])
-    span = detection_span(volume, parts, own_up, None, 0.0, lookahead_s)
-    lost = np.flatnonzero(span.begin_s < span.end_s)
-    direction = np.repeat(DIRECTIONS_RAD, relative.shape[1])[lost]
-    return Reached(direction, speed_mps * span.begin_s[lost], speed_mps * span.end_s[lost])

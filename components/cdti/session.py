@@ -42,6 +42,7 @@ def run_session(
     out: str | None,
     host: str,
     port: int,
+    units: str,
     no_wait: bool,
     no_figures: bool,
 ) -> None:
@@ -65,7 +66,7 @@ def run_session(
     replay = _replay(loaded, console, target.path)
     desk = Desk()
     control = SessionControl(
-        loaded, desk, console, speed, waits=not no_wait and console is not None
+        loaded, desk, console, speed, units, waits=not no_wait and console is not None
     )
     admission = Admission()
     server = DisplayServer(host, port, admission, control)

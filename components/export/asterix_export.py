@@ -26,6 +26,15 @@ _TURNED = ("own_heading_rad", "own_pitch_rad", "own_roll_rad")
 _STATE = ("north_m", "east_m", "down_m")
 _MOVES = ("north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+#: Largest range rate that a plot holds.
+_FASTEST_M_S = 511.0
+#: Standard deviations that a track says of itself, and the variances in north, east and down.
+_ERRORS = {
+    "north_error_m": "covariance_00_m2", "east_error_m": "covariance_11_m2",
+    "alt_error_m": "covariance_22_m2", "velocity_north_error_m_s": "covariance_33_m2_s2",
+    "velocity_east_error_m_s": "covariance_44_m2_s2",
+    "velocity_up_error_m_s": "covariance_55_m2_s2",
+}  # fmt: skip
 #: System area code of everything here: none is assigned to it.
 _SAC = 0
 
@@ -91,6 +100,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     lit = run.numbers("detections", "illuminated_s")[there]
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
     bearing, far_m, ends = _sight([part[there] for part in lines], pose)
+    rate_m_s = run.numbers("detections", "range_rate_m_s")[there]
     for k, row in enumerate(there.tolist()):
         yield AsterixRecord(
             PLOTS,
@@ -102,6 +112,8 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
                 "range_m": float(far_m[k]),
                 "azimuth_deg": float(np.degrees(bearing[k])),
                 "alt_m": float(ends[2, k]),
+                # What does not fit is left out: a speed that is cut off would be a wrong one.
+                "range_rate_m_s": float(rate_m_s[k]) if abs(rate_m_s[k]) <= _FASTEST_M_S else None,
             },
         )
 
@@ -188,6 +200,11 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     ]
     own_axes = local_axes(places[0], places[1])
     along: list[Any] = [sum(v * a for v, a in zip(earth, axis, strict=True)) for axis in own_axes]
+    errors = {
+        name: np.sqrt(np.maximum(run.numbers("state_tracks", column)[rows], 0.0))
+        for name, column in _ERRORS.items()
+    }
+    told = np.asarray(np.isfinite(np.stack(list(errors.values()))).all(axis=0))
     blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
     numbers = run.values("state_tracks", "track")
     state_s = run.numbers("state_tracks", "state_s")
@@ -203,6 +220,8 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
             "velocity_north_m_s": float(along[1][k]),
             "velocity_up_m_s": float(along[2][k]),
         }
+        if told[k]:
+            values |= {name: float(error[k]) for name, error in errors.items()}
         yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
 
 

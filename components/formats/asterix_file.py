@@ -45,9 +45,9 @@ class RadarPlots:
     scan : (plots,)
         To which scan a plot belongs.
     time_s : (plots,)
-    azimuth_rad, elevation_rad, range_m : (plots,)
+    azimuth_rad, elevation_rad, range_m, range_rate_m_s : (plots,)
         Azimuth from north, (-pi, pi]; elevation NaN where no height was reported, or not from
-        where.
+        where; range rate NaN where none was.
     notes : list of str
     """
 
@@ -63,6 +63,7 @@ class RadarPlots:
     azimuth_rad: FloatArray
     elevation_rad: FloatArray
     range_m: FloatArray
+    range_rate_m_s: FloatArray
     notes: list[str]
 
 
@@ -173,13 +174,14 @@ def read_asterix_plots(path: str | PathLike[str]) -> RadarPlots:
         if record.category == PLOTS and "range_m" in values:
             alt_m = values.get("alt_m", values.get("flight_level_m", np.nan))
             turned = np.radians(values["azimuth_deg"])
-            plots.append((current[radar], now_s, turned, alt_m, values["range_m"]))
-    scan, time_s, azimuth, height, far_m = np.array(plots).reshape(-1, 5).T
+            rate_m_s = values.get("range_rate_m_s", np.nan)
+            plots.append((current[radar], now_s, turned, alt_m, values["range_m"], rate_m_s))
+    scan, time_s, azimuth, height, far_m, rate = np.array(plots).reshape(-1, 6).T
     radar_of, scan_s, lat, lon, alt = np.array(scans).T
     of = scan.astype(np.int64)
     return RadarPlots(
         radars, start_s, radar_of.astype(np.int64), scan_s, lat, lon, alt, of, time_s,
-        wrap_pi(azimuth), _elevations(azimuth, far_m, height, lat[of], alt[of]), far_m, notes,
+        wrap_pi(azimuth), _elevations(azimuth, far_m, height, lat[of], alt[of]), far_m, rate, notes,
     )  # fmt: skip
 
 

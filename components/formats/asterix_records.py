@@ -28,7 +28,10 @@ _CLIMB_MPS = 6.25 * FOOT_M / 60.0
 
 
 class _Field(NamedTuple):
-    """Where a quantity stands (item, part of it), its least bit, how many bits, and its sign."""
+    """Where a quantity stands (item, part of it), its least bit, how many bits, and its sign.
+
+    A part of a part is ``CAL/CAL``.
+    """
 
     item: str
     part: str | None
@@ -37,6 +40,8 @@ class _Field(NamedTuple):
     signed: bool = False
     #: For what goes round, as angles do: all of it.
     turn: float = math.inf
+    #: Whether the largest number stands for all that are larger, too.
+    saturates: bool = False
 
 
 #: EUROCONTROL-SPEC-0149, parts 2b (034), 4 (048), 9 (062) and 12 (021).
@@ -59,6 +64,7 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
         "azimuth_deg": _Field("040", "THETA", _TURN_DEG, 16, turn=360.0),
         "alt_m": _Field("110", "3DH", _LEVEL_M, 14, True),
         "flight_level_m": _Field("090", "FL", _LEVEL_M, 14, True),
+        "range_rate_m_s": _Field("120", "CAL/CAL", 1.0, 10, True),
     },
     SYSTEM_TRACKS: {
         "sac": _Field("010", "SAC", 1, 8),
@@ -69,6 +75,12 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
         "velocity_east_m_s": _Field("185", "VX", 0.25, 16, True),
         "velocity_north_m_s": _Field("185", "VY", 0.25, 16, True),
         "velocity_up_m_s": _Field("220", None, _CLIMB_MPS, 16, True),
+        "east_error_m": _Field("500", "APC/X", 0.5, 16, saturates=True),
+        "north_error_m": _Field("500", "APC/Y", 0.5, 16, saturates=True),
+        "alt_error_m": _Field("500", "AGA", _HEIGHT_M, 8, saturates=True),
+        "velocity_east_error_m_s": _Field("500", "ATV/X", 0.25, 8, saturates=True),
+        "velocity_north_error_m_s": _Field("500", "ATV/Y", 0.25, 8, saturates=True),
+        "velocity_up_error_m_s": _Field("500", "ARC", _CLIMB_MPS, 8, saturates=True),
         "number": _Field("040", None, 1, 16),
         "tentative": _Field("080", "CNF", 1, 1),
         "simulated": _Field("080", "SIM", 1, 1),
@@ -137,7 +149,7 @@ def write_records(records: Sequence[AsterixRecord]) -> bytes:
     return b"".join(cats[key[0]].create(made).unparse().to_bytes() for key, made in blocks)
 
 
-#: A block holds 65,535 bytes, and no record of ours has more than 60.
+#: A block holds 65,535 bytes, and no record of ours has more than 64.
 _MOST_OF_A_BLOCK = 1000
 
 
@@ -176,6 +188,9 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
                      None),),
             "040": group(("RHO", "range_m"), ("THETA", "azimuth_deg")),
             "110": height,
+            "120": {"CAL": (("D", 0), 0, ("CAL", raw["range_rate_m_s"]))}
+            if "range_rate_m_s" in raw
+            else None,
         }  # fmt: skip
     if record.category == SYSTEM_TRACKS:
         first = (("MON", 1), ("SPI", 0), ("MRH", 1), ("SRC", 1), ("CNF", raw["tentative"]), None)
@@ -193,7 +208,17 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
             "080": (first, second, third, fourth),
             "245": (("STI", 1), 0, ("CHR", raw["name"])) if "name" in raw else None,
             "130": raw["alt_m"],
-        }
+            "500": {
+                "APC": (("X", raw["east_error_m"]), ("Y", raw["north_error_m"])),
+                "AGA": raw["alt_error_m"],
+                "ATV": (
+                    ("X", raw["velocity_east_error_m_s"]), ("Y", raw["velocity_north_error_m_s"])
+                ),
+                "ARC": raw["velocity_up_error_m_s"],
+            }
+            if "velocity_up_error_m_s" in raw
+            else None,
+        }  # fmt: skip
     return common | {
         "073": raw["time_of_day_s"],
         "040": (
@@ -227,6 +252,8 @@ def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
         turn = round(field.turn / field.step)
         steps = (steps + turn // 2) % turn - turn // 2 if field.signed else steps % turn
     low = -(2 ** (field.bits - 1)) if field.signed else 0
+    if field.saturates:
+        steps = min(steps, 2**field.bits - 1)
     if not low <= steps < low + 2**field.bits:
         raise UsageError(
             f"ASTERIX: category {record.category:03d}, time {record.time_s:g} s: {name} = "
@@ -305,8 +332,8 @@ def _values(category: int, record: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, field in FIELDS[category].items():
         item = record.get_item(field.item)
-        if item is not None and field.part is not None:
-            item = item.variation.get_item(field.part)
+        for part in field.part.split("/") if field.part is not None else ():
+            item = None if item is None else item.variation.get_item(part)
         if item is None:
             continue
         content = item.variation.content

@@ -146,7 +146,7 @@ def _of_asterix(path: Path, radar: str | None) -> Measurements:
         problems.fail(f"{without} of {len(of)} plots have no height, or the radar has no place")
     entries = {
         "azimuth_rad": plots.azimuth_rad[of], "elevation_rad": plots.elevation_rad[of],
-        "range_m": plots.range_m[of],
+        "range_m": plots.range_m[of], "range_rate_m_s": plots.range_rate_m_s[of],
     }  # fmt: skip
     time_s = plots.scan_s[mine]
     if (plots.time_s[of] != time_s[scan]).any():

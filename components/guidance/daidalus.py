@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -155,7 +155,7 @@ def smaller(changes: tuple[float, float]) -> float | None:
     return change if math.isfinite(change) else None
 
 
-_NAMES = {"direction": "hdir", "altitude": "alt"}
+_NAMES = {"direction": "hdir", "altitude": "alt", "speed": "hs"}
 
 
 class GuidanceParameters(ConfParameters):
@@ -164,17 +164,24 @@ class GuidanceParameters(ConfParameters):
     level: int = Field(
         default=1, ge=0, description="Bands are given where an alert is of this level or above."
     )
+    kinds: tuple[Literal["direction", "altitude", "speed"], ...] = Field(
+        default=("direction", "altitude"),
+        min_length=1,
+        description="What bands are given of: direction, altitude, speed over the ground.",
+    )
 
 
 class DaidalusGuidance(Component):
-    """Which directions and altitudes lose separation, by the rules of DAIDALUS (RTCA DO-365).
+    """Which directions, altitudes and speeds lose separation, by DAIDALUS (RTCA DO-365).
 
     Over all targets whose flights the alerting knows, at each of its scans by itself. It steers
     nobody; `avoidance.daidalus` flies out of the same bands.
     """
 
     inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
-    outputs = {"bands": Output(GuidanceBands, "Directions and altitudes that lose separation.")}
+    outputs = {
+        "bands": Output(GuidanceBands, "Directions, altitudes and speeds that lose separation.")
+    }
     Parameters = GuidanceParameters
     windowed = True
     lockstep = True
@@ -192,6 +199,8 @@ class DaidalusGuidance(Component):
         rows = np.flatnonzero(alerts.highest() >= self.p.level).tolist()
         found: list[tuple[int, int, int, float, float]] = []
         for number, kind in enumerate(BAND_KINDS):
+            if kind not in self.p.kinds:
+                continue
             every = bands_around(_NAMES[kind], self._configuration, self._alerter, alerts, rows)
             for place, guided in enumerate(every):
                 found += [
@@ -204,9 +213,10 @@ class DaidalusGuidance(Component):
         found.sort(key=lambda one: one[0])
         table = np.array(found)
         line, code = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
-        turned = code == BAND_KINDS.index("direction")
         ends = [
-            np.where(where, table[:, k], math.nan) for where in (turned, ~turned) for k in (3, 4)
+            np.where(code == number, table[:, k], math.nan)
+            for number in range(len(BAND_KINDS))
+            for k in (3, 4)
         ]
         region = table[:, 2].astype(np.int64)
         ticks = wake.ticks[np.array(rows, dtype=np.int64)]

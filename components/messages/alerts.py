@@ -100,7 +100,7 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
 
 
 #: What bands are of, and the regions they are painted with.
-BAND_KINDS = ("direction", "altitude")
+BAND_KINDS = ("direction", "altitude", "speed")
 BAND_REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY", "UNKNOWN")
 
 
@@ -116,16 +116,18 @@ class GuidanceBands(Message):
     region : (entries,) of int
         Place in `BAND_REGIONS`.
     low_rad, high_rad : (entries,)
-        Directions over the ground from north, clockwise; NaN in bands of altitude.
+        Directions over the ground from north, clockwise; NaN in other bands.
     low_m, high_m : (entries,)
-        Altitudes; NaN in bands of direction.
+        Altitudes; NaN in other bands.
+    low_mps, high_mps : (entries,)
+        Speeds over the ground; NaN in other bands.
     """
 
     entry_table = "bands"
 
     offsets: IntArray
     band: IntArray = column(
-        "", "", "direction or altitude: what it is a stretch of", "text",
+        "", "", "direction, altitude or speed: what it is a stretch of", "text",
         value=lambda m: Text(m.band, BAND_KINDS),
     )  # fmt: skip
     region: IntArray = column(
@@ -138,3 +140,5 @@ class GuidanceBands(Message):
     high_rad: FloatArray = column("rad", "", "direction, clockwise, at which it ends")
     low_m: FloatArray = column("m", "", "altitude at which it begins")
     high_m: FloatArray = column("m", "", "altitude at which it ends")
+    low_mps: FloatArray = column("m/s", "", "speed over the ground at which it begins")
+    high_mps: FloatArray = column("m/s", "", "speed over the ground at which it ends")

@@ -53,6 +53,8 @@ class Decisions(Message):
     wall_time_s : (rows,)
         By the wall clock, of a person's decision; it says nothing of the run, and a replay repeats
         it.
+    replaces_s : (rows,)
+        When the command of the same kind was given that was still being flown; NaN without one.
     targets : tuple of str
     """
 
@@ -86,6 +88,11 @@ class Decisions(Message):
     wall_time_s: FloatArray = column(
         "s", "", "seconds since 1970-01-01T00:00Z by the wall clock when the decision came from a "
         "person; null where none did",
+        of=PER_ROW,
+    )  # fmt: skip
+    replaces_s: FloatArray = column(
+        "s", "", "time_s of the command of the same kind that it replaces, which was still being "
+        "flown; null where it replaces none",
         of=PER_ROW,
     )  # fmt: skip
     targets: tuple[str, ...] = static()

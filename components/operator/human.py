@@ -43,6 +43,23 @@ class _Alert(NamedTuple):
     tick: int
 
 
+class Taken(NamedTuple):
+    """When a decision was taken in, s, and what it does to what was told before.
+
+    Parameters
+    ----------
+    time_s : float
+    ends_s : float
+        When a turn or a climb is flown; NaN for others.
+    replaces_s : float
+        When a command of the same kind was taken in that is still being flown; NaN without one.
+    """
+
+    time_s: float
+    ends_s: float = math.nan
+    replaces_s: float = math.nan
+
+
 class Console(Component):
     """Turns decisions into messages; subclasses say which decisions there are."""
 
@@ -57,6 +74,8 @@ class Console(Component):
         """Start without an alert."""
         self._alerts: dict[str, _Alert] = {}
         self._targets: tuple[str, ...] = ()
+        #: The last turn and the last climb, by kind.
+        self._told: dict[int, Taken] = {}
 
     def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
         """Return the decisions that come at the scans of a wake, with their ticks, in order."""
@@ -69,9 +88,35 @@ class Console(Component):
         made = []
         for tick, decision in self.due(wake):
             place = self._take_alerts(came, place, tick)
-            made.append((tick, decision, self._alerts.get(decision.target)))
+            taken = self._commanded(tick / self.context.ticks_per_s, decision)
+            made.append((tick, decision, self._alerts.get(decision.target), taken))
         self._take_alerts(came, place, None)
-        return self._messages(made) if made else None
+        if not made:
+            return None
+        sent = self._messages(made)
+        self.acknowledge([taken for *_, taken in made])
+        return sent
+
+    def acknowledge(self, taken: Sequence[Taken]) -> None:
+        """Tell whoever decided that what was due is taken in, in its order."""
+
+    def _commanded(self, time_s: float, decision: OperatorDecision) -> Taken:
+        """Return when a decision is flown, and what it replaces.
+
+        A turn replaces a turn and a climb a climb; one of each is flown at the same time.
+        """
+        if not _is_flown(decision):
+            return Taken(time_s)
+        flown = self._manoeuvre(decision)
+        if decision.kind == TURN:
+            lasts_s = abs(flown.turn_rad) / flown.rate_rad_s
+        else:
+            lasts_s = abs(flown.climb_m) / flown.climb_rate_mps
+        before = self._told.get(decision.kind)
+        replaces = before is not None and time_s < before.ends_s
+        taken = Taken(time_s, time_s + lasts_s, before.time_s if before and replaces else math.nan)
+        self._told[decision.kind] = taken
+        return taken
 
     def _take_alerts(self, came: list[Arrivals], row: int, until: int | None) -> int:
         """Take in alerts from a row on that have come by an instant; return the next row."""
@@ -97,27 +142,28 @@ class Console(Component):
         return now
 
     def _messages(
-        self, made: list[tuple[int, OperatorDecision, _Alert | None]]
+        self, made: list[tuple[int, OperatorDecision, _Alert | None, Taken]]
     ) -> dict[str, Message]:
         per_s = self.context.ticks_per_s
-        known = dict.fromkeys([*self._targets, *(d.target for _, d, _ in made if d.target)])
+        known = dict.fromkeys([*self._targets, *(d.target for _, d, *_ in made if d.target)])
         self._targets = tuple(known)
         code = {name: place for place, name in enumerate(self._targets)}
-        ticks = np.array([tick for tick, _, _ in made], dtype=np.int64)
-        began = np.array([math.nan if a is None else a.tick / per_s for _, _, a in made])
+        ticks = np.array([tick for tick, *_ in made], dtype=np.int64)
+        began = np.array([math.nan if a is None else a.tick / per_s for _, _, a, _ in made])
         decisions = Decisions(
             ticks,
-            np.array([d.kind for _, d, _ in made], dtype=np.int64),
-            np.array([code.get(d.target, -1) for _, d, _ in made], dtype=np.int64),
-            np.array([d.turn_rad for _, d, _ in made]),
-            np.array([d.climb_m for _, d, _ in made]),
-            np.array([0 if a is None else a.level for _, _, a in made], dtype=np.int64),
+            np.array([d.kind for _, d, *_ in made], dtype=np.int64),
+            np.array([code.get(d.target, -1) for _, d, *_ in made], dtype=np.int64),
+            np.array([d.turn_rad for _, d, *_ in made]),
+            np.array([d.climb_m for _, d, *_ in made]),
+            np.array([0 if a is None else a.level for _, _, a, _ in made], dtype=np.int64),
             began,
             ticks / per_s - began,
-            np.array([d.wall_time_s for _, d, _ in made]),
+            np.array([d.wall_time_s for _, d, *_ in made]),
+            np.array([taken.replaces_s for *_, taken in made]),
             self._targets,
         )
-        flown = [(tick, self._manoeuvre(d)) for tick, d, _ in made if _is_flown(d)]
+        flown = [(tick, self._manoeuvre(d)) for tick, d, *_ in made if _is_flown(d)]
         if not flown:
             return {"decisions": decisions}
         manoeuvres = Manoeuvres.of([tick for tick, _ in flown], [one for _, one in flown])
@@ -145,8 +191,7 @@ class PendingDecision:
     """A decision that waits on the desk, and what is called when it is taken in."""
 
     decision: OperatorDecision
-    # Called with the simulated time, s, from the thread of the simulation
-    taken: Callable[[float], None]
+    taken: Callable[[Taken], None]  # From the thread of the simulation
 
 
 class Desk:
@@ -165,13 +210,11 @@ class Desk:
             self._waiting.append(pending)
             return True
 
-    def take(self, time_s: float, tick: int) -> list[tuple[int, OperatorDecision]]:
-        """Take all that waits, at an instant of the simulation, and acknowledge each."""
+    def take(self, time_s: float) -> list[PendingDecision]:
+        """Take all that waits, at an instant of the simulation."""
         with self._lock:
             found, self._waiting = self._waiting, []
-        for pending in found:
-            pending.taken(time_s)
-        return [(tick, pending.decision) for pending in found]
+        return found
 
     def close(self) -> list[PendingDecision]:
         """Take nothing more; return what was never taken in, and so never acknowledged."""
@@ -200,13 +243,20 @@ class Human(Console):
     Parameters = HumanParameters
     #: Set by the program that has a person at hand.
     desk: Desk | None = None
+    _taken: Sequence[PendingDecision] = ()
 
     def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
         """Take what lies on the desk."""
         if self.desk is None:
             return []
         tick = int(wake.ticks[-1])
-        return self.desk.take(tick / self.context.ticks_per_s, tick)
+        self._taken = self.desk.take(tick / self.context.ticks_per_s)
+        return [(tick, pending.decision) for pending in self._taken]
+
+    def acknowledge(self, taken: Sequence[Taken]) -> None:
+        """Tell each page what became of its decision."""
+        for pending, one in zip(self._taken, taken, strict=True):
+            pending.taken(one)
 
     def warnings(self) -> list[str]:
         """Say that nobody is there."""

@@ -18,7 +18,7 @@ from dsa_des.text.safe_text import printable
 _PACKAGE = "components.view"
 #: The program's parts, in the order in which they need each other.
 SCRIPTS = (
-    "data.js", "symbols.js", "labels.js", "plan.js", "altitude.js", "timeline.js", "table.js",
+    "data.js", "symbols.js", "plan.js", "altitude.js", "timeline.js", "table.js",
     "app.js",
 )  # fmt: skip
 #: Number of the table's row, in 32 bits.
@@ -102,7 +102,7 @@ def page_program(package: str, scripts: Iterable[str]) -> tuple[str, str]:
     Scripts stand in the order in which they need each other; the digest is in base 64, as a content
     security policy has it.
     """
-    parts = [page_part("components.view", "canvas.js")]
+    parts = [page_part("components.view", name) for name in ("canvas.js", "labels.js")]
     parts += [page_part(package, name) for name in scripts]
     script = "\n".join(parts)
     return script, base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")

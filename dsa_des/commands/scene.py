@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.foreign import Foreign, Imports, imports
-from dsa_des.errors import SceneError
+from dsa_des.commands.grouping import check_grouping
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
 from dsa_des.running.effects import Planned
 from dsa_des.running.pacing import Pacer, parse_factor
 from dsa_des.running.recorded_run import record_run
@@ -141,7 +139,7 @@ def check_scene_file(
             )
             return
         simulation = Simulation(loaded)
-        _check_grouping(loaded, partial(load, scene, sets, swaps, seed, noted=True))
+        check_grouping(loaded, partial(load, scene, sets, swaps, seed, noted=True))
     say_if_long(simulation)
     say_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
@@ -156,44 +154,6 @@ def check_scene_file(
             f"  {node.name}: {float(spec.rate_hz):g} Hz from {float(spec.offset_s):g} s, "
             f"a scan every {float(node.clock.period):,.10g} ticks"
         )
-
-
-_OURS = ("dsa_des", "components")
-#: Scans of the slowest clock that are run for `_check_grouping`.
-_SCANS_TO_GROUP = 8
-
-
-def _check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
-    """Run a few scans one by one and all at once: a stranger's block must not see which it is.
-
-    Raises
-    ------
-    SceneError
-        If results differ.
-    """
-    strangers = [
-        name
-        for name, block in loaded.blocks.items()
-        if block.cls.windowed and block.cls.__module__.partition(".")[0] not in _OURS
-    ]
-    clocks = [block.cls.clock_of(block.parameters) for block in loaded.blocks.values()]
-    rates = [clock.rate_hz for clock in clocks if clock is not None]
-    if not strangers or not rates:
-        return
-    length = _SCANS_TO_GROUP / min(rates)
-    whole = again(duration=str(min(length, loaded.duration_s or length)))
-    found = []
-    for window in (1, None):
-        tables = MemorySink()
-        Simulation(whole, window=window, recorder=Recorder([tables])).run()
-        # As text: a value that is no number is equal to itself.
-        found.append({name: str(table.to_pydict()) for name, table in tables.tables().items()})
-    one, many = found
-    differ = [name for name in one if one[name] != many[name]]
-    if differ:
-        message = "gives other results where scans are worked on one by one and together (table "
-        message += f"{differ[0]}): what it returns must not depend on how often it is called"
-        raise SceneError([loaded.problem(f"blocks.{name}.type", message) for name in strangers])
 
 
 _WIDE = 300

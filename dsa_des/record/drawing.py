@@ -158,13 +158,13 @@ def drawing(
         _make_plain(figure)
         content = io.BytesIO()
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
-        if not isinstance(path, Path):
+        if isinstance(path, Path):
+            write_file(path, content.getvalue())
+        else:
             path.write(content.getvalue())
-            return
-        write_file(path, content.getvalue())
-        if (kept := _kept.get()) is not None:
-            figure.name, figure.png = path.stem, content.getvalue()
-            kept[path.stem] = figure
+        if (kept := _kept.get()) is not None and (name := Path(getattr(path, "name", "")).stem):
+            figure.name, figure.png = name, content.getvalue()
+            kept[name] = figure
 
 
 def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:

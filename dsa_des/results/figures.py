@@ -47,17 +47,23 @@ def draw_figures(
         if figure.kind == "run":
             paths += [] if draw_run is None else draw_run(figure.cell, figure.replica)
             continue
-        drawn = io.BytesIO()
+        drawn = _stream(f"figure-{number + 1:02d}-{figure.kind}.png")
         if draw_figure(drawn, tables, figure):
-            paths.append(_write(tables, f"figure-{number + 1:02d}-{figure.kind}.png", drawn))
+            paths.append(_write(tables, drawn))
     if tables.compared and tables.baseline is not None and tables.baseline[0].startswith("swap."):
         paths += _draw_scatters(tables, *tables.baseline, only)
     return paths
 
 
-def _write(tables: Tables, name: str, drawn: io.BytesIO) -> Path:
-    tables.folder.write_file(name, drawn.getvalue())
-    return tables.folder.path / name
+def _stream(name: str) -> io.BytesIO:
+    drawn = io.BytesIO()
+    drawn.name = name
+    return drawn
+
+
+def _write(tables: Tables, drawn: io.BytesIO) -> Path:
+    tables.folder.write_file(drawn.name, drawn.getvalue())
+    return tables.folder.path / drawn.name
 
 
 def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
@@ -152,9 +158,10 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
         for metric in tables.notable_results(only):
             _, first, second = paired(tables.rows, metric, by_place[base], chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
-            names, drawn = (str(baseline), str(at[place])), io.BytesIO()
+            names = str(baseline), str(at[place])
+            drawn = _stream(f"{safe_name(name)}.png")
             draw_scatter(drawn, first, second, names, metric, _cut(tables.record.title))
-            paths.append(_write(tables, f"{safe_name(name)}.png", drawn))
+            paths.append(_write(tables, drawn))
     return paths
 
 

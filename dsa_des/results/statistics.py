@@ -221,8 +221,10 @@ def difference(
     NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
     Events, and shares of which each unit has all or nothing, are counted: their paired interval is
     that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
-    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012).
-    It is no point where no unit differs.
+    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012);
+    the unpaired one is that of Agresti and Caffo, "Simple and effective confidence intervals for
+    proportions and differences of proportions", The American Statistician 54 (2000). Neither is a
+    point where no unit differs.
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
@@ -230,7 +232,8 @@ def difference(
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
     paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
-    unpaired = _welch(first[both], second[both], confidence)
+    apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
+    unpaired = (_counted_apart if apart else _welch)(first[both], second[both], confidence)
     if kind != "number":
         paired, unpaired = _of_shares(paired), _of_shares(unpaired)
     return EstimatedDifference(
@@ -261,6 +264,16 @@ def _counted(changes: FloatArray, confidence: float) -> Estimate:
     middle = math.fsum(more) / len(more)
     error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
     half = t_quantile(count - 1, confidence) * error
+    return Estimate(value, middle - half, middle + half, count, count < FEW)
+
+
+def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+    """Return the difference of two shares, each as if of one unit more of either kind."""
+    count = len(first)
+    one, other = ((found.sum() + 1.0) / (count + 2.0) for found in (first, second))
+    error = math.sqrt((one * (1.0 - one) + other * (1.0 - other)) / (count + 2.0))
+    half = _z(confidence) * error
+    value, middle = float(second.mean() - first.mean()), float(other - one)
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dsa_des.errors import Problem, did_you_mean, nearest
-from dsa_des.scene.keys import INDEX, Key, dotted, names_of, no_item, place_of, step, unquoted
+from dsa_des.errors import Problem, did_you_mean
+from dsa_des.scene.keys import Key, dotted, is_new_item, names_of, no_item, place_of, step, unquoted
 
 REMOVE = "remove"
 
@@ -133,7 +133,7 @@ class Inheritance:
             if isinstance(value, Removals):
                 continue
             place = place_of(items, name)
-            if place is None and _is_new(items, name, value):
+            if place is None and is_new_item(items, name, value):
                 place = len(items)
                 items.append({"name": name})
             if place is None:
@@ -197,17 +197,6 @@ class Inheritance:
                 )
                 key = dotted((*at, REMOVE))
                 self._problems.append(Problem(removal.source, key, message, removal.text))
-
-
-def _is_new(items: list[Any], name: str, value: Any) -> bool:
-    """Return whether a table of a name that a list lacks adds an item, and is no slip of the pen.
-
-    One of nearly a known name that lacks what all items have is meant to change that one.
-    """
-    if not isinstance(value, dict) or INDEX.fullmatch(name) or names_of(items).count(name):
-        return False
-    common = set.intersection(*(set(item) for item in items if isinstance(item, dict)))
-    return nearest(name, names_of(items)) is None or common <= {"name", *value}
 
 
 def _lost(old: Any, new: Any) -> list[str]:

@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from dsa_des.errors import did_you_mean
+from dsa_des.errors import did_you_mean, nearest
 
 Key = tuple[str | int, ...]
 
@@ -72,6 +72,19 @@ def no_item(items: list[Any], part: str) -> str:
     if not names:
         return message
     return message + did_you_mean(part, names)
+
+
+def is_new_item(items: list[Any], name: str, value: Any) -> bool:
+    """Return whether a table of a name that a list lacks adds an item, and is no slip of the pen.
+
+    One of nearly a known name that lacks what all items have is meant to change that one.
+    """
+    if not isinstance(value, dict) or INDEX.fullmatch(name) or names_of(items).count(name):
+        return False
+    if not all(isinstance(item, dict) for item in items):
+        return False
+    common = set.intersection(*map(set, items)) if items else set()
+    return nearest(name, names_of(items)) is None or common <= {"name", *value}
 
 
 def names_of(items: list[Any]) -> list[str]:

@@ -16,7 +16,7 @@ from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
-from dsa_des.scene.keys import Key, dotted, no_item, step, unquoted
+from dsa_des.scene.keys import Key, dotted, is_new_item, no_item, step, unquoted
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
 
 
@@ -97,6 +97,9 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     rest = unquoted(text)
     while True:
         place, part, rest = step(container, rest)
+        if place is None and not rest and is_new_item(container, part, value):
+            place, value = len(container), {"name": part, **value}
+            container.append(value)
         if place is None:
             return [Problem(source, text, no_item(container, part))]
         if key == ["blocks"] and place not in container:

@@ -123,6 +123,8 @@ def read_wires(
     entries = scene.data.get("wires", [])
     if not isinstance(entries, list):
         problems.append(scene.problem(("wires",), "must be a list of wires", entries))
+        if unsure is not None:
+            unsure.update(classes)  # which ones it meant to feed cannot be told
         return []
     wires: list[Wire] = []
     for position, entry in enumerate(entries):

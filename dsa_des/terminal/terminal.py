@@ -67,7 +67,8 @@ def html_of(show: Callable[[Any], None]) -> str:
     """Return what a function prints on a console, as HTML for a notebook."""
     from dsa_des.terminal.safe_console import SafeConsole
 
-    console = SafeConsole(file=io.StringIO(), record=True, width=110)
+    # In a notebook Rich would show each line by itself, beside what is returned.
+    console = SafeConsole(file=io.StringIO(), record=True, width=110, force_jupyter=False)
     show(console)
     style = "font-family:monospace;line-height:1.25;white-space:pre;overflow-x:auto"
     plain: str = console.export_html(

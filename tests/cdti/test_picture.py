@@ -11,7 +11,8 @@ import dsa_des
 from components.aircraft.aircraft import VisibleAreas
 from components.cdti.camera import silhouette
 from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines
-from components.cdti.scope import Scope, lost_area
+from components.cdti.loss_area import lost_area
+from components.cdti.scope import Scope
 from components.messages.tracks import Tracks
 from components.optical.silhouette import union_area
 from components.well_clear.volume import Volume, violates

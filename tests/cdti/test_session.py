@@ -105,10 +105,19 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
         assert hear(other, "taken")["id"] == ident(2)  # who watches sees what is decided
         say(socket, **{**TURN, "decision": "climb", "value": 60}, id=ident(6))
         climbed = hear(socket, "taken")
+        say(socket, **{**TURN, "value": -15}, id=ident(7))
+        turned_back = hear(socket, "taken")
+        assert "replaces" not in {**taken, **climbed}
+        assert turned_back["replaces"] == {"time": taken["time"], "value": 45}
+        assert taken["ends"] == pytest.approx(taken["time"] + 45 / 5)
+        own = frame["own"]
+        assert taken["to"] == pytest.approx((own["heading"] + 45) % 360, abs=0.1)
+        assert climbed["to"] == pytest.approx(own["alt"] + 60, abs=0.2)
+        assert verified["level"] == taken["level"] >= 1 and "to" not in verified
     # The page is gone; what it was told is taken in stays, and the run goes on.
     with page(session, key=welcome["key"]) as (socket, again):
         assert again["role"] == "operator"
-        assert [one["id"] for one in again["log"]] == [ident(2), ident(4), ident(6)]
+        assert [one["id"] for one in again["log"]] == [ident(2), ident(4), ident(6), ident(7)]
         say(socket, **TURN, id=ident(4))  # said again, as if the answer had been lost
         assert hear(socket, "taken") == taken
         assert hear(socket, "end", timeout=120)["why"] == "the scene has come to its end"
@@ -118,9 +127,14 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
     decided = pq.read_table(session.out / "decisions.parquet").to_pylist()
     assert [(row["decision"], row["time_s"]) for row in decided] == [
         ("verified", verified["time"]), ("turn", taken["time"]), ("climb", climbed["time"]),
+        ("turn", turned_back["time"]),
     ]  # fmt: skip
+    assert [row["replaces_s"] for row in decided] == [None, None, None, taken["time"]]
     told = [(row["turn_rad"], row["climb_m"]) for row in decided]
-    assert told == [(0.0, 0.0), (pytest.approx(math.pi / 4), 0.0), (0.0, 60.0)]  # to the right, up
+    assert told == [
+        (0.0, 0.0), (pytest.approx(math.pi / 4), 0.0), (0.0, 60.0),
+        (pytest.approx(-math.pi / 12), 0.0),
+    ]  # fmt: skip
     assert abs(decided[1]["wall_time_s"] - time.time()) < 60
     replayed = tmp_path / "replayed"
     dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=replayed)

@@ -1,6 +1,7 @@
 """What the operator's display shows of a crooked scene is what is there, and whose it is."""
 
 import math
+from copy import copy
 
 import crooked
 import numpy as np
@@ -57,7 +58,8 @@ def shown(request, tmp_path_factory):
     if not ekf:
         scene["blocks"]["fusion"] = {"type": "fusion.pick_best", "latency_s": LATE_S}
     scene["blocks"]["alerting"] = {"type": "alerting.daidalus", "scan_rate_hz": 2, **rules}
-    scene["blocks"]["guidance"] = {"type": "guidance.daidalus", **rules}
+    kinds = ["direction", "altitude", "speed"]
+    scene["blocks"]["guidance"] = {"type": "guidance.daidalus", "kinds": kinds, **rules}
     scene["wires"] += ["traffic -> alerting", "tracker -> alerting -> guidance"]
     scope, recorded = displayed(scene, window=None if ekf else 4)
     last = [row for row in recorded["alerts"] if row["time_s"] == 8.0]
@@ -129,15 +131,37 @@ def test_the_area_of_a_loss_begins_where_a_target_comes_near(shown):
         assert min(abs(distance - 1500.0) for distance in apart) < 250.0
 
 
-def test_bands_are_shown_in_degrees_until_they_are_old(shown):
+def test_bands_are_shown_in_degrees_and_m_until_they_are_old(shown):
     scope, recorded, _ = shown
-    bands = [r for r in recorded["bands"] if r["time_s"] == 8.0 and r["band"] == "direction"]
-    wanted = [
-        [round(math.degrees(r["low_rad"]), 1), round(math.degrees(r["high_rad"]), 1), r["region"]]
-        for r in bands
-    ]
-    assert wanted and scope.picture(DURATION_S)["bands"] == wanted
-    assert scope.picture(8.0 + 1.6)["bands"] == []
+    units = {"direction": ("rad", math.degrees), "altitude": ("m", float), "speed": ("mps", float)}
+    wanted = {kind: [] for kind in units}
+    for row in recorded["bands"]:
+        unit, shown_as = units[row["band"]]
+        ends = [round(shown_as(row[f"{end}_{unit}"]), 1) for end in ("low", "high")]
+        if row["time_s"] == 8.0:
+            wanted[row["band"]].append([*ends, row["region"]])
+    assert all(wanted.values()) and scope.picture(DURATION_S)["bands"] == wanted
+    assert not any(scope.picture(8.0 + 1.6)["bands"].values())
+
+
+def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
+    scope, _, _ = shown
+    heard, before = scope.heard(), scope.picture(DURATION_S)
+    late = copy(scope)
+    late._contacts, late._alerts, late._bands = None, None, None
+    assert late.picture(DURATION_S)["contacts"] == [] != before["contacts"]
+    assert late.picture(DURATION_S, heard) == before
+
+
+def test_the_display_says_where_a_command_leads_and_of_which_alert_a_contact_is(shown):
+    scope, recorded, contact = shown
+    own = scope.picture(DURATION_S)["own"]
+    assert scope.led_to("turn", -60.0) == pytest.approx((own["heading"] - 60.0) % 360.0, abs=0.06)
+    assert scope.led_to("turn", 150.0) == pytest.approx((own["heading"] + 150.0) % 360.0, abs=0.06)
+    assert scope.led_to("climb", -150.0) == pytest.approx(own["alt"] - 150.0, abs=0.11)
+    last = {r["target"]: r["level"] for r in recorded["alerts"] if r["time_s"] == 8.0}
+    assert {name: scope.level_of(contact[name]) for name in TARGETS} == last
+    assert scope.level_of(77) == 0
 
 
 def test_where_sensors_look_is_said_from_the_nose(shown):

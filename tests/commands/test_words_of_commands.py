@@ -9,6 +9,7 @@ from click.testing import CliRunner, Result
 from covering import covers
 
 from dsa_des.cli import main
+from dsa_des.commands import grouping
 
 SMALL = ("--set", "axes.blocks.radar.scan_rate_hz=[1,2]", "--set", "set.duration_s=5")
 
@@ -159,6 +160,15 @@ class Honest(Counting):
 class Broken(Counting):
     def look(self, cells):
         helper({})
+
+class Endless(Counting):
+    def look(self, cells):
+        while True:
+            try:
+                while True:
+                    pass
+            except ValueError:
+                pass
 """
 
 
@@ -176,6 +186,15 @@ def test_a_block_that_counts_its_calls_is_found_by_check(own):
     (line,) = [text for text in done.stderr.splitlines() if text.startswith("error: ")]
     assert "blocks.radar.type: gives other results" in line and "table detections" in line
     assert call("check", "first_light", "--swap", f"radar={own}:Honest").exit_code == 0
+
+
+def test_a_block_that_never_returns_ends_a_check_with_one_line(own, monkeypatch):
+    monkeypatch.setattr(grouping, "_DEADLINE_S", 0.3)
+    done = call("check", "first_light", "--swap", f"radar={own}:Endless")
+    assert done.exit_code == 2
+    (line,) = [text for text in done.stderr.splitlines() if text.startswith("error: ")]
+    assert line.startswith(f"error: radar ({own}:Endless) failed at t = 0.000 s")
+    assert "has not returned within 0.3 s" in line and "in look" in line
 
 
 @pytest.mark.parametrize("command", ["run", "cost", "check"])

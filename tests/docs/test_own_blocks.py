@@ -1,13 +1,16 @@
 """The blocks and the metric that docs/extending.md shows do what the page says of them."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from snippets import file_of, read_snippets
 
 from dsa_des.block.message import Text
+from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -50,6 +53,22 @@ def _plain(column: Any) -> Any:
 
 
 SHORT = ["duration_s=30", "blocks.traffic.intruders[0].north_m=3000"]
+
+
+def test_the_ladder_is_climbed_and_a_block_without_one_says_so(
+    configs: Path, tmp_path: Path
+) -> None:
+    scene, out = str(configs / "first_light.toml"), str(tmp_path / "cost")
+    of_radar = ["cost", scene, "--block", "radar", "--duration", "2", "--repeats", "1"]
+    changed = ["--swap", f"radar={MODULE}:MyFadingRadar", "--set", "blocks.radar.reach_km=12"]
+    done = CliRunner().invoke(main, [*of_radar, *changed, "--out", out, "--json"])
+    assert done.exit_code == 0, done.output
+    step, smooth = json.loads(done.stdout)
+    assert (step["rung"], smooth["rung"]) == ("step", "smooth")
+    # Both intruders are near the reach for two seconds, where a half is what the step is wrong by.
+    assert step["error_max"] == pytest.approx(0.5, abs=0.02) and smooth["error_max"] is None
+    done = CliRunner().invoke(main, [*of_radar, "--swap", f"radar={MODULE}:MyRadar"])
+    assert done.exit_code == 2 and f"radar: {MODULE}:MyRadar declares no ladder" in done.stderr
 
 
 def test_the_fusion_reports_what_two_sensors_see_at_once(configs: Path) -> None:

@@ -152,6 +152,11 @@ def test_files_named_in_running_text_exist(page: str) -> None:
     assert [name for name in names if not (ROOT / name).exists()] == []
 
 
+def test_the_readme_is_one_screen() -> None:
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 65 and max(map(len, lines)) <= 130
+
+
 def test_the_reading_finds_notes_and_what_is_shortened() -> None:
     page = (
         "<!-- not run: takes a day -->\n```\nsleep 86400\n```\n"

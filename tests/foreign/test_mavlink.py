@@ -259,6 +259,47 @@ def test_an_address_has_a_host_and_a_port(address):
         dsa_des.run(scene(address=address))
 
 
+def test_with_a_tracker_the_autopilot_is_told_of_its_tracks_and_of_nothing_else(monkeypatch):
+    """Confirmed tracks, where they are carried on to from when they were last updated."""
+    link = Wired(lambda datagram: [])
+    monkeypatch.setattr(mavlink, "UdpLink", link)
+    found = scene(duration_s=12, lost_s=60)
+    radar = {
+        "type": "radar.range_boundary", "range_km": 5.0, "scan_rate_hz": 0.7, "latency_s": 0.2,
+        "azimuth_resolution_deg": 0.5, "elevation_resolution_deg": 1.0, "range_resolution_m": 20.0,
+    }  # fmt: skip
+    found["blocks"] |= {
+        "transform": {"type": "geometry.ellipsoid"}, "radar": radar,
+        "fusion": {"type": "fusion.pass_through"}, "tracker": {"type": "tracking.ekf"},
+    }  # fmt: skip
+    found["wires"] += [
+        "traffic -> transform -> radar", "fusion -> tracker -> pilot",
+        {"from": "radar", "to": "fusion", "holds": "nothing"},
+    ]  # fmt: skip
+    run = dsa_des.run(found)
+    parser = common.MAVLink(None)
+    rows = run.state_tracks.to_pylist()
+    told = 0
+    for second, datagrams in enumerate(link.sent, start=1):
+        messages = [m for d in datagrams for m in parser.parse_buffer(d)]
+        vehicles = [m for m in messages if m.get_type() == "ADSB_VEHICLE"]
+        before = [row for row in rows if row["time_s"] <= second]
+        known = [row for row in before if row["time_s"] == before[-1]["time_s"]
+                 and row["track_status"] in ("confirmed", "coasted")]  # fmt: skip
+        assert [v.callsign for v in vehicles] == [f"T{row['track']}" for row in known]
+        for vehicle, row in zip(vehicles, known, strict=True):
+            ahead_s = second - row["state_s"]
+            assert ahead_s > 0.19
+            ned = [row[f"{axis}_m"] + ahead_s * row[f"{axis}_m_s"]
+                   for axis in ("north", "east", "down")]  # fmt: skip
+            origin = (row[f"origin_{name}"] for name in ("lat_deg", "lon_deg", "alt_m"))
+            lat, lon, alt = pymap3d.ned2geodetic(*ned, *origin)
+            assert (vehicle.lat / 1e7, vehicle.lon / 1e7) == pytest.approx((lat, lon), abs=1e-7)
+            assert vehicle.altitude / 1e3 == pytest.approx(alt, abs=0.01)
+            told += 1
+    assert told > 5
+
+
 def test_a_missing_pymavlink_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20.common", None)
     with pytest.raises(Exception, match=r"needs an extra: pip install 'dsa-des\[mavlink\]'"):

@@ -52,6 +52,7 @@ def plots_of(count=40, start_s=86390.0, lat_deg=-16.9):
         "elevation_rad": random.uniform(-0.3, 0.3, count),
         "range_m": random.uniform(300.0, 40_000.0, count),
         "illuminated_s": np.full(count, np.nan),
+        "range_rate_m_s": np.where(np.arange(count) % 5, random.uniform(-600, 500, count), np.nan),
     }
     detections["range_m"][3:4] = np.nan  # no plot, but a scan
     return RecordedTables(
@@ -85,6 +86,11 @@ def test_plots_come_back_within_the_least_bits(tmp_path):
     assert found.start_time_s + found.scan_s == pytest.approx(time_s, abs=TIME_S * 1.01)
     assert found.scan_s[found.scan].tolist() == found.time_s.tolist()
     assert found.range_m == pytest.approx(far_m, abs=RANGE_M * 1.001)
+    rate = run.tables["detections"]["range_rate_m_s"].to_numpy()[rows]
+    fits = np.abs(rate) <= 511  # what does not fit is not there
+    assert np.isnan(rate).sum() > 3 and (rate < -511).sum() > 0
+    assert np.isnan(found.range_rate_m_s[~fits]).all()
+    assert found.range_rate_m_s[fits] == pytest.approx(rate[fits], abs=0.5)
     apart = (found.azimuth_rad - bearing + math.pi) % (2 * math.pi) - math.pi
     assert np.abs(apart).max() <= TURN * 1.001
     assert found.own_lat_deg == pytest.approx(scans["own_lat_deg"].to_numpy(), abs=MARK_DEG * 1.01)
@@ -121,6 +127,13 @@ def test_the_bytes_are_those_of_the_specification(tmp_path):
     assert height == round(alt[0] / FOOT_M / 25) % 2**14
 
 
+#: Variances of the first track; the second one says none.
+SPREADS = {
+    "covariance_00_m2": 20.25, "covariance_11_m2": 6250000.0, "covariance_22_m2": 1e9,
+    "covariance_33_m2_s2": 1.1, "covariance_44_m2_s2": 1e6, "covariance_55_m2_s2": 0.04,
+}  # fmt: skip
+
+
 def tracked_run(start_s=86395.0):
     """Two tracks and the ownship over midnight, one of them below the ellipsoid."""
     count, random = 30, np.random.default_rng(3)
@@ -136,6 +149,7 @@ def tracked_run(start_s=86395.0):
         **{f"{axis}_m": ned[:, :2, k].ravel() for k, axis in enumerate(("north", "east", "down"))},
         **{f"{axis}_m_s": np.tile(velocity[:2, k], count)
            for k, axis in enumerate(("north", "east", "down"))},
+        **{name: np.tile([spread, np.nan], count) for name, spread in SPREADS.items()},
         **dict(zip(("origin_lat_deg", "origin_lon_deg", "origin_alt_m"),
                    (np.full(2 * count, v) for v in origin), strict=True)),
     }  # fmt: skip
@@ -185,6 +199,11 @@ def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
     assert [t["tentative"] for t in tracks[:2]] == [0, 1]
     assert [(t["last"], t["coasted"]) for t in tracks[-2:]] == [(1, 0), (0, 1)]
     assert all(t["simulated"] for t in tracks)
+    said = [tracks[0][f"{name}_error_m"] for name in ("north", "east", "alt")]
+    assert said == [4.5, 2500.0, 255 * 6.25 * FOOT_M]  # the largest stands for all that are larger
+    moves = [tracks[0][f"velocity_{name}_error_m_s"] for name in ("north", "east", "up")]
+    assert moves == [1.0, 63.75, pytest.approx(0.2, abs=6.25 * FOOT_M / 120)]
+    assert "north_error_m" not in tracks[1]
 
 
 def test_what_aircraft_say_of_themselves_is_ads_b_and_no_plot(tmp_path):

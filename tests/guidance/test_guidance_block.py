@@ -51,6 +51,27 @@ def test_bands_come_with_alerts_of_a_level(tmp_path):
     assert rows(every, "bands")[0]["time_s"] <= began
 
 
+@covers("kinds", of=KIND)
+def test_bands_are_of_the_kinds_that_are_asked_for(tmp_path):
+    both, three = run(scene(tmp_path)), run(scene(tmp_path, kinds=["speed", "direction"]))
+    assert {row["band"] for row in rows(both, "bands")} == {"direction", "altitude"}
+    assert {row["band"] for row in rows(three, "bands")} == {"direction", "speed"}
+
+    # What is asked for beside them changes no band.
+    def turns(found):
+        return [row for row in rows(found, "bands") if row["band"] == "direction"]
+
+    assert turns(both) == turns(three)
+    began_s = rows(three, "bands")[0]["time_s"]
+    speeds = bands(three, began_s, "speed")
+    assert speeds and {row["low_rad"] for row in speeds} == {row["low_m"] for row in speeds} == {
+        None
+    }
+    # Head-on nobody escapes by flying faster: the own speed and all above it are in bands.
+    own_mps = 50.0
+    assert min(r["low_mps"] for r in speeds) < own_mps < max(r["high_mps"] for r in speeds)
+
+
 @covers("conf", "alerter", of=KIND)
 def test_a_larger_alerter_has_wider_bands(tmp_path):
     width = {}

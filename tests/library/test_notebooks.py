@@ -1,5 +1,6 @@
 """What a notebook shows of scenes, runs and studies, and figures as values."""
 
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -47,9 +48,28 @@ def test_scenes_runs_and_studies_show_as_html(scene: dsa_des.Scene, run: dsa_des
     html = run._repr_html_()
     assert html.startswith("<pre") and "detections" in html and "Sensors" in html
     assert "&lt;b&gt;" in scene.set("title='<b>'")._repr_html_()
-    study = dsa_des.study(scene, metrics=["first_detection"], replicas=2, workers=1)
-    assert "first_detection_time_s.radar" in study._repr_html_()
+    study = dsa_des.study(
+        scene,
+        axes={"blocks.radar.scan_rate_hz": [1, 2]},
+        metrics=["first_detection"],
+        figures=[{"metric": "detected.radar", "axis": "blocks.radar.scan_rate_hz"}],
+        replicas=2,
+        workers=1,
+    )
+    assert list(study.figures) == ["figure-01-axis"]
+    assert "detected.radar" in study._repr_html_()
     assert all(isinstance(figure, Figure) for figure in study.figures.values())
+
+
+def test_what_is_shown_is_one_value_and_no_line_by_itself(
+    scene: dsa_des.Scene, run: dsa_des.Run, monkeypatch: pytest.MonkeyPatch
+):
+    study = dsa_des.study(scene, metrics=["first_detection"], replicas=2, workers=1)
+    plain = run._repr_html_(), study._repr_html_()
+    # Rich shows each line itself where it finds a notebook; IPython is not there to be asked.
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setitem(sys.modules, "IPython.display", None)
+    assert (run._repr_html_(), study._repr_html_()) == plain
 
 
 def test_a_scene_is_set_by_texts_as_the_command_line_has_them(scene: dsa_des.Scene):

@@ -38,10 +38,10 @@ class Person(Desk):
         super().__init__()
         self.acts, self.told = list(acts), []
 
-    def take(self, time_s, tick):
+    def take(self, time_s):
         while self.acts and self.acts[0][0] <= time_s:
             self.put(PendingDecision(self.acts.pop(0)[1], self.told.append))
-        return super().take(time_s, tick)
+        return super().take(time_s)
 
 
 def scene(tmp_path, kind=RECORDED, truth=False, **keys):
@@ -78,7 +78,8 @@ def test_a_replay_is_what_the_person_did_to_the_last_column(tmp_path):
     assert [name for name in there if not again[name].equals(there[name])] == []
     decided = there["decisions"].to_pylist()
     assert [row["decision"] for row in decided] == ["shown", "verified", "turn", "climb"]
-    assert [row["time_s"] for row in decided] == [41.25, 43.5, 43.5, 60.0] == person.told
+    assert [row["time_s"] for row in decided] == [41.25, 43.5, 43.5, 60.0]
+    assert [one.time_s for one in person.told] == [41.25, 43.5, 43.5, 60.0]
     assert decided[2]["wall_time_s"] - decided[0]["wall_time_s"] == 2.5
     assert decided[3]["target"] is None and decided[3]["wall_time_s"] is None
     turned = [row["heading_rad"] for row in there["truth"].to_pylist() if row["target"] is None]
@@ -88,6 +89,44 @@ def test_a_replay_is_what_the_person_did_to_the_last_column(tmp_path):
     assert [row["alert_s"] for row in decided] == [began, began, began, None]
     assert decided[1]["response_s"] == pytest.approx(43.5 - began, abs=1e-9)
     assert decided[1]["level"] >= 1 and decided[3]["level"] == 0
+
+
+#: Turns of 3 deg/s last 11.46 s and 5.73 s; climbs of 2.5 m/s 40 s, 8 s and 4 s.
+STEERED = [
+    (41.0, OperatorDecision(TURN, "head_on", turn_rad=0.6)),
+    (42.0, OperatorDecision(CLIMB, climb_m=100.0)),
+    (45.0, OperatorDecision(TURN, "head_on", turn_rad=-0.3)),
+    (50.0, OperatorDecision(CLIMB, climb_m=-20.0)),
+    (50.0, OperatorDecision(SHOWN, "head_on")),
+    (51.0, OperatorDecision(TURN, turn_rad=0.1)),
+    (58.0, OperatorDecision(CLIMB, climb_m=10.0)),
+]
+
+
+def test_a_command_says_which_one_it_replaces_and_a_turn_and_a_climb_fly_both(tmp_path):
+    keys = {"turn_rate_deg_s": 3.0, "vertical_rate_mps": 2.5}
+    there, person = lived(scene(tmp_path, HUMAN, truth=True, **keys), STEERED)
+    decided = there["decisions"].to_pylist()
+    # The third turn comes 0.27 s after the second is flown, the third climb as the second ends.
+    assert [row["replaces_s"] for row in decided] == [None, None, 41.0, 42.0, None, None, None]
+    told = [(one.time_s, one.replaces_s) for one in person.told]
+    assert [one for one in told if not math.isnan(one[1])] == [(45.0, 41.0), (50.0, 42.0)]
+    ends = [one.ends_s for one in person.told]
+    assert ends[:4] == pytest.approx(
+        [41 + math.degrees(0.6) / 3, 82, 45 + math.degrees(0.3) / 3, 58]
+    )
+    assert math.isnan(ends[4])
+    own = {r["time_s"]: r for r in there["truth"].to_pylist() if r["target"] is None}
+
+    def flown(name, since_s, time_s):  # a second later: what the wire to the ownship takes
+        return own[time_s + 1.0][name] - own[since_s + 1.0][name]
+
+    # Both at once from 42 s to 45 s; then what was left of the first turn and climb is not flown.
+    assert math.degrees(flown("heading_rad", 41.0, 45.0)) == pytest.approx(12.0, abs=0.1)
+    assert flown("alt_m", 42.0, 45.0) == pytest.approx(7.5, abs=0.1)
+    assert math.degrees(flown("heading_rad", 45.0, 50.0)) == pytest.approx(-15.0, abs=0.1)
+    assert flown("alt_m", 42.0, 50.0) == pytest.approx(20.0, abs=0.1)
+    assert flown("alt_m", 50.0, 58.0) == pytest.approx(-20.0, abs=0.1)
 
 
 @covers("turn_rate_deg_s", "vertical_rate_mps", of=BOTH)
@@ -203,11 +242,11 @@ def test_what_is_no_table_of_decisions_is_refused(tmp_path, text, says):
 
 
 def test_a_desk_takes_no_more_than_a_person_lays_down():
-    desk, taken = Desk(), []
-    decision = PendingDecision(OperatorDecision(SHOWN), taken.append)
+    desk = Desk()
+    decision = PendingDecision(OperatorDecision(SHOWN), print)
     accepted = [desk.put(decision) for _ in range(MOST_WAITING + 2)]
     assert accepted == [True] * MOST_WAITING + [False] * 2
-    assert len(desk.take(1.5, 15)) == MOST_WAITING and taken == [1.5] * MOST_WAITING
+    assert desk.take(1.5) == [decision] * MOST_WAITING and desk.take(2.5) == []
     assert desk.put(decision)
     assert len(desk.close()) == 1 and not desk.put(decision)
 
@@ -289,6 +328,8 @@ def test_a_turn_and_a_climb_are_flown_together(tmp_path, table, turned_rad, clim
     first_s, second_s = (row["time_s"] + 1.0 for row in alone["manoeuvres"].to_pylist())
     own_mps = (own[1]["alt_m"] - own[0]["alt_m"]) / (own[1]["time_s"] - own[0]["time_s"])
     begun_m = own[0]["alt_m"] + own_mps * (first_s - own[0]["time_s"])
+    replaces = [row["replaces_s"] for row in alone["decisions"].to_pylist()]
+    assert replaces == [None, 44.0 if turned_rad == 0.0 else None]
     if turned_rad == 0.0:
         begun_m += 4.0 * (second_s - first_s)
     assert own[-1]["alt_m"] - begun_m == pytest.approx(climbed_m, abs=0.1)

@@ -127,6 +127,23 @@ def test_paired_differences_of_events(count: int, up: float, down: float) -> Non
     assert 0.93 <= found <= (1.0 if rare else 0.97)
 
 
+@pytest.mark.parametrize(("one", "other"), [(0.3, 0.5), (0.1, 0.15), (0.9, 0.97)])
+@pytest.mark.parametrize("count", [30, 100])
+def test_unpaired_differences_of_events(count: int, one: float, other: float) -> None:
+    def unpaired(random: Random) -> Estimate:
+        first, second = (random.random(count) < one) * 1.0, (random.random(count) < other) * 1.0
+        return difference(first, second, LEVEL, kind="event").unpaired
+
+    assert 0.93 <= coverage(unpaired, other - one) <= 0.995
+    alike = difference(np.ones(count), np.ones(count), LEVEL, kind="event").unpaired
+    # Agresti and Caffo: (count + 1) / (count + 2) of both, and no point.
+    p = (count + 1) / (count + 2)
+    assert alike.high == pytest.approx(
+        1.959964 * math.sqrt(2 * p * (1 - p) / (count + 2)), rel=1e-6
+    )
+    assert (alike.value, alike.low) == (0.0, -alike.high)
+
+
 def test_where_no_unit_differs_outcomes_may_still_differ_elsewhere() -> None:
     same = np.ones(60)
     found = difference(same, same, LEVEL, kind="event").paired

@@ -2,6 +2,7 @@
 
 import pytest
 
+import dsa_des
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica, scene_of
@@ -194,6 +195,25 @@ def test_a_table_of_a_new_name_adds_an_item(write, name):
     wrong = write(f"[blocks.traffic.intruders.{name}]\n{THIRD}color = 1\n")
     with pytest.raises(SceneError, match=r"scene.toml: blocks.traffic.intruders\[2\].color"):
         load_scene(wrong)
+
+
+@pytest.mark.parametrize("name", ["third", "head_on_2"])
+def test_a_table_set_at_a_new_name_adds_an_item(write, name):
+    scene = dsa_des.load_scene(write(""))
+    item = {"east_m": 5000, "north_m": 1, "up_m": 0, "speed_mps": 70}
+    more = scene.set({f"blocks.traffic.intruders.{name}": item})
+    written = f"{{{', '.join(f'{key} = {value}' for key, value in item.items())}}}"
+    for changed in (more, scene.set(f"blocks.traffic.intruders.{name}={written}")):
+        assert [one.name for one in changed.blocks["traffic"].parameters.intruders][2:] == [name]
+        assert [east_m(changed, place) for place in range(3)] == [3000, 4000, 5000]
+    with pytest.raises(SceneError, match=r"no item 'head_onn'.* did you mean 'head_on'"):
+        scene.set({"blocks.traffic.intruders.head_onn": {"east_m": 1}})
+
+
+def test_a_table_of_a_name_in_a_list_of_wires_is_refused(write):
+    with pytest.raises(SceneError, match=r"wires.*must be a list of wires") as found:
+        load_scene(write('[wires.third]\nfrom = "traffic"\n'))
+    assert len(found.value.problems) == 1  # and no block is blamed for missing one
 
 
 def test_nearly_a_known_name_with_a_key_or_two_is_a_slip(write):

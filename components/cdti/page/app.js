@@ -6,9 +6,11 @@ const App = (() => {
   const scene = { title: "", sensors: [], names: [], heading: 0, console: false,
     name: (number) => (number >= 1000000 ? `track ${number - 1000000}`
       : scene.names[number] || (number < 0 ? "unknown" : `target ${number}`)) };
-  const state = { role: "", frame: null, dirty: false, chosen: -1, order: [], over: false,
-    ended: "", began: false, lost: false };
-  const levels = new Map(), rejected = new Map(), said = [];
+  const state = { role: "", frame: null, dirty: false, chosen: -1, picked: false, order: [], over: false,
+    ended: "", began: false, lost: false, notice: "", noticeUntil: 0 };
+  const levels = new Map(), said = [];
+  let decided = [], commands = {};
+  const rejected = new Map();  // by target, for as long as the contact is there: at which level
   const shown = new Map();  // by target: until when alerts on it have been told of, s
   let drawn = {};
   const frames = { count: 0, spent_ms: 0 };
@@ -25,15 +27,14 @@ const App = (() => {
     if (decision === "turn" && state.frame && state.frame.own) {
       trip = { at: performance.now(), heading: state.frame.own.heading, side: Math.sign(value) };
     }
-    if (decision === "rejected") rejected.set(target, levels.get(target) || 0);
-    if (decision === "verified") rejected.delete(target);
     return Link.decide(content);
   }
-  function choose(number) {
+  function choose(number, picked = true) {
+    state.picked = picked;
     if (number === state.chosen) return;
     state.chosen = number;
     Link.send({ type: "chosen", target: number });
-    if (number >= 0 && levels.get(number) && may()) decide("looked");
+    if (picked && number >= 0 && levels.get(number) && may()) decide("looked");
     state.dirty = true;
   }
   function step(by) {
@@ -44,7 +45,7 @@ const App = (() => {
 
   // An alert that is new or more urgent sounds; that it is on screen is told once.
   function heed(frame) {
-    const on = new Set();
+    const on = new Set(), there = new Set(frame.contacts.map((one) => one[0]));
     for (const one of frame.alerts) {
       on.add(one.target);
       const before = levels.get(one.target) || 0;
@@ -56,12 +57,34 @@ const App = (() => {
         if (may()) Link.decide({ decision: "shown", target: one.target });
       }
     }
-    for (const target of [...levels.keys()]) {
-      if (!on.has(target)) { levels.delete(target); rejected.delete(target); }
+    for (const target of [...levels.keys()]) if (!on.has(target)) levels.delete(target);
+    for (const target of [...rejected.keys()]) {
+      if (!on.has(target) && !there.has(target)) rejected.delete(target);
     }
+  }
+  // Until somebody picks a contact, and when it is gone, the chosen one is that of an alert.
+  function follow(frame) {
+    if (state.picked && !frame.contacts.some((one) => one[0] === state.chosen)) state.picked = false;
+    if (state.picked || levels.get(state.chosen)) return;
+    const open = frame.alerts.find((one) => !rejected.has(one.target));
+    if (open) choose(open.target, false);
+  }
+  // What was decided, by whichever page: it is known to all of them.
+  function take(one) {
+    decided.push(one);
+    if (one.decision === "rejected") rejected.set(one.target, one.level);
+    if (one.decision === "verified") rejected.delete(one.target);
+    if (one.to !== undefined) commands[one.decision] = one;
+  }
+  // A line for a while, that the next picture does not take away.
+  function notice(text) {
+    state.notice = text;
+    state.noticeUntil = performance.now() + 8000;
+    state.dirty = true;
   }
   function words() {
     if (state.over) return `ended: ${state.ended}`;
+    if (performance.now() < state.noticeUntil) return state.notice;
     if (state.lost) return "connection lost: the display stands still";
     if (!state.began) return "waiting for the operator to begin";
     const watched = state.role === "operator" ? "you decide" : "you watch";
@@ -74,23 +97,27 @@ const App = (() => {
     if (frame && frame.own) {
       scene.heading = frame.own.heading;
       heed(frame);
-      if (state.chosen < 0 && frame.alerts.length) {
-        state.chosen = frame.alerts[0].target;
-      }
-      Scope.draw(frame, scene, state.chosen, drawn);
-      state.order = Panel.contacts(frame, scene, state.chosen);
+      follow(frame);
+      const { turn, climb } = commands, flown = (one) => (one && frame.t < one.ends ? one.to : null);
+      Scope.draw(frame, scene, state.chosen, flown(turn), drawn);
+      Tapes.draw(frame.own, frame.bands, flown(climb), drawn);
+      Panel.flying(commands, frame.t);
+      state.order = Panel.contacts(frame, scene, state.chosen, rejected);
       drawn.alerts = Panel.alerts(frame, scene, rejected);
       drawn.camera = Camera.draw(frame.camera, scene);
       drawn.own = frame.own;
       measure(frame);
     }
     if (frame) {
-      get("time").textContent = `${frame.t.toFixed(1)} s`;
+      Panel.put(get("time"), `${frame.t.toFixed(1)} s`);
       const late = frame.lag > 0.1;
-      get("lag").textContent = `lag ${(1000 * frame.lag).toFixed(0)} ms`;
+      Panel.put(get("lag"), `lag ${(1000 * frame.lag).toFixed(0)} ms`);
       get("lag").className = late ? "late" : "";
     }
     Panel.status(words());
+    Panel.put(get("range"), Units.range(Scope.range()));
+    Panel.put(get("chosen"), state.chosen < 0 ? "no contact is chosen"
+      : `chosen: ${scene.name(state.chosen)}`);
     for (const id of ["verify", "reject"]) get(id).disabled = !may() || state.chosen < 0;
     for (const id of ["left", "right", "up", "down"]) get(id).disabled = !may();
     frames.count += 1;
@@ -123,11 +150,15 @@ const App = (() => {
     state.lost = false;
     get("title").textContent = content.title;
     document.title = `${content.title}: traffic display`;
-    get("log").replaceChildren();
+    decided = [];
+    commands = {};
     for (const one of content.log) {
-      Panel.decided(one, scene);
+      take(one);
       if (one.decision === "shown") shown.set(one.target, one.time);
     }
+    let kept = "";
+    try { kept = sessionStorage.getItem("units") || ""; } catch { /* as it was started */ }
+    units(kept || content.units);
     get("start").hidden = content.began || content.role !== "operator";
     if (!get("start").hidden) get("ready").focus();
     Scope.fit(content.sensors);
@@ -143,15 +174,14 @@ const App = (() => {
   };
   Link.hears.taken = (content) => {
     said.push(content);
+    take(content);
     Panel.decided(content, scene);
-    if (content.decision === "turn" && state.frame && state.frame.own) {
-      Scope.bug = (state.frame.own.heading + content.value + 360) % 360;
-    }
+    if (content.replaces) notice(Panel.command(content) + Panel.replaced(content));
     state.dirty = true;
   };
   Link.hears.refused = (content) => {
     said.push(content);
-    Panel.status(`refused: ${content.why}`);
+    notice(`refused: ${content.why}`);
   };
   Link.hears.end = (content) => {
     state.over = true;
@@ -167,6 +197,23 @@ const App = (() => {
   function theme(name) {
     root.dataset.theme = name;
     Symbols.readTheme();
+    Legend.draw(scene.sensors);
+    state.dirty = true;
+  }
+  function units(name) {
+    const before = Scope.range();
+    Units.choose(name);
+    Scope.hold(before);
+    get("units").textContent = Units.system.words;
+    const place = Math.max(get("climb-by").selectedIndex, 0), was = get("climb-by").options.length;
+    get("climb-by").replaceChildren(...Units.system.climbs.map((value) => {
+      const metres = Units.metres("height", value);
+      return new Option(Units.height(metres), metres.toFixed(4).replace(/\.?0+$/, ""));
+    }));
+    get("climb-by").selectedIndex = was ? place : 1;
+    Tapes.units();
+    Legend.draw(scene.sensors);
+    Panel.decisions(decided.slice(-100), scene);
     state.dirty = true;
   }
   const by = (id, sign) => sign * Number(get(id).value);
@@ -181,6 +228,10 @@ const App = (() => {
     up: () => decide("climb", by("climb-by", 1)), down: () => decide("climb", by("climb-by", -1)),
     in: () => { Scope.zoom(-1); state.dirty = true; },
     out: () => { Scope.zoom(1); state.dirty = true; },
+    units: () => {
+      units(Units.other());
+      try { sessionStorage.setItem("units", Units.name); } catch { /* until it is loaded again */ }
+    },
     theme: () => theme(root.dataset.theme === "dark" ? "light" : "dark"),
     mute: () => {
       const on = get("mute").getAttribute("aria-pressed") !== "true";
@@ -192,7 +243,11 @@ const App = (() => {
   document.addEventListener("pointerdown", Sound.allow);
   document.addEventListener("keydown", Sound.allow);
   const keys = {
-    v: press.verify, x: press.reject, n: () => step(1), p: () => step(-1), "+": press.in,
+    l: () => {
+      get("legend").open = !get("legend").open;
+      if (get("legend").open) get("legend").scrollIntoView({ block: "nearest" });
+    },
+    u: press.units, v: press.verify, x: press.reject, n: () => step(1), p: () => step(-1), "+": press.in,
     "=": press.in, "-": press.out, d: press.theme, s: press.mute, ArrowLeft: press.left,
     ArrowRight: press.right, ArrowUp: press.up, ArrowDown: press.down,
   };

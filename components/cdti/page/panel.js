@@ -19,23 +19,23 @@ const Panel = (() => {
     }
     return list.children[place];
   }
-  function words(one, scene) {
+  function words(one, scene, rejected) {
     const [number, east, north, up, bearing, , , , vu, level] = one;
     const from = ((bearing - scene.heading) % 360 + 360) % 360;
     const clock = Math.round(from / 30) % 12 || 12;
     const parts = [level ? Symbols.WORDS[Math.min(level, 3)] : "traffic", scene.name(number),
       `${clock} o'clock`];
     if (east === null) parts.push("no range");
-    else parts.push(`${(Math.hypot(east, north) / 1000).toFixed(1)} km`,
-      `${Symbols.altitude(up)}${Symbols.climb(vu)}`);
+    else parts.push(Units.distance(Math.hypot(east, north), 1), `${Units.above(up)}${Symbols.climb(vu)}`);
+    if (rejected.has(number)) parts.push("rejected");
     return parts.join(", ");
   }
-  function contacts(frame, scene, chosen) {
+  function contacts(frame, scene, chosen, rejected) {
     const shown = order(frame);
     shown.forEach((one, place) => {
       const made = row(place);
-      const text = words(one, scene);
-      if (made.textContent !== text) made.textContent = text;
+      const text = words(one, scene, rejected);
+      put(made, text);
       made.className = one[9] ? `level${Math.min(one[9], 3)}` : "";
       made.setAttribute("aria-selected", String(one[0] === chosen));
       made.dataset.number = String(one[0]);
@@ -44,34 +44,61 @@ const Panel = (() => {
     while (list.children.length > shown.length) list.lastChild.remove();
     return shown.map((one) => one[0]);
   }
+  // The most urgent alert in words; one that was rejected stays for as long as it is on.
   function alerts(frame, scene, rejected) {
-    const open = frame.alerts.filter((one) => !rejected.has(one.target));
-    const most = open[0];
-    let text = "";
+    const every = frame.alerts.map((one) => ({ ...one, rejected: rejected.has(one.target) }))
+      .sort((a, b) => a.rejected - b.rejected);
+    const most = every[0];
+    let text = "", more = "";
     if (most) {
-      const wait = most.to_loss === null ? "" : most.to_loss <= 0 ? ": separation is lost"
+      text = `${Symbols.WORDS[Math.min(most.level, 3)]} ${scene.name(most.target)}`;
+      more = most.to_loss === null ? "" : most.to_loss <= 0 ? ": separation is lost"
         : `: separation is lost in ${Math.round(most.to_loss)} s`;
-      text = `${Symbols.WORDS[Math.min(most.level, 3)]} ${scene.name(most.target)}${wait}`;
+      if (most.rejected) more += " (rejected)";
+      if (every.length > 1) more += `; ${every.length - 1} more`;
     }
-    if (banner.textContent !== text) banner.textContent = text;
+    put(get("alert"), text);
+    put(get("alert-more"), more);
     banner.className = most ? `level${Math.min(most.level, 3)}` : "";
-    return open;
+    return every;
+  }
+  function put(element, text) {
+    if (element.textContent !== text) element.textContent = text;
+  }
+  function command(one) {
+    if (one.decision === "turn") {
+      return `turn ${Math.abs(one.value)}° ${one.value < 0 ? "left" : "right"}`;
+    }
+    return `${one.value < 0 ? "descend" : "climb"} ${Units.height(Math.abs(one.value))}`;
+  }
+  // Which command one replaces that was still being flown.
+  function replaced(one) {
+    if (!one.replaces) return "";
+    return ` replaces ${command({ ...one, ...one.replaces })} of ${one.replaces.time.toFixed(2)} s`;
   }
   function decided(one, scene) {
     const made = document.createElement("li");
-    const who = one.target >= 0 ? ` ${scene.name(one.target)}` : "";
-    let what = SAID[one.decision] || "";
-    if (one.decision === "turn") {
-      what = `turn ${Math.abs(one.value)}° ${one.value < 0 ? "left" : "right"}`;
-    } else if (one.decision === "climb") {
-      what = `${one.value < 0 ? "descend" : "climb"} ${Math.round(Math.abs(one.value) / 0.3048)} ft`;
-    }
-    made.textContent = `${one.time.toFixed(2)} s: ${what}${who}`;
+    const who = one.target >= 0 ? ` (${scene.name(one.target)})` : "";
+    const what = SAID[one.decision] || command(one);
+    made.textContent = `${one.time.toFixed(2)} s: ${what}${who}${replaced(one)}`;
     log.prepend(made);
     while (log.children.length > 100) log.lastChild.remove();
   }
-  function status(text) {
-    if (get("status").textContent !== text) get("status").textContent = text;
+  // All that was decided, again: in other units, or after the page was away.
+  function decisions(every, scene) {
+    log.replaceChildren();
+    for (const one of every) decided(one, scene);
   }
-  return { contacts, alerts, decided, status, list };
+  function flying(commands, time) {
+    const { turn, climb } = commands, parts = [];
+    if (turn && time < turn.ends) {
+      parts.push(`${turn.value < 0 ? "left" : "right"} to ${Units.heading(turn.to)}`);
+    }
+    if (climb && time < climb.ends) {
+      parts.push(`${climb.value < 0 ? "descent" : "climb"} to ${Units.height(climb.to)}`);
+    }
+    put(get("flying"), parts.length ? `flying ${parts.join(", ")}` : "no command is being flown");
+  }
+  function status(text) { put(get("status"), text); }
+  return { contacts, alerts, command, replaced, decided, decisions, flying, status, put, list };
 })();

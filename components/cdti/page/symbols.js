@@ -2,7 +2,7 @@
 // Traffic symbols: TSO-C195b / AC 20-172B and TCAS. Caution: amber circle; warning: red square; the
 // direction of flight is an arrowhead inside; without an alert an open arrowhead, or a diamond.
 const Symbols = (() => {
-  const names = ["ground", "ink", "faint", "line", "own", "traffic", "eo", "ir", "radar", "sight",
+  const names = ["ground", "ink", "faint", "line", "own", "traffic", "eo", "ir", "radar", "recovery",
     "symbol-caution", "symbol-warning", "on-symbol", "caution", "warning"];
   const WORDS = ["", "PREVENTIVE", "CORRECTIVE", "WARNING"];
   const CLIMBS_MPS = 2.54;  // 500 ft/min
@@ -53,15 +53,21 @@ const Symbols = (() => {
     }
     c.restore();
   }
-  function altitude(up) {
-    if (up === null) return "";
-    const hundreds = Math.round(up / 30.48);
-    const sign = hundreds < 0 ? "−" : "+";
-    return `${sign}${String(Math.abs(hundreds)).padStart(2, "0")}`;
+  // The colour of words about a contact.
+  function ink(level) {
+    return level >= 3 ? colours.warning : level > 0 ? colours.caution : colours.traffic;
   }
   function climb(rate) {
     if (rate === null || Math.abs(rate) < CLIMBS_MPS) return "";
     return rate > 0 ? "↑" : "↓";
+  }
+  // What was commanded: a heading on the outer ring, an altitude on its tape.
+  function bug(c, x, y) {
+    c.beginPath();
+    c.arc(x, y, 5, 0, 2 * Math.PI);
+    c.strokeStyle = colours.own;
+    c.lineWidth = 2;
+    c.stroke();
   }
   function own(c, x, y, r) {
     c.save();
@@ -75,5 +81,6 @@ const Symbols = (() => {
     c.stroke();
     c.restore();
   }
-  return { get colours() { return colours; }, WORDS, readTheme, shape, traffic, altitude, climb, own };
+  return { get colours() { return colours; }, WORDS, readTheme, shape, traffic, ink, climb, bug,
+    own };
 })();

@@ -120,8 +120,9 @@ class ForeignFmu(Component):
                 "a sensor needs to know where aircraft are between instants, as beam_sweep and "
                 "measures_range_rate do: an FMU says where the ownship is at instants only"
             )
+        spec = wiring.spec(self.name, self.context.ticks_per_s)
         self._process = process_for(model.path, alone=model.alone)
-        self._number = self._process.open(wiring.spec(self.name), self.p.deadline_s)
+        self._number = self._process.open(spec, self.p.deadline_s)
         self._freed: Any = _Shared()
         self._saved = _Saved(0, self._freed.slots)
         self._last: FloatArray = np.array(wiring.defaults)
@@ -162,9 +163,8 @@ class ForeignFmu(Component):
         """Step the FMU through the instants, and send what it gives."""
         own, wiring = np.arange(len(wake)), self.p.wiring
         scheduled = self.p.model.kind == "se"
-        due: list[list[int]] = [[] for _ in own]
+        due = self._due(wake)
         if scheduled:
-            due = self._due(wake)
             own = np.array([row for row in own if due[row] or self._waiting], dtype=np.int64)
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
@@ -214,6 +214,8 @@ class ForeignFmu(Component):
         due: list[list[int]] = [[] for _ in ticks]
         for number, clock in enumerate(self.p.model.clocks.values()):
             given = self.p.clocks.get(clock.name)
+            if self.p.model.kind == "cs" and not isinstance(given, str):
+                continue  # the FMU's process knows when
             if clock.interval_s is not None and clock.variability != "triggered":
                 shift, interval = int(clock.shift_s * per_s), int(clock.interval_s * per_s)
                 ticking = (ticks >= shift) & ((ticks - shift) % interval == 0)

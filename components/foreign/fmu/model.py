@@ -63,7 +63,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class PartitionClock:
-    """An input clock of a scheduled-execution FMU; `interval_s` is None where it varies."""
+    """An input clock, of FMI 3; `interval_s` is None where it varies."""
 
     name: str
     reference: int

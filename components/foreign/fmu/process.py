@@ -24,7 +24,7 @@ _ROOT = Path(__file__).parents[3]
 _WORKER = """
 import sys
 sys.path.append(sys.argv[1])
-from components.foreign.fmu.worker import serve
+from components.foreign.fmu.running.worker import serve
 serve(sys.argv[2])
 """
 _LOOK_S = 0.05

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from components.foreign.fmu.detections import DetectionOutputs
-from components.foreign.fmu.model import TEXT_KINDS, FmuModel, Variable
+from components.foreign.fmu.model import TEXT_KINDS, FmuModel, PartitionClock, Variable
 from components.foreign.fmu.start_values import first_inputs, size_of, start_value
 from components.foreign.fmu.units import unit_of_column
 from components.messages.steering import Manoeuvre
@@ -229,21 +229,47 @@ class Wiring:
                     self.wrong.append(f"clocks: {name!r} ticks before 0 s")
                 self.instants += times
         self.instants = [instant for instant in self.instants if instant > 0]
+        if known and self.model.kind == "cs" and not self.model.events:
+            self.wrong.append("file: it has clocks, and no event mode in which they could tick")
 
     # -- what the FMU's process needs to know --------------------------------------------------
 
-    def spec(self, name: str) -> dict[str, Any]:
-        """Return what the FMU's process needs to know."""
+    def spec(self, name: str, ticks_per_s: int) -> dict[str, Any]:
+        """Return what the FMU's process needs to know.
+
+        Raises
+        ------
+        ValueError
+            If a clock of a co-simulation FMU ticks between two ticks of the scene.
+        """
         model = self.model
-        asked = ("countdown", "changing")
         return {
             "version": model.version, "kind": model.kind, "identifier": model.identifier,
             "token": model.token, "name": name, "events": model.events,
             "discrete": self.discrete, "start": [tuple(one) for one in self.starts],
             "inputs": self.inputs, "outputs": self.outputs, "raised": self.raised,
-            "clocks": [
-                {"name": c.name, "reference": c.reference, "priority": c.priority,
-                 "fraction": c.fraction, "asked": c.variability in asked}
-                for c in model.clocks.values()
-            ],
+            "clocks": [self._clock(clock, ticks_per_s) for clock in model.clocks.values()],
+        }  # fmt: skip
+
+    def _clock(self, clock: PartitionClock, ticks_per_s: int) -> dict[str, Any]:
+        """Return when a clock ticks; those of scheduled FMUs are told at every wake."""
+        interval, shift = Fraction(0), Fraction(0)
+        given = self.p.clocks.get(clock.name)
+        times: list[Fraction] = []
+        if self.model.kind == "cs":
+            times = [] if given is None or isinstance(given, str) else list(given)
+            if clock.interval_s is not None and clock.variability != "triggered":
+                interval, shift = clock.interval_s, clock.shift_s
+        for instant in (interval, shift, *times):
+            if (instant * ticks_per_s).denominator != 1:
+                raise ValueError(
+                    f"clock {clock.name!r} of {self.model.path.name} ticks at {instant} s, which "
+                    f"is no whole number of the scene's ticks (1/{ticks_per_s} s): a block whose "
+                    f"scan_rate_hz is a multiple of {instant.denominator} makes it one"
+                )
+        return {
+            "name": clock.name, "reference": clock.reference, "priority": clock.priority,
+            "fraction": clock.fraction, "asked": clock.variability in ("countdown", "changing"),
+            "interval": int(interval * ticks_per_s), "shift": int(shift * ticks_per_s),
+            "times": sorted(int(time * ticks_per_s) for time in times),
         }  # fmt: skip

@@ -9,9 +9,19 @@ const Canvas = (() => {
   function font(c, size = 12) {
     c.font = `${size}px system-ui, sans-serif`;
   }
-  function text(c, words, x, y, colour, align = "left", size = 12) {
+  // With a halo, a colour, words stand out from what is under them.
+  function text(c, words, x, y, colour, align = "left", size = 12, halo = null) {
     font(c, size);
     c.textAlign = align;
+    if (halo !== null) {
+      c.save();
+      c.setLineDash([]);
+      c.lineJoin = "round";
+      c.lineWidth = 4;
+      c.strokeStyle = halo;
+      c.strokeText(words, x, y);
+      c.restore();
+    }
     c.fillStyle = colour;
     c.fillText(words, x, y);
   }

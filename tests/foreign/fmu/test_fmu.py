@@ -49,7 +49,7 @@ def _left_behind():
             parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
         except (OSError, ValueError):
             continue
-        if b"fmu.worker" in words and parent == os.getpid():
+        if b"running.worker" in words and parent == os.getpid():
             running.add(entry.name)
     return ours, running
 

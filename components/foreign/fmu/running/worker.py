@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from components.foreign.fmu.instance import FmuFailure, Instance
+from components.foreign.fmu.running.instance import Instance
+from components.foreign.fmu.running.values import FmuFailure
 
 _MOST_WORDS = 1_000_000
 

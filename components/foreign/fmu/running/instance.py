@@ -4,20 +4,17 @@ For the process in which it runs; what we ask it for is in `components.foreign.f
 """
 
 import ctypes as c
+import math
 from collections import deque
-from fractions import Fraction
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from components.foreign.fmu.values import ValueGroup
+from components.foreign.fmu.running.clocks import Clocks
+from components.foreign.fmu.running.values import FmuFailure, ValueGroup, refusal
 
-_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _EXACT = 2**53
-
-
-class FmuFailure(Exception):
-    """What an FMU refused, in its own words."""
 
 
 class Instance:
@@ -62,7 +59,9 @@ class Instance:
         self.saved: dict[int, Any] = {}
         self.slot = self.names = 0
         self.started = self.ended = False
-        self.tick, self.pending = 0, {}  # type: ignore[var-annotated]
+        self.tick = 0
+        self.next_event_s = math.inf  # when it wants an event
+        self.clocks = Clocks(self, spec["clocks"], spec["raised"])
         self._groups()
 
     def _groups(self) -> None:
@@ -86,9 +85,6 @@ class Instance:
             ]  # fmt: skip
             self._pointers = [c.addressof(flag) for flag in self._flags]
             self._do_step = function
-        else:
-            self._activate = self.function("fmi3ActivateModelPartition")
-            self._activate.argtypes = [c.c_void_p, c.c_uint32, c.c_double]
 
     def function(self, name: str) -> Any:
         """Return a function of the FMU's library, without the checks of arguments."""
@@ -113,7 +109,7 @@ class Instance:
 
     def refuse(self, call: str, status: int) -> None:
         """Raise what the FMU answered, with what it logged."""
-        raise FmuFailure(f"{call} returned {_STATUS[min(status, 5)]}{self.words()}")
+        raise refusal(call, status, self.words())
 
     # -- the life of an instance ---------------------------------------------------------------
 
@@ -131,42 +127,56 @@ class Instance:
         else:
             fmu.setupExperiment(startTime=time_s)
             fmu.enterInitializationMode()
-        self._set(first, events=False)
+        self._put_inputs(first)
         fmu.exitInitializationMode()
-        self._events(entered=True)
         self.started = True
 
     def _put(self, starts: Any) -> None:
         for kind, reference, values, _ in starts:
             ValueGroup(self, kind, [(reference, len(values))], "Set").put(values)
 
-    def _events(self, entered: bool = False) -> None:
-        """Let it handle an event, where it has an event mode."""
-        if not self.spec["events"]:
-            return
-        if not entered:
-            self.fmu.enterEventMode()
+    def _events(self, inputs: Any = None, due: Sequence[int] = (), raised: Any = None) -> None:
+        """Let it handle an event, in its event mode: new inputs, and clocks that tick.
+
+        What of its own clocks ticks is added to `raised`.
+        """
+        fmu = self.fmu
+        if inputs is not None:
+            self._put_inputs(inputs)
+        if due:
+            self.clocks.let_tick(due)
         for _ in range(1000):
-            again, ended, *_ = self.fmu.updateDiscreteStates()
+            self.clocks.count_raised(raised)
+            again, ended, _, _, defined, next_s = fmu.updateDiscreteStates()
             self.ended = self.ended or ended
             if not again:
-                self.fmu.enterStepMode()
+                self.next_event_s = next_s if defined else math.inf
                 return
         raise FmuFailure("its discrete states do not settle within 1000 updates")
 
-    def _set(self, row: Any, *, events: bool = True) -> None:
-        discrete = events and self.spec["events"] and self.spec["discrete"]
-        if discrete:
-            self.fmu.enterEventMode()
+    def _put_inputs(self, row: Any) -> None:
         at = 0
         for group, _ in self.setters:
             group.values[:] = row[at : at + group.count]
             group.go()
             at += group.count
-        if discrete:
-            self._events(entered=True)
 
-    def step(self, start_s: float, end_s: float) -> bool:
+    def _exchange(
+        self, inputs: Any, due: Sequence[int], tick: int, per_s: int, raised: Any
+    ) -> None:
+        """Give it new inputs, or None, and let clocks tick, where it is."""
+        if self.spec["events"] and (due or (inputs is not None and self.spec["discrete"])):
+            self.fmu.enterEventMode()
+            self._events(inputs, due, raised)
+            self._leave_event_mode(tick, per_s)
+        elif inputs is not None:
+            self._put_inputs(inputs)
+
+    def _leave_event_mode(self, tick: int, per_s: int) -> None:
+        self.clocks.count_down(tick, per_s)
+        self.fmu.enterStepMode()
+
+    def step(self, start_s: float, end_s: float, raised: Any = None) -> bool:
         """Go from one communication point to the next; return whether it got there.
 
         Events on the way are handled. It may ask to end before, or there (`ended`).
@@ -175,20 +185,29 @@ class Instance:
             return self._step2(start_s, end_s)
         event, ended, early, last = self._flags
         for _ in range(1_000_000):
-            size = end_s - start_s
+            to_s = self.next_event_s if start_s < self.next_event_s < end_s else end_s
+            size = to_s - start_s
             status = self._do_step(self.component, start_s, size, False, *self._pointers)
             if status > 1:
                 self.refuse("fmi3DoStep", status)
             self.ended = self.ended or ended.value
-            if event.value and not ended.value:
-                self._events()
-            there = not early.value or last.value >= end_s
+            there_s = min(last.value, to_s) if early.value else to_s
+            if (event.value or there_s >= self.next_event_s) and not ended.value:
+                self.next_event_s = math.inf
+                self._event_on_the_way(there_s, raised)
             if self.ended:
-                return there or end_s - last.value <= 1e-9 * max(1.0, abs(end_s))
-            if there:
+                return end_s - there_s <= 1e-9 * max(1.0, abs(end_s))
+            if there_s >= end_s:
                 return True
-            start_s = last.value
+            start_s = there_s
         raise FmuFailure("it returned early from a step 1000000 times")
+
+    def _event_on_the_way(self, now_s: float, raised: Any) -> None:
+        if not self.spec["events"]:
+            return
+        self.fmu.enterEventMode()
+        self._events(raised=raised)
+        self._leave_event_mode(round(now_s * self.per_s), self.per_s)
 
     def _step2(self, start_s: float, end_s: float) -> bool:
         status = self._do_step(self.component, start_s, end_s - start_s, 0)
@@ -202,50 +221,20 @@ class Instance:
 
     # -- clocks --------------------------------------------------------------------------------
 
-    def _tick_clocks(self, due: list[int], tick: int, per_s: int, raised: Any) -> None:
-        """Activate the clocks that are due up to an instant, in order of time and priority."""
-        clocks = self.spec["clocks"]
-        waiting = [(tick, clocks[number]["priority"], number) for number in due]
-        while True:
-            late = [(at, clocks[number]["priority"], number) for number, at in self.pending.items()]
-            ready = sorted(one for one in waiting + late if one[0] <= tick)
-            if not ready:
-                return
-            one = ready[0]
-            at, _, number = one
-            if one in waiting:
-                waiting.remove(one)
-            else:
-                del self.pending[number]
-            reference = clocks[number]["reference"]
-            status = self._activate(self.component, reference, at / per_s)
-            if status > 1:
-                self.refuse("fmi3ActivateModelPartition", status)
-            for place, output in enumerate(self.spec["raised"]):
-                raised[place] += self.fmu.getClock([output])[0]
-            self._count_down(at, per_s)
+    def _go(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
+        """Step to an instant; clocks that tick on the way do so at their own; whether it got there.
 
-    def _count_down(self, now: int, per_s: int) -> None:
-        for number, clock in enumerate(self.spec["clocks"]):
-            if not clock["asked"]:
-                continue
-            reference, qualifier = (c.c_uint32 * 1)(clock["reference"]), (c.c_int * 1)()
-            if clock["fraction"]:
-                counter, resolution = (c.c_uint64 * 1)(), (c.c_uint64 * 1)()
-                self.fmu.getIntervalFraction(reference, counter, resolution, qualifier)
-                exact = Fraction(counter[0], resolution[0] or 1)
-            else:
-                interval = (c.c_double * 1)()
-                self.fmu.getIntervalDecimal(reference, interval, qualifier)
-                exact = Fraction(repr(interval[0]))
-            if qualifier[0] == 2:
-                ticks = exact * per_s
-                if ticks.denominator != 1:
-                    raise FmuFailure(
-                        f"clock {clock['name']!r} asks for an interval of {exact} s, which is no "
-                        f"whole number of ticks (1/{per_s} s)"
-                    )
-                self.pending[number] = now + int(ticks)
+        Those that tick at the instant itself are left to whoever gives it its inputs there.
+        """
+        while True:
+            at = min([tick, *self.clocks.next_ticks(before).values()])
+            if not self.step(before / per_s, at / per_s, raised):
+                return False
+            if at == tick or self.ended:
+                return at == tick
+            due = self.clocks.ticking(before, at)
+            self._exchange(None, due, at, per_s, raised)
+            before = at
 
     # -- going back ----------------------------------------------------------------------------
 
@@ -254,11 +243,12 @@ class Instance:
         if slot != self.slot:
             if slot == 0:
                 self.fmu.reset()
-                self.started, self.ended, self.pending, self.tick = False, False, {}, 0
+                self.started, self.ended, self.clocks.pending, self.tick = False, False, {}, 0
+                self.next_event_s = math.inf
             else:
-                state, self.tick, pending, self.ended = self.saved[slot]
+                state, self.tick, pending, self.ended, self.next_event_s = self.saved[slot]
                 self.fmu.setFMUState(state)
-                self.pending, self.started = dict(pending), True
+                self.clocks.pending, self.started = dict(pending), True
             self.slot = slot
         for old in freed:
             if old in self.saved:
@@ -267,7 +257,9 @@ class Instance:
     def save(self) -> int:
         """Remember its state; return the number it is known by."""
         self.names += 1
-        self.saved[self.names] = self.fmu.getFMUState(), self.tick, dict(self.pending), self.ended
+        state = self.fmu.getFMUState()
+        kept = state, self.tick, dict(self.clocks.pending), self.ended, self.next_event_s
+        self.saved[self.names] = kept
         self.slot = self.names
         return self.slot
 
@@ -290,6 +282,8 @@ class Instance:
         texts: list[list[str]] = []
         exact: dict[tuple[int, int], str] = {}
         scheduled, step = self.spec["kind"] == "se", self.step
+        self.per_s = per_s
+        clocked = bool(self.spec["clocks"]) and not scheduled
         times = [tick / per_s for tick in ticks]
         before = self.tick / per_s
         done = count
@@ -302,15 +296,28 @@ class Instance:
             if not self.started:
                 self.start(time_s, rows[row])
                 if scheduled:
-                    self._count_down(tick, per_s)
-            else:
-                if not scheduled and not step(before, time_s):
+                    self.clocks.count_down(tick, per_s)
+                elif self.spec["events"]:
+                    due_now = [*due[row], *self.clocks.ticking(tick - 1, tick)] if clocked else ()
+                    self._events(None, due_now, raised[row])
+                    self._leave_event_mode(tick, per_s)
+            elif clocked:
+                if not self._go(self.tick, tick, per_s, raised[row]):
+                    done = row
+                    break
+                now_due = [*due[row], *self.clocks.ticking(tick - 1, tick)]
+                self._exchange(rows[row] if changed[row] else None, now_due, tick, per_s,
+                               raised[row])  # fmt: skip
+            elif not scheduled:
+                if not step(before, time_s, raised[row]):
                     done = row
                     break
                 if changed[row]:
-                    self._set(rows[row])
+                    self._exchange(rows[row], (), tick, per_s, raised[row])
             if scheduled:
-                self._tick_clocks(due[row], tick, per_s, raised[row])
+                if changed[row]:
+                    self._put_inputs(rows[row])
+                self.clocks.activate(due[row], tick, per_s, raised[row])
             before, self.tick = time_s, tick
             for go, values, place in places:
                 go()

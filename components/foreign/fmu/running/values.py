@@ -17,6 +17,18 @@ _FMI2 = {
 }  # fmt: skip
 
 
+_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+
+
+class FmuFailure(Exception):
+    """What an FMU refused, in its own words."""
+
+
+def refusal(call: str, status: int, words: str) -> FmuFailure:
+    """Return the error of a function that returned a status, with what was logged."""
+    return FmuFailure(f"{call} returned {_STATUS[min(status, 5)]}{words}")
+
+
 class ValueGroup:
     """The variables of one type that are read, or set, together, and their buffer.
 

@@ -1,0 +1,1 @@
+"""What runs an FMU, in a process of its own."""
