@@ -131,6 +131,11 @@ class TurnAwayParameters(Parameters):
     """Parameters of turning away."""
 
     range_km: float = Field(default=5.0, gt=0, description="Turn for tracks nearer than this, km.")
+    without_range: bool = Field(
+        default=False,
+        description="Turn for tracks without a range too, as those of cameras and eyes are, after "
+        "any that are in range.",
+    )
     turn_deg: float = Field(
         default=30.0, gt=0, le=180, description="Change of heading, away from the nearest, deg."
     )
@@ -171,7 +176,7 @@ class TurnAway(Component):
     """Turns for the nearest track in range, and then leaves the ownship alone for a while.
 
     It closes the loop from what is sensed to where the ownship flies; the rule itself is as simple
-    as can be. Tracks without a range are not acted on.
+    as can be. Tracks without a range are acted on only where the scene says so.
     """
 
     inputs = {"tracks": Input(Tracks, "trigger", "What is held of every target.")}
@@ -193,6 +198,8 @@ class TurnAway(Component):
         if tracks is None:
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
+        if self.p.without_range:
+            near |= np.isnan(tracks.range_m)
         row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
         manoeuvres: dict[int, Manoeuvre] = {}
         replica = wake.replica
@@ -202,7 +209,8 @@ class TurnAway(Component):
             if tick < self._free_from.get(run, 0):
                 continue
             entries = np.flatnonzero(near & (row == place))
-            nearest = entries[np.argmin(tracks.range_m[entries])]
+            ranges_m = np.nan_to_num(tracks.range_m[entries], nan=np.inf)
+            nearest = entries[np.argmin(ranges_m)]
             manoeuvres[place] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
             self._free_from[run] = tick + self._pause_ticks
         return Manoeuvres.at_rows(wake.ticks, manoeuvres)

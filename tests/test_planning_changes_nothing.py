@@ -19,7 +19,7 @@ from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
 
 CONFIGS = Path(__file__).parent.parent / "configs"
-PARTS = ("aircraft", "evidence", "obstacles", "sensors", "studies")
+PARTS = ("aircraft", "encounters", "evidence", "obstacles", "sensors", "studies")
 #: Chains and sets of intruders that other scenes extend; they cannot run by themselves.
 UNFINISHED = {
     "detect_and_sense.toml",

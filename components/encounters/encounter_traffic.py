@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from components.encounters.made_encounters import read_made
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import (
     PairingRules,
@@ -156,7 +157,10 @@ class OneEncounter(FileParameters):
 class SetParameters(OneEncounter):
     """Parameters of traffic from a set of encounters."""
 
-    file: ScenePath = Field(description="The set: a Parquet file of `dsa-des encounters`.")
+    file: ScenePath = Field(
+        description="The set: a Parquet file of `dsa-des encounters`, or the table (`.toml`) of "
+        "encounters made by hand."
+    )
     skip_damaged: bool = Field(
         default=False,
         description="Use the set without its damaged encounters; otherwise any is an error.",
@@ -312,7 +316,10 @@ def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter that a block's parameters name, and its place there."""
     if issubclass(cls, ModelTraffic):
         return _made(_model_key(parameters), parameters.encounter), 0
-    found = read_set(parameters.file, parameters.skip_damaged)
+    if parameters.file.suffix == ".toml":
+        found = read_made(parameters.file)
+    else:
+        found = read_set(parameters.file, parameters.skip_damaged)
     return found, found.index_of(parameters.encounter)
 
 

@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from components.formats.encounter_set import (
     EncounterSet,
     geometry_class,
 )
-from components.formats.set_file import is_origin
+from components.formats.set_file import EncounterSetError, is_origin
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
@@ -59,7 +60,10 @@ QUANTITIES = {
     "intruder_climb": _Quantity(_CLIMB, 0.0, -200.0, 200.0),
 }
 GEOMETRIES = ("any", "head-on", "overtaking", "crossing")
-_OTHERS = ("count", "seed", "at", "duration_s", "geometry", "sense", "weight")
+COURSES = ("one", "every")
+_OTHERS = ("count", "seed", "at", "duration_s", "geometry", "courses", "sense", "weight")
+# What courses follow from.
+_OF_COURSES = ("bearing", "own_speed", "intruder_speed")
 _MOST = 1_000_000
 _TRIES = 200
 
@@ -81,6 +85,9 @@ class Recipe:
     at_deg : (latitude, longitude)
     duration_s, weight : float
     sense : str
+    courses : list of int, optional
+        Which of the two courses that lead there each combination takes; the first of its geometry
+        by default.
     """
 
     path: Path
@@ -92,6 +99,7 @@ class Recipe:
     duration_s: float
     weight: float
     sense: str
+    courses: list[int] | None = None
 
 
 def read_recipe(text: str) -> Recipe:
@@ -137,6 +145,12 @@ class _Recipes:
                 self.add("geometry", f"must be of {', '.join(GEOMETRIES)}")
         swept["geometry"] = geometries
         sense = self.tables.get("sense", "slant")
+        if self.tables.get("courses", "one") not in COURSES:
+            self.add("courses", f"must be {' or '.join(COURSES)}")
+        elif self.tables.get("courses") == "every":
+            drawn = [q for q in _OF_COURSES if any(isinstance(v, tuple) for v in swept[q])]
+            if drawn:
+                self.add("courses", f"is of numbers; {' and '.join(drawn)} must not be drawn")
         if sense not in SENSES:
             self.add("sense", f"must be {' or '.join(SENSES)}")
         count, seed = self.whole("count", 1, 1, _MOST), self.whole("seed", 0, 0, 2**62)
@@ -157,7 +171,14 @@ class _Recipes:
         ]
         kinds = [str(one.pop("geometry")) for one in every]
         place = float(at[0]), float(at[1])
-        return Recipe(self.path, every, kinds, count, seed, place, duration, weight, sense)
+        courses = None
+        if self.tables.get("courses", "one") == "every":
+            there = [(k, c) for k, one in enumerate(every) for c in _courses_there(one)]
+            every, kinds = [every[k] for k, _ in there], [kinds[k] for k, _ in there]
+            courses = [course for _, course in there]
+            if not every:
+                raise UsageError(f"{self.path}: no course of any intruder leads there")
+        return Recipe(self.path, every, kinds, count, seed, place, duration, weight, sense, courses)
 
     def values(self, key: str, spec: _Quantity, factor: float) -> list[Any]:
         """Return what a quantity is in turn: numbers, or ranges from which it is drawn."""
@@ -196,8 +217,35 @@ class _Recipes:
         return float(value)
 
 
+def _courses_there(one: Mapping[str, Any]) -> list[int]:
+    """Return which of the two courses there are for a combination."""
+    speeds = np.array([one["own_speed"]]), np.array([one["intruder_speed"]])
+    both = intruder_heading(np.zeros(1), *speeds, np.array([one["bearing"]]))
+    return [k for k, heading in enumerate(both) if not np.isnan(heading[0])]
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def read_made(path: Path) -> EncounterSet:
+    """Return the encounters of a table; those of one that was read before, if it is the same.
+
+    Raises
+    ------
+    EncounterSetError
+        Of whatever is wrong with the table.
+    """
+    try:
+        return _read_made(path, path.stat().st_mtime_ns)
+    except (UsageError, OSError) as error:
+        raise EncounterSetError(str(error)) from None
+
+
+@lru_cache(maxsize=32)
+def _read_made(path: Path, state: object) -> EncounterSet:
+    """Read a table; the replicas of a study read the same one over and over."""
+    return made_set(read_recipe(str(path)))
 
 
 def made_set(recipe: Recipe) -> EncounterSet:
@@ -252,10 +300,12 @@ def _courses(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> Floa
     both = intruder_heading(v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"])
     found = np.full(len(combination), np.nan)
     wanted = np.array([recipe.geometries[c] for c in combination])
-    for heading in both:
+    for k, heading in enumerate(both):
         off = np.degrees(heading - v["own_heading"]) % 360.0
         kind = np.array([str(name).split(" ")[0] for name in geometry_class(np.nan_to_num(off))])
         good = ~np.isnan(heading) & ((wanted == "any") | (wanted == kind)) & np.isnan(found)
+        if recipe.courses is not None:
+            good &= np.array(recipe.courses)[combination] == k
         found = np.where(good, heading, found)
     return found
 

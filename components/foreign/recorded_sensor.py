@@ -53,8 +53,9 @@ class RecordedSensorParameters(Parameters):
     )
     model: ScenePath | None = Field(
         None,
-        description="Scene whose block of the name `block` says the sensor's reach and which of "
-        "its errors last; by default a run folder's scene.toml, and nothing is said for a file.",
+        description="Scene whose block of the name `block`, for ASTERIX of this block's own name, "
+        "says the sensor's reach and which of its errors last; by default a run folder's "
+        "scene.toml, and nothing is said for a file.",
     )
     azimuth_error_deg: float | None = Field(
         None, gt=0, description="Standard deviation, where the file says no variance."
@@ -127,6 +128,8 @@ class RecordedSensor(Component):
         from dsa_des.running.simulation import Simulation
 
         components = Simulation(load_scene(path)).components
+        if block not in components and (block is None or "/" in block):
+            block = self.name  # a radar of ASTERIX has a number where the model has a name
         if block not in components:
             hint = did_you_mean(str(block), components)
             raise ValueError(f"block is {block!r}: {path} has no such block{hint}")

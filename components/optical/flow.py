@@ -16,11 +16,18 @@ _RING = 3
 # Of normal noise, the median of its size; clutter counts where the ring varies so much more.
 # Coarse filters leave few independent values there.
 _OF_MEDIAN, _CLUTTERED, _COARSE = 0.6745, 1.5, 2.5
-_ITERATIONS, _STEP = 60, 1e-3
-# How far the background beside a target says what it is behind it, pixels, and how little of it.
-_NEAR, _LITTLE = 1.5, 1e-3
-# Smoothing before the flow, as sampling between pixels is linear, and how the rest fades out.
-_SMOOTH, _FADES, _ROUNDS = 0.7, 1.0, 3
+# How far the background beside a target says what it is behind it, pixels, how little of it, and
+# how often what is behind is relaxed.
+_NEAR, _LITTLE, _RELAXED = 1.5, 1e-3, 20
+_FOUR = np.array([[0.0, 0.25, 0.0], [0.25, 0.0, 0.25], [0.0, 0.25, 0.0]])
+# Smoothing of the correlation, pixels; rounds of whole pixels; steps, and the least of them.
+_SMOOTH, _ROUNDS, _STEPS, _FINE = 0.7, 3, 12, 1e-4
+#: Flows known to no better than this, pixels, are not told; and less correlation is another thing.
+_WORST, _ALIKE = 0.5, 0.6
+#: A flow this near to the whole pixels at which it was cut out stands.
+_SETTLED = 0.75
+#: So many times what is left says was measured in clutter (1 to 2.4, more for larger targets).
+_IN_CLUTTER = 2.0
 _AROUND = np.ones((3, 3), np.uint8)
 
 
@@ -59,14 +66,14 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     """
     cv2 = opencv()
     rim = _rim(picture.shape[0])
-    behind = float(np.median(picture[rim]))
+    behind = float(picture[rim].mean())
     flat = picture - behind
     best: tuple[float, Any, float] = (-math.inf, flat, 1.0)
     cluttered = False
     spread = spread_pixels
     while spread <= max(picture.shape[0] / 6.0, spread_pixels):
         through = cv2.GaussianBlur(flat, (0, 0), spread, borderType=cv2.BORDER_REFLECT)
-        white = noise / math.sqrt(4.0 * math.pi) / spread
+        white = noise * _let_through(picture.shape[0], spread)
         rough = float(np.median(np.abs(through[rim]))) / _OF_MEDIAN
         finest = spread == spread_pixels
         rough = rough if rough > (_CLUTTERED if finest else _COARSE) * white else 0.0
@@ -89,6 +96,21 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
 
 
 @cache
+def _let_through(size: int, spread: float) -> float:
+    """Return the deviation that a filter, less the rim's mean, makes of white noise of deviation 1.
+
+    Of the filter as it is in pixels: by the formula for a continuous picture noise comes out as 1.1
+    to 1.5 times what is expected, and a false alarm at 3 deviations is 14 times as likely.
+    """
+    point = np.zeros((size, size))
+    point[size // 2, size // 2] = 1.0
+    weight = opencv().GaussianBlur(point, (0, 0), spread, borderType=opencv().BORDER_REFLECT)
+    rim = _rim(size)
+    weight -= rim / np.count_nonzero(rim)
+    return float(np.sqrt((weight**2).sum()))
+
+
+@cache
 def _rim(size: int) -> BoolArray:
     rim = np.ones((size, size), dtype=bool)
     rim[_RING:-_RING, _RING:-_RING] = False
@@ -103,67 +125,168 @@ def _vertex(three: FloatArray) -> float:
     return 0.0 if bend >= 0.0 else max(-0.5, min(0.5, 0.5 * (before - after) / bend))
 
 
-def spot_flow(
-    earlier: FloatArray, later: FloatArray, spot: Spot, sought: BoolArray, reach: int
-) -> tuple[float, float]:
-    """Return how far the spot of the later picture has come since the earlier one, x and y, pixels.
+class Flow(NamedTuple):
+    """How far a spot has come between two pictures, pixels; all NaN where that is not told."""
 
-    Only pixels of the spot and one beside it count, so that the flow is the target's, whatever the
-    background does: first the whole pixel where they fit best, then Evangelidis and Psarakis's
-    maximisation of the correlation (an iterated Lucas-Kanade step, IEEE PAMI 30(10), 2008). NaN
-    where the spot is too small, or leaves the picture.
+    x: float
+    y: float
+    deviation: float  # standard deviation of either, as the pictures themselves tell it
+
+
+_NOTHING = Flow(math.nan, math.nan, math.nan)
+
+
+def spot_flow(
+    earlier: FloatArray, later: FloatArray, spot: Spot, sought: BoolArray, noise: float
+) -> Flow:
+    """Return how far the spot of the later picture has come since the earlier one.
+
+    Of both pictures the share of each pixel that the target covers is worked out, from its level
+    and from the background, as it is beside the target; so the flow is the target's, whatever the
+    background does. Of these, first the whole pixel where they fit best, then the maximum of their
+    correlation, as the Fourier series that goes through all pixels has it, by Newton's method: a
+    shift in between costs no interpolation (Guizar-Sicairos, Thurman & Fienup, Optics Letters 33,
+    2008). What is left between the pictures says how good the flow is. Nothing is told where the
+    spot is too small, leaves the picture, is not the same again, or where the flow is known to
+    no better than `_WORST` pixels.
     """
-    cv2 = opencv()
-    nothing = (math.nan, math.nan)
     if spot.pixels < FEWEST_PIXELS or spot.level <= 0.0:
-        return nothing
-    size = later.shape[0]
+        return _NOTHING
+    mask = _mask(later, spot, sought)
+    if mask is None:
+        return _NOTHING
+    ahead = _whole_pixels(earlier, later, spot, mask)
+    second = _covered(later, mask, spot)
+    flow = ahead.astype(np.float64)
+    for _ in range(_ROUNDS):
+        before = _shifted(mask, -ahead)
+        if before.sum() < mask.sum() or before[0].any() or before[:, 0].any():
+            return _NOTHING
+        if before[-1].any() or before[:, -1].any():
+            return _NOTHING
+        first = _covered(earlier, before, spot)
+        found = _registered(_shifted(first, ahead), second, noise / spot.level)
+        flow = ahead + np.array(found[:2])
+        whole = np.rint(flow)
+        if not np.isfinite(whole).all() or np.abs(whole - ahead).max() > 2.0:
+            return _NOTHING
+        if np.abs(flow - ahead).max() < _SETTLED:
+            break
+        ahead = whole.astype(np.int64)
+    else:
+        return _NOTHING
+    # Along an edge the background is wrong in one way: that is not seen in what is left.
+    deviation = found.deviation * (_IN_CLUTTER if spot.cluttered else 1.0)
+    if not deviation < _WORST:
+        return _NOTHING
+    return Flow(float(flow[0]), float(flow[1]), deviation)
+
+
+def _mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
+    """Return which pixels are the spot's and beside it, 0 or 1; None where it is no one."""
+    cv2, size = opencv(), later.shape[0]
     stands = (sought & (later - spot.behind > 0.5 * spot.level)).astype(np.uint8)
     _, labels = cv2.connectedComponents(stands, connectivity=8)
     mine = labels[min(int(spot.y), size - 1), min(int(spot.x), size - 1)]
-    if mine == 0:
-        return nothing
-    mask = cv2.dilate((labels == mine).astype(np.uint8), np.ones((3, 3), np.uint8))
+    return None if mine == 0 else cv2.dilate((labels == mine).astype(np.uint8), _AROUND)
+
+
+def _whole_pixels(earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyArray) -> AnyArray:
+    """Return how far the spot's pixels came, where they correlate best."""
+    cv2 = opencv()
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-    first, second = earlier.astype(np.float32), later.astype(np.float32)
-    part, weight = second[top:bottom, left:right], mask[top:bottom, left:right]
-    apart = cv2.matchTemplate(first, part, cv2.TM_SQDIFF, mask=weight.astype(np.float32))
-    near = apart[max(top - reach, 0) : top + reach + 1, max(left - reach, 0) : left + reach + 1]
-    row, column = np.unravel_index(int(np.argmin(near)), near.shape)
-    ahead = np.array([left - max(left - reach, 0) - column, top - max(top - reach, 0) - row])
-    flow = ahead.astype(np.float64)
-    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _ITERATIONS, _STEP)
-    soft = cv2.GaussianBlur(cv2.dilate(mask, _AROUND).astype(np.float32), (0, 0), _FADES)
-    outside = 1.0 - cv2.dilate(mask, _AROUND).astype(np.float32)
-    masks = np.dstack([soft, outside])
-    for _ in range(_ROUNDS):
-        # What is not the target fades out in both pictures, each about its own place of it.
-        back = np.array([[1.0, 0.0, -flow[0]], [0.0, 1.0, -flow[1]]], dtype=np.float32)
-        moved = cv2.warpAffine(masks, back, (size, size), borderValue=(0.0, 1.0, 0.0, 0.0))
-        pair = []
-        for frame, (share, beside) in (
-            (first, np.moveaxis(moved, -1, 0)),
-            (second, (soft, outside)),
-        ):
-            behind: Any = np.float32(spot.behind)
-            if spot.cluttered:
-                behind = _behind(frame, np.ascontiguousarray(beside), spot.behind)
-            pair.append(cv2.GaussianBlur(frame - behind, (0, 0), _SMOOTH) * share)
-        guess = np.array([[1.0, 0.0, flow[0]], [0.0, 1.0, flow[1]]], dtype=np.float32)
-        try:
-            _, found = cv2.findTransformECC(
-                pair[0], pair[1], guess, cv2.MOTION_TRANSLATION, stop, None, 1
-            )
-        except cv2.error:  # it does not converge
-            return nothing
-        flow = found[:, 2].astype(np.float64)
-    return (float(flow[0]), float(flow[1])) if np.hypot(*(flow - ahead)) < 2.0 else nothing
+    first, second = ((one - spot.behind).astype(np.float32) for one in (earlier, later))
+    part = (second * mask)[top:bottom, left:right]
+    alike = cv2.matchTemplate(first, part, cv2.TM_CCORR)
+    row, column = np.unravel_index(int(np.argmax(alike)), alike.shape)
+    return np.array([left - column, top - row])
 
 
-def _behind(frame: AnyArray, outside: AnyArray, level: float) -> AnyArray:
-    """Return the background of a picture, carried on behind the target from what is beside it."""
+def _shifted(picture: AnyArray, by: AnyArray) -> AnyArray:
+    """Return a picture moved by whole pixels, x and y; what comes in is 0."""
+    moved = np.zeros_like(picture)
+    (x, y), (rows, columns) = by.tolist(), picture.shape
+    moved[max(y, 0) : rows + min(y, 0), max(x, 0) : columns + min(x, 0)] = picture[
+        max(-y, 0) : rows + min(-y, 0), max(-x, 0) : columns + min(-x, 0)
+    ]
+    return moved
+
+
+def _covered(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArray:
+    """Return the share of each pixel that the target covers; 0 beyond what is its own.
+
+    A pixel is partly the target's and partly the background's: the background counts less the more
+    is covered.
+    """
     cv2 = opencv()
-    weight = cv2.GaussianBlur(outside, (0, 0), _NEAR) + np.float32(_LITTLE)
-    beside = cv2.GaussianBlur((frame - np.float32(level)) * outside, (0, 0), _NEAR)
-    return beside / weight + np.float32(level)
+    own = cv2.dilate(mask, _AROUND)
+    behind: Any = np.full_like(picture, spot.behind)
+    if spot.cluttered:
+        behind = _behind(picture, own, spot.behind)
+    level = float(cv2.GaussianBlur(picture, (0, 0), 0.5)[mask > 0].max(initial=-math.inf))
+    share = (picture - behind) / np.maximum(level - behind, 0.3 * spot.level)
+    return np.asarray(np.where((mask if spot.cluttered else own) > 0, share, 0.0))
+
+
+def _behind(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
+    """Return the background, carried on behind the target as smoothly as what is beside it lets."""
+    cv2 = opencv()
+    outside = 1.0 - own.astype(np.float64)
+    weight = cv2.GaussianBlur(outside, (0, 0), _NEAR) + _LITTLE
+    beside = cv2.GaussianBlur((picture - level) * outside, (0, 0), _NEAR) / weight
+    inner = own > 0
+    filled = np.where(inner, beside, picture - level)
+    for _ in range(_RELAXED):
+        filled[inner] = cv2.filter2D(filled, -1, _FOUR)[inner]
+    return filled + level
+
+
+def _registered(first: FloatArray, second: FloatArray, noise: float) -> Flow:
+    """Return by how much less than a pixel or so the second picture is shifted against the first.
+
+    The correlation is that of both, smoothed by `_SMOOTH`: the sharpest detail is not sampled
+    finely enough to say where it is.
+    """
+    k, square, soft, counted = _waves(len(first))
+    one, other = np.fft.rfft2(first), np.fft.rfft2(second)
+    both = other * np.conj(one) * (soft * counted)
+    shift = np.zeros(2)
+    for _ in range(_STEPS):
+        turned = both * np.exp(1j * (k[0] * shift[0] + k[1] * shift[1]))
+        bend = _by_axes(square, turned.real)
+        if not (bend[0, 0] > 0.0 and np.linalg.det(bend) > 0.0):
+            return _NOTHING
+        slope = -np.array([(k[0] * turned.imag).sum(), (k[1] * turned.imag).sum()])
+        step = np.linalg.solve(bend, slope)
+        shift = shift + np.clip(step, -1.0, 1.0)
+        if np.abs(step).max() < _FINE:
+            break
+    # What is left between the two, in each wave: that of the pixels' noise at least.
+    left = np.abs(other - one * np.exp(-1j * (k[0] * shift[0] + k[1] * shift[1]))) ** 2
+    # In the waves that say where it is, or in all; those of what is cut out go together, so that as
+    # many of them are their own as the target has pixels.
+    telling = (square[0] + square[2]) * soft * np.abs(turned)
+    power = max(float((left * by).sum() / by.sum()) for by in (telling, soft * counted))
+    power = max(power * second.size / np.count_nonzero(second), 2.0 * noise**2 * second.size)
+    energy = [float((np.abs(of) ** 2 * soft * counted).sum()) for of in (one, other)]
+    if float(turned.real.sum()) < _ALIKE * math.sqrt(energy[0] * energy[1]):
+        return _NOTHING
+    inverse = np.linalg.inv(bend)
+    covariance = power * inverse @ _by_axes(square, soft * turned.real) @ inverse
+    return Flow(float(shift[0]), float(shift[1]), math.sqrt(0.5 * float(np.trace(covariance))))
+
+
+def _by_axes(square: Any, values: FloatArray) -> FloatArray:
+    xx, xy, yy = ((one * values).sum() for one in square)
+    return np.array([[xx, xy], [xy, yy]])
+
+
+@cache
+def _waves(size: int) -> tuple[Any, Any, FloatArray, FloatArray]:
+    """Return waves' numbers per pixel, their products, how much they count, and how often."""
+    x = 2.0 * np.pi * np.fft.rfftfreq(size)[np.newaxis]
+    y = 2.0 * np.pi * np.fft.fftfreq(size)[:, np.newaxis]
+    soft = np.exp(-0.5 * _SMOOTH**2 * (x * x + y * y)) * (x < np.pi) * (np.abs(y) < np.pi)
+    counted = np.where((x > 0.0) & (x < np.pi), 2.0, 1.0) * np.ones_like(y)
+    return (x, y), (x * x, x * y, y * y), soft, counted

@@ -15,6 +15,8 @@ from components.optical.detection import noise_equivalent_pixels
 from components.optical.flow import find_spot, opencv, spot_flow
 from components.optical.picture import (
     Pinhole,
+    angles_over,
+    as_grey,
     background,
     target_outlines,
     union_coverage,
@@ -36,6 +38,7 @@ PICTURE = {
     "true_row_px": Column("pixels", "frame", "its row"),
     "flow_column_px": Column("pixels", "frame", "moved so far to the right between two frames"),
     "flow_row_px": Column("pixels", "frame", "moved so far down"),
+    "flow_deviation_px": Column("pixels", "frame", "standard deviation of either, as it is told"),
     "flow_rate_rad_s": Column("rad/s", "", "turn of the line of sight by the flow, in NED"),
     "snr": Column("", "", "how far it stands out, in standard deviations of the background"),
 }
@@ -98,9 +101,8 @@ _BESIDE, _LARGEST = 12, 128
 _CURRENT, _EARLIER = 0, 1
 # Multiplies pixel numbers into keys far apart (Knuth's multiplicative hash).
 _APART = np.uint64(0x9E3779B97F4A7C15)
-_KEPT = 1024
-#: Side of the patch that is kept to be shown, pixels.
-SHOWN = 48
+# How many patches are kept to be shown, and the most pixels of their sides.
+_KEPT, SHOWN = 1024, 48
 
 
 class _View(NamedTuple):
@@ -132,10 +134,7 @@ _LADDER = Ladder(
              {"silhouette": "convex_hull"}),
         Rung("image", "rendered, searched, its flow measured", "optical.image"),
     ),
-    "image",
-    (Quantity("confidence", "signature"),),
-    measure,
-    clears=("model",),
+    "image", (Quantity("confidence", "signature"),), measure, clears=("model",),
 )  # fmt: skip
 
 
@@ -147,8 +146,8 @@ class ImageCamera(ElectroOptical):
     in NED, and noise. The strongest spot at the target is measured by filters of several sizes
     (`components.optical.flow`); it is a detection where it reaches the threshold, in as many
     standard deviations as `optical.eo` asks of a point. Its place is what is reported, with the
-    flow of the target in pixels between the frames; NaN below three pixels, where the target was
-    not there before, and where it leaves the patch. Needs the extra ``image``.
+    flow of the target in pixels between the frames and its deviation; NaN below three pixels, where
+    the target was not there before, and where pictures do not tell. Needs the extra ``image``.
     """
 
     Parameters = ImageParameters
@@ -175,9 +174,9 @@ class ImageCamera(ElectroOptical):
 
     def look(self, cells: Cells) -> Look:
         """Render every target twice, and look for it."""
-        count, found = len(cells), self.detector
+        count = len(cells)
         fields = {name: np.full(count, np.nan) for name in PICTURE}
-        confidence, pixels = np.full(count, -found.threshold), np.zeros(count)
+        confidence, pixels = np.full(count, -self.detector.threshold), np.zeros(count)
         if count:
             now, before, there = self._views(cells)
             outlines = self._outlines(cells, now)
@@ -252,24 +251,25 @@ class ImageCamera(ElectroOptical):
         extent = float(np.nanmax(np.abs(points), initial=0.0))
         if not np.isfinite(points).all():  # it reaches behind the picture
             return {"confidence": self.all_pixels, "pixels": self.all_pixels}
-        # A target that is larger than a patch is seen in a coarser picture.
-        binned = max(1, math.ceil((extent + _BESIDE) / (0.5 * _LARGEST)))
-        half = max(16, math.ceil(extent / binned) + _BESIDE)
         attitude = [float(angle[cell]) for angle in now.attitude]
-        corner = np.floor(middle / binned).astype(np.int64) - half
-        moved, earlier = np.zeros(2), np.zeros(2)
         then = [float(angle[cell]) for angle in before.attitude]
-        if there:
-            earlier = np.array([before.column[cell], before.row[cell]])
-            moved = middle - earlier
-            there = bool(np.isfinite(moved).all())
+        earlier = np.array([before.column[cell], before.row[cell]])
+        moved = middle - earlier
+        # So far it moves before what is behind it, which the earlier patch has to hold too.
+        beside = self._pixel_of(self._direction(middle, attitude), then) - earlier
+        there = there and bool(np.isfinite([moved, beside]).all())
         smear = moved * (self.p.exposure_s / self.p.frame_interval_s) if there else np.zeros(2)
+        extent += 0.5 * float(np.hypot(*smear))
+        margin = _BESIDE + (min(math.ceil(np.hypot(*beside)), _BESIDE) if there else 0)
+        # A target that is larger than a patch is seen in a coarser picture.
+        binned = max(1, math.ceil((extent + margin) / (0.5 * _LARGEST)))
+        half = max(16, math.ceil(extent / binned) + margin)
+        corner = np.floor(middle / binned).astype(np.int64) - half
         scene = _Scene(cells, cell, key, half, binned, contrast, outlines, smear / binned)
         later = self._frame(scene, corner, middle, attitude, _CURRENT)
         pixels_y, pixels_x = np.mgrid[: 2 * half, : 2 * half] + 0.5
         at = middle / binned - corner
-        reach = max(2.0, extent / binned + 1.0)
-        sought = np.hypot(pixels_x - at[0], pixels_y - at[1]) <= reach
+        sought = np.hypot(pixels_x - at[0], pixels_y - at[1]) <= max(2.0, extent / binned + 1.0)
         spread = math.sqrt((self.p.blur_pixels / binned) ** 2 + 1.0 / 12.0)
         spot = find_spot(later, sought, spread, self.pixel_noise / binned)
         self._keep(cells, cell, later)
@@ -287,14 +287,13 @@ class ImageCamera(ElectroOptical):
             return answer
         before_corner = np.floor(where / binned).astype(np.int64) - half
         first = self._frame(scene, before_corner, earlier, then, _EARLIER)
-        flow = np.array(spot_flow(first, later, spot, sought, half))
-        moved_px = (flow + corner - before_corner) * binned
+        flow = spot_flow(first, later, spot, sought, self.pixel_noise / binned)
+        moved_px = (np.array(flow[:2]) + corner - before_corner) * binned
+        answer["flow_deviation_px"] = flow.deviation * binned
         answer["flow_column_px"], answer["flow_row_px"] = moved_px
         if np.isfinite(moved_px).all():
-            lines = np.array(
-                [self._direction(place, attitude), self._direction(place - moved_px, then)]
-            )
-            turn = float(angle_between_vectors(lines[0], lines[1]))
+            lines = self._direction(place, attitude), self._direction(place - moved_px, then)
+            turn = float(angle_between_vectors(*lines))
             answer["flow_rate_rad_s"] = turn / self.p.frame_interval_s
         return answer
 
@@ -307,16 +306,19 @@ class ImageCamera(ElectroOptical):
     def _frame(
         self, scene: "_Scene", corner: IntArray, middle: FloatArray, attitude: Any, which: int
     ) -> FloatArray:
-        """Return a patch of a frame; its corner counts binned pixels."""
-        cv2, side = opencv(), 2 * scene.half
-        at = middle / scene.binned - corner
-        covered = union_coverage(
-            [at + outline / scene.binned for outline in scene.outlines], side, side, scene.smear
-        )
-        # Blurred by the optics; that of a pixel is in the coverage.
-        covered = cv2.GaussianBlur(
-            covered, (0, 0), self.p.blur_pixels / scene.binned, borderType=cv2.BORDER_REPLICATE
-        )
+        """Return a patch of a frame; its corner counts binned pixels.
+
+        The optics blur before anything falls on pixels: it is drawn twice as fine, and summed up.
+        """
+        side = 2 * scene.half
+        at = 2.0 * (middle / scene.binned - corner)
+        fine = union_coverage(
+            [at + (2.0 / scene.binned) * outline for outline in scene.outlines],
+            2 * side, 2 * side, 2.0 * scene.smear,
+        )  # fmt: skip
+        spread, cv2 = 2.0 * self.p.blur_pixels / scene.binned, opencv()
+        fine = cv2.GaussianBlur(fine, (0, 0), spread, borderType=cv2.BORDER_REPLICATE)
+        covered = fine.reshape(side, 2, side, 2).mean(axis=(1, 3))
         picture = scene.contrast * covered
         if self.p.texture_contrast:
             behind = self.p.texture_contrast * self._background(scene, corner, attitude)
@@ -331,15 +333,10 @@ class ImageCamera(ElectroOptical):
         side = 2 * scene.half
         at = (corner + scene.half) * scene.binned
         ahead, right, down = (
-            self._ned_angles(at + np.array(step) * side, attitude)
-            for step in ((0, 0), (1, 0), (0, 1))
+            self._ned_angles(at + side * np.array(by), attitude) for by in ((0, 0), (1, 0), (0, 1))
         )
-        turn = np.array([right - ahead, down - ahead])
-        turn[:, 0] = np.remainder(turn[:, 0] + np.pi, 2.0 * np.pi) - np.pi
-        offset = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
-        azimuth, elevation = (
-            ahead[i] + offset * turn[0, i] + offset[:, np.newaxis] * turn[1, i] for i in (0, 1)
-        )
+        offset: Any = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
+        azimuth, elevation = angles_over(ahead, right, down, offset)
         replica = int(scene.cells.replica[scene.cell])
 
         def normal(one: IntArray, other: IntArray) -> FloatArray:
@@ -365,11 +362,8 @@ class ImageCamera(ElectroOptical):
 
     def _keep(self, cells: Cells, cell: int, picture: FloatArray) -> None:
         """Keep the middle of a patch to be shown."""
-        most = max(float(np.abs(picture).max()), 1e-12)
-        grey = np.clip(128.0 - 120.0 * picture / most, 0.0, 255.0).astype(np.uint8)
-        step = max(1, math.ceil(len(grey) / SHOWN))
         tick = int(cells.scan_ticks[cells.row[cell]])
-        self.patches[int(cells.target[cell]), tick] = grey[::step, ::step]
+        self.patches[int(cells.target[cell]), tick] = as_grey(picture, SHOWN)
         while len(self.patches) > _KEPT:
             del self.patches[next(iter(self.patches))]
 

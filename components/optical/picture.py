@@ -236,6 +236,30 @@ def union_coverage(
     return np.clip(total / steps, 0.0, 1.0)
 
 
+def as_grey(picture: FloatArray, most: int) -> Any:
+    """Return a patch to be shown, eight bits a pixel, at most so many pixels wide."""
+    largest = max(float(np.abs(picture).max()), 1e-12)
+    grey = np.clip(128.0 - 120.0 * picture / largest, 0.0, 255.0).astype(np.uint8)
+    step = max(1, math.ceil(len(grey) / most))
+    return grey[::step, ::step]
+
+
+def angles_over(
+    middle: FloatArray, right: FloatArray, down: FloatArray, offset: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return azimuths and elevations over a patch, linear in its pixels.
+
+    They are those in its middle, and one patch to the right and down; `offset` (side,) is how far a
+    row or column is from the middle, in patches.
+    """
+    turn = np.array([right - middle, down - middle])
+    turn[:, 0] = np.remainder(turn[:, 0] + np.pi, 2.0 * np.pi) - np.pi
+    azimuth, elevation = (
+        middle[i] + offset * turn[0, i] + offset[:, np.newaxis] * turn[1, i] for i in (0, 1)
+    )
+    return azimuth, elevation
+
+
 def background(
     normal: Callable[[IntArray, IntArray], FloatArray],
     azimuth_rad: FloatArray,

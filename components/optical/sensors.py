@@ -85,7 +85,7 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     return {_AREA.name: found[_AREA.name][cells[:, 0], cells[:, 1]]}
 
 
-def _ladder(band: str, type_name: str) -> Ladder:
+def _ladder(band: str, type_name: str, *top: Rung) -> Ladder:
     def silhouette(name: str) -> Mapping[str, Any]:
         return {"silhouette": name}
 
@@ -105,6 +105,7 @@ def _ladder(band: str, type_name: str) -> Ladder:
             Rung("mesh", "a mesh of the three bodies, projected", type_name, silhouette("mesh")),
             Rung("union", "union of the three bodies, closed form", type_name,
                  silhouette("convex_hull")),
+            *top,
         ),
         "union",
         (_AREA,),
@@ -114,7 +115,14 @@ def _ladder(band: str, type_name: str) -> Ladder:
     )  # fmt: skip
 
 
-VISIBLE = _ladder("eo", "optical.eo")
+#: Pictures show what a signature leaves out: the same area, found otherwise, at its price.
+VISIBLE = _ladder(
+    "eo",
+    "optical.eo",
+    Rung(
+        "image", "rendered, searched (extra image)", "optical.image", {"silhouette": "convex_hull"}
+    ),
+)
 INFRARED = _ladder("ir", "optical.ir")
 
 

@@ -17,11 +17,7 @@ from components.sensor.parameters import rising_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
 from components.surveillance.broadcast import Altimeters, Who
-from components.surveillance.cooperative import (
-    STEP_S,
-    CooperativeParameters,
-    CooperativeSensor,
-)
+from components.surveillance.cooperative import CooperativeParameters, CooperativeSensor
 from components.surveillance.interrogation import (
     CUT,
     IN_1_S,
@@ -40,7 +36,7 @@ from components.surveillance.interrogation import (
 )
 from components.surveillance.reports import unreported
 from components.well_clear.volume import FOOT_M
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
@@ -81,7 +77,8 @@ class ActiveParameters(CooperativeParameters):
     near_s: float = Field(
         default=60.0,
         ge=0,
-        description="Who would be met within this time is asked at every scan, s.",
+        description="Who would be met within this time, by measured ranges, is asked at every "
+        "scan, s; as is who is new.",
     )
     far_every: int = Field(
         default=5, ge=1, le=1000, description="Of others, one scan in so many asks each."
@@ -151,7 +148,8 @@ MEASUREMENT = Ladder(
 class Active(CooperativeSensor):
     """Asks transponders at its scans: range, coarse bearing, reported altitude, identity.
 
-    Who may be met soon is asked at every scan, others at one in five, each at its own. Mode S
+    Who is new, or may be met soon by the ranges measured of it, is asked at every scan, others at
+    one in five, each in turn. Mode S
     answers with its address, Mode C without; how far, by sector. An answer counts if any of the
     last ten rounds of 0.1 s got one. The elevation is that of the reported altitude above the
     ownship's own. The confidence is the probability of an answer.
@@ -215,7 +213,10 @@ class Active(CooperativeSensor):
         return Look(detected, probability, extras)
 
     def _is_asked(self, cells: Cells, which: AnyArray) -> BoolArray:
-        """Return who is asked at this scan: who is near, and of others each at its own scans."""
+        """Return who is asked at this scan: who is near or new, and others each in turn.
+
+        Who is near is known by the ranges measured at an aircraft's own last two turns.
+        """
         if self.p.far_every == 1 or not len(which):
             return np.ones(len(which), dtype=bool)
         every = self.p.far_every
@@ -223,10 +224,16 @@ class Active(CooperativeSensor):
         due = (own_scans(cells.scan[which]) + turn) % every == 0
         rest = which[~due]
         if len(rest):
-            at = [cells.seen_at(rest, np.full(len(rest), s)) for s in (-STEP_S, STEP_S)]
-            there = at[0]["present"] & at[1]["present"]
-            rate = np.where(there, (at[1]["range_m"] - at[0]["range_m"]) / (2.0 * STEP_S), 0.0)
-            due[~due] = is_near(cells.range_m[rest], rate, self.p.near_s)
+            period_s = 1.0 / float(self.p.scan_rate_hz)
+            since_s = (own_scans(cells.scan[rest]) + turn[~due]) % every * period_s
+            ranges, known = [], np.ones(len(rest), dtype=bool)
+            for ago_s in (since_s, since_s + every * period_s):
+                then = cells.seen_at(rest, -ago_s)
+                instant_ns = cells.state_ns[rest] - np.rint(ago_s * NANOSECONDS).astype(np.int64)
+                known &= then["present"] & (instant_ns >= 0)
+                ranges.append(self._ranged(cells, rest, then["range_m"], instant_ns))
+            rate = (ranges[0] - ranges[1]) / (every * period_s)
+            due[~due] = ~known | is_near(ranges[0] + rate * since_s, rate, self.p.near_s)
         return np.asarray(due)
 
     def _answer(self, cells: Cells, which: AnyArray, in_1_s: FloatArray) -> BoolArray:
@@ -261,11 +268,15 @@ class Active(CooperativeSensor):
 
     def measured_range_m(self, cells: Cells, which: AnyArray) -> FloatArray:
         """Return the ranges that the answers of some cells come from, m."""
-        range_m: FloatArray = cells.range_m[which]
+        return self._ranged(cells, which, cells.range_m[which], cells.state_ns[which])
+
+    def _ranged(
+        self, cells: Cells, which: AnyArray, range_m: FloatArray, instant_ns: IntArray
+    ) -> FloatArray:
         if not self._errs:
             return range_m
         who = self._who(cells, which)
-        drawn = self._ranges(who.keys, cells.state_ns[which], replica=who.replica)
+        drawn = self._ranges(who.keys, instant_ns, replica=who.replica)
         bias = np.where(cells.roster.equipage.mode_s[who.craft], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 

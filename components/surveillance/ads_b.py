@@ -36,11 +36,11 @@ from components.surveillance.reception import LAWS
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.well_clear.volume import FOOT_M
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import NANOSECONDS
+from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 from dsa_des.time.timeline import first_scan
 
 #: Longest time that a message counts for: nobody is reported by older ones.
@@ -169,6 +169,8 @@ class AdsB(CooperativeSensor):
         self.law = LAWS[parameters.reception][0]
         #: Scan of each cell of the last look, and the ownship's velocity then.
         self._rows: tuple[IntArray, FloatArray] | None = None
+        #: When the scan before each of the last look was, in ns of its run.
+        self._before_ns: IntArray = np.zeros(0, dtype=np.int64)
         streams = context.streams
         self._clocks = {
             kind: SquitterClocks(streams.stream("[equipage]", f"{kind} messages"))
@@ -176,10 +178,6 @@ class AdsB(CooperativeSensor):
         }
         self._received = {kind: self.stream(f"{kind} received") for kind in self._clocks}
         self._broadcasts = Broadcasts(streams, parameters.position_errors, parameters.compact)
-        self._age_s = {
-            "position": min(1.0 / float(parameters.scan_rate_hz), LONGEST_S),
-            "velocity": parameters.velocity_age_s,
-        }
 
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
@@ -194,6 +192,11 @@ class AdsB(CooperativeSensor):
     def steps(self) -> dict[str, float]:
         """No quantity has a grid in the line of sight."""
         return {**super().steps, "range_rate": 0.0}
+
+    def cells(self, targets: Any, rows: IntArray, wake: Wake) -> tuple[Cells, Any]:
+        """Return what all sensors have, and keep in mind when the scans before were."""
+        self._before_ns = nanosecond_of(wake.scans_before, wake.ticks_per_s)
+        return super().cells(targets, rows, wake)
 
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
@@ -228,13 +231,13 @@ class AdsB(CooperativeSensor):
         none = np.zeros(0, dtype=np.int64)
         if not len(asked):
             return none, none, none
-        age_s = self._age_s[kind]
-        count = math.ceil(age_s / SHORTEST_S) + 1
+        oldest_ns = here_ns[asked] - self._oldest_age_ns(kind, cells, asked)
+        count = math.ceil(int((here_ns[asked] - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         those = who.take(asked)
         number, sent_ns, counts = self._clocks[kind].latest(
             those.keys, those.replica, here_ns[asked], count
         )
-        counts &= sent_ns > (here_ns[asked] - round(age_s * NANOSECONDS))[:, np.newaxis]
+        counts &= sent_ns > oldest_ns[:, np.newaxis]
         counts &= sent_ns < (equipage.silent_after_s[those.craft] * NANOSECONDS)[:, np.newaxis]
         row, place = np.nonzero(counts)
         if not len(row):
@@ -248,21 +251,18 @@ class AdsB(CooperativeSensor):
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:
             came &= ~then["hidden"]
-        came &= self._known_then(cells, each, ahead_s, equipage.latency_s[those.craft[row]])
         counts[row, place] = came
         some = np.flatnonzero(counts.any(axis=1))
         newest = counts[some].argmax(axis=1)
         return asked[some], number[some, newest], sent_ns[some, newest]
 
-    def _known_then(
-        self, cells: Cells, each: IntArray, ahead_s: FloatArray, latency_s: FloatArray
-    ) -> BoolArray:
-        """Return whether aircraft were there when what they send was measured."""
-        known = np.ones(len(each), dtype=bool)
-        late = np.flatnonzero(latency_s > 0.0)
-        if len(late):
-            known[late] = cells.seen_at(each[late], ahead_s[late] - latency_s[late])["present"]
-        return known
+    def _oldest_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
+        """Return how old a message may be that counts: a position came since the scan before."""
+        if kind == "velocity":
+            return np.full(len(asked), round(self.p.velocity_age_s * NANOSECONDS))
+        # What delays the picture of the aircraft delays that of both scans.
+        since_ns = cells.instant_ns[asked] - self._before_ns[cells.row[asked]]
+        return np.minimum(since_ns, round(LONGEST_S * NANOSECONDS))
 
     def _report(
         self,
@@ -310,14 +310,26 @@ class AdsB(CooperativeSensor):
         here_ns: IntArray,
         equipage: Any,
     ) -> Sent:
-        """Return what was true when what messages say was measured."""
+        """Return what was true when what messages say was measured.
+
+        Before a flight begins its aircraft flew on towards there as it is when the message is sent.
+        """
         latency_s = equipage.latency_s[who.craft]
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
         ahead_s = (instant_ns - here_ns[which]) / NANOSECONDS
+        back_s = np.zeros(len(which))
+        if latency_s.any():
+            known = cells.seen_at(which, ahead_s)["present"]
+            back_s = np.where(known, 0.0, latency_s)
+            ahead_s = ahead_s + back_s
         then = cells.seen_at(which, ahead_s)
         velocity = velocity_of(cells, which, ahead_s, then, "target")
+        place = [then[f"target_{name}"] for name in PLACE]
+        if back_s.any():
+            before = carried_on(place, -velocity * back_s)
+            place = [np.where(back_s > 0.0, b, p) for b, p in zip(before, place, strict=True)]
         velocity[2] = -velocity[2]
-        lat, lon, alt = (then[f"target_{name}"] for name in PLACE)
+        lat, lon, alt = place
         return Sent(lat, lon, alt, velocity, number, instant_ns)
 
     def _own_velocity(self, cells: Cells, found: IntArray) -> FloatArray:

@@ -50,6 +50,8 @@ class Wake:
         (`dsa_des.time.timeline`); 0 otherwise.
     first_run : int
         The first replica that runs now: rows of those before it never come again.
+    clock : callable, optional
+        Given scan numbers, returns when the scan before each was (`ScanClock.before`).
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Wake:
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
         span_ticks: int = 0,
         first_run: int = 0,
+        clock: Callable[[IntArray], IntArray] | None = None,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -71,6 +74,7 @@ class Wake:
         self._demand = demand
         self.span_ticks = span_ticks
         self.first_run = first_run
+        self._clock = clock
 
     def __len__(self) -> int:
         return len(self.ticks)
@@ -79,6 +83,13 @@ class Wake:
     def demand(self) -> Mapping[str, IntArray]:
         """The rows at which each clocked block downstream scans."""
         return {} if self._demand is None else self._demand()
+
+    @cached_property
+    def scans_before(self) -> IntArray:
+        """When the block's scan before each row was, in ticks of its own run; -1 for none."""
+        if self._clock is None:
+            return np.full(len(self), -1)
+        return self._clock(self.scans)
 
     @property
     def time_s(self) -> FloatArray:

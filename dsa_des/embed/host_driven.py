@@ -111,6 +111,7 @@ class _Runner:
     def __init__(self, node: Node, cursor: ScanCursor | None, wires: Iterable[WireOfScene]) -> None:
         component = self.component = node.component
         self.name, self.cursor = component.name, cursor
+        self.before = None if node.clock is None else node.clock.before
         self.demands = [] if cursor else [demand.block for demand in node.demands]
         into: dict[str, list[_Wire]] = {}
         for wire in wires:
@@ -282,7 +283,7 @@ class HostDriven:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.seen(ticks, own, tick + 1, demand)
+            wake = runner.inputs.seen(ticks, own, tick + 1, demand, clock=runner.before)
             if wake is None:
                 continue
             try:

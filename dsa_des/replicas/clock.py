@@ -6,7 +6,7 @@ import numpy as np
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.time.clock import ClockSpec, ScanClock
-from dsa_des.time.timeline import ReplicaTime, first_scan
+from dsa_des.time.timeline import ReplicaTime, first_scan, split_scans
 
 Scans = tuple[IntArray, IntArray]
 # So many scans of each drawn clock are found at a time.
@@ -56,6 +56,17 @@ class ReplicaClock(ScanClock):
         if self._runs != self._time.runs:
             self._runs, self._last, self._read = self._time.runs, (0, -1, None), _NOTHING
         return super().between(start, min(end, self._time.run_ticks))
+
+    def before(self, scans: IntArray) -> IntArray:
+        """Return when the scan before each was, in ticks of its own run; -1 before the first."""
+        replica, own = split_scans(scans)
+        if self._alike:
+            shift = self._offsets[replica] - self._clocks[0].offset
+            return np.where(own > 0, self._clocks[0].before(own) + shift, -1)
+        found = np.empty_like(own)
+        for run in np.unique(replica).tolist():
+            found[replica == run] = self._clocks[run].before(own[replica == run])
+        return found
 
     def _between(self, start: int, end: int) -> Scans:
         """Return their scan numbers and ticks on the common timeline, in order."""

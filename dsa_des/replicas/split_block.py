@@ -129,7 +129,10 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         return {block: _within(asked, rows) for block, asked in wake.demand.items()}
 
     own = np.where(scans >= 0, scans - scan, -1)
-    return Wake(ticks, own, wake.ticks_per_s, held, arrived, demand)
+    return Wake(
+        ticks, own, wake.ticks_per_s, held, arrived, demand,
+        clock=lambda scans: wake.scans_before[rows],
+    )  # fmt: skip
 
 
 def _arrivals(new: Arrivals, begin: int, scan: int, span: int) -> Arrivals | None:

@@ -250,6 +250,7 @@ class Inputs:
         end: int,
         demand: Callable[[IntArray], Mapping[str, IntArray]] | None = None,
         *,
+        clock: Callable[[IntArray], IntArray] | None = None,
         complete: bool = True,
     ) -> Wake | None:
         """Return what the block sees at some instants, or None if it cannot run at any.
@@ -262,6 +263,8 @@ class Inputs:
             First tick that is no longer seen.
         demand : callable, optional
             Given the instants of the wake, returns what `Wake.demand` is.
+        clock : callable, optional
+            As for `Wake`.
         complete : bool
             Leave out instants at which a required input holds nothing yet.
         """
@@ -287,7 +290,7 @@ class Inputs:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         asked = None if demand is None else partial(demand, ticks)
         span, run = self._time.span_ticks, self._time.runs.start
-        return Wake(ticks, scans, self._ticks_per_s, held, arrived, asked, span, run)
+        return Wake(ticks, scans, self._ticks_per_s, held, arrived, asked, span, run, clock)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

@@ -235,7 +235,8 @@ class Node:
         return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
 
     def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
-        wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for)
+        before = None if self.clock is None else self.clock.before
+        wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for, clock=before)
         if wake is None:
             return
         ticks = wake.ticks

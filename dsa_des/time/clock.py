@@ -172,6 +172,11 @@ class ScanClock:
             ticks = np.maximum(ticks + np.rint(shift).astype(np.int64), 0)
         return ticks
 
+    def before(self, scans: IntArray) -> IntArray:
+        """Return when the scan before each was, in ticks of its own run; -1 before the first."""
+        earlier = np.asarray(scans, dtype=np.int64) - 1
+        return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
+
     def tick_of(self, scan: int) -> int:
         """Return the tick of one scan."""
         if self._jitter_draw is None:

@@ -10,7 +10,10 @@ from wired import chain, rows, run, sensor
 TRACKER = {"type": "tracking.stub"}
 
 
-def turned(azimuth_deg: float, *, range_m: float = 3000.0, duration_s: float = 8, **avoidance):
+def turned(
+    azimuth_deg: float, *, range_m: float = 3000.0, duration_s: float = 8,
+    kind: str = "radar.range_boundary", **avoidance,
+):  # fmt: skip
     """Manoeuvres and the final heading with a hovering target at a body azimuth."""
     bearing = math.radians(217.0 + azimuth_deg)
     target = {
@@ -22,7 +25,7 @@ def turned(azimuth_deg: float, *, range_m: float = 3000.0, duration_s: float = 8
         "speed_mps": 40.0,
     }  # fmt: skip
     scene = chain(
-        {"radar": sensor("radar.range_boundary", scan_rate_hz=2)}, ownship=own, targets=[target],
+        {"sensor": sensor(kind, scan_rate_hz=2)}, ownship=own, targets=[target],
         duration_s=duration_s, fusion={"type": "fusion.pick_best"}, tracker=TRACKER,
     )  # fmt: skip
     scene["blocks"]["avoidance"] = {"type": "avoidance.turn_away", **avoidance}
@@ -73,6 +76,17 @@ def test_a_bank_turns_as_fast_as_the_speed_lets_it_and_takes_time_to_roll():
     expected = in_body_deg(-20.0 - math.degrees(rolled_rad), 39.0)
     assert later[8] == pytest.approx(expected, abs=2.0)
     assert azimuths[8] - azimuths[0] < -40.0
+
+
+@covers("without_range", of=("avoidance.turn_away",))
+@pytest.mark.parametrize("side", [20.0, -20.0])
+def test_a_camera_s_track_has_no_range_and_is_turned_from_where_told(side):
+    camera = {"kind": "optical.range_boundary", "duration_s": 1, "range_km": 0.1}
+    assert turned(side, **camera)[0] == []
+    ((row,), _) = turned(side, **camera, without_range=True)
+    assert row["turn_rad"] == pytest.approx(-math.copysign(math.radians(30.0), side))
+    # Who is known to be far is not turned from.
+    assert turned(side, range_km=0.1, duration_s=1, without_range=True)[0] == []
 
 
 @covers("direction", of=("avoidance.turn_away",))

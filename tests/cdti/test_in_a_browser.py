@@ -39,9 +39,13 @@ def closest_m(run):
 
 
 def above_own_ft(run, track, time_s):
-    """How far a track was above the ownship, by the last of its rows up to an instant."""
+    """How far a track was above the ownship, by the last of its rows before an instant.
+
+    A window of the run ends before its end: a page that shows an instant has not heard what is sent
+    at it, and shows nothing of what the run has computed since then.
+    """
     rows = pq.read_table(run / "state_tracks.parquet").to_pylist()
-    known = [row for row in rows if row["track"] == track - TRACKS and row["time_s"] <= time_s]
+    known = [row for row in rows if row["track"] == track - TRACKS and row["time_s"] < time_s]
     return (known[-1]["own_down_m"] - known[-1]["down_m"]) / 0.3048
 
 

@@ -8,12 +8,14 @@ import pymap3d
 import pytest
 from geographiclib.geodesic import Geodesic
 
+import dsa_des
 from components.encounters.encounter_traffic import encounter_flights
 from components.encounters.made_encounters import made_set, read_recipe
 from components.formats.encounter_set import EncounterSet
 from components.formats.set_file import read_set
 from dsa_des.errors import UsageError
 from tests.encounters.test_set_file import call
+from tests.support.wired import sensor
 
 FOOT, KT = 0.3048, 1852 / 3600
 RECIPE = """\
@@ -62,6 +64,49 @@ def searched(found: EncounterSet, place: int, low: float, high: float) -> float:
         else:
             low = a
     return (low + high) / 2
+
+
+def test_every_course_of_a_slow_intruder_is_made_and_none_that_is_not(tmp_path: Path) -> None:
+    """Of 35 kt against 60 kt two lead there from within asin(35/60) = 35.69 deg, else none."""
+    text = changed("bearing_deg = 70", "bearing_deg = [-80, -35.5, 0, 20, 36]")
+    text = text.replace("own_speed_kt = 120", "own_speed_kt = 60").replace("= 140", "= 35")
+    text = text.replace('geometry = "overtaking"', 'courses = "every"')
+    text = text.replace("intruder_climb_ft_min = 500", "intruder_climb_ft_min = 0")
+    found = made(tmp_path, text)
+    assert found.extra["bearing_deg"].tolist() == pytest.approx([324.5, 324.5, 0, 0, 20, 20])
+    for place in range(len(found)):
+        # It comes from that bearing, though at both courses at another speed.
+        (own, other), (own_later, other_later) = (places(found, place, t) for t in (10.0, 11.0))
+        speeds = [_moved_m(a, b) for a, b in ((own, own_later), (other, other_later))]
+        assert speeds == pytest.approx([60 * KT, 35 * KT], rel=1e-3)
+    closing = [slant_m(found, place, 50.0) for place in range(len(found))]
+    assert closing[0] > closing[1] and closing[2] > closing[3]
+
+
+def _moved_m(one: tuple[float, float, float], other: tuple[float, float, float]) -> float:
+    first, second = (np.array(pymap3d.geodetic2ecef(*place)) for place in (one, other))
+    return float(np.linalg.norm(second - first))
+
+
+def test_traffic_takes_the_table_itself(tmp_path: Path) -> None:
+    text = changed("bearing_deg = 70", "bearing_deg = [70, 80]")
+    expected = made(tmp_path, text)
+    blocks = {
+        "traffic": {"type": "traffic.encounters", "file": str(tmp_path / "made.toml")},
+        "transform": {"type": "geometry.ellipsoid"},
+        "radar": sensor("radar.range_boundary"),
+    }
+    scene = {"duration_s": 3, "seed": 1, "wires": ["traffic -> transform -> radar"],
+             "blocks": blocks}  # fmt: skip
+    blocks["traffic"]["encounter"] = 1
+    run = dsa_des.run(scene)
+    own = [row for row in run["truth"].to_pylist() if row["target"] is None][-1]
+    lat, lon, alt = places(expected, 1, own["time_s"])[0]
+    assert (own["lat_deg"], own["alt_m"]) == pytest.approx((lat, alt), abs=1e-6)
+    assert math.remainder(own["lon_deg"] - lon, 360.0) == pytest.approx(0.0, abs=1e-6)
+    (tmp_path / "made.toml").write_text(text.replace("closest_s", "closest"), encoding="utf-8")
+    with pytest.raises(Exception, match=r"made.toml: closest = 100: unknown key.*closest_s"):
+        dsa_des.run(scene)
 
 
 @pytest.mark.parametrize("side", [200, -200])

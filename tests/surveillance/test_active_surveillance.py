@@ -138,11 +138,27 @@ def test_bearings_err_by_nine_degrees_as_stated(scene):
 def test_who_is_far_is_asked_at_one_scan_in_five(scene):
     certain = 'replies = "certain"'
     away = recorded(scene("mode_s = true", certain, heading=217, speed=90))
-    assert set(np.diff(column(away, "scan"))) == {5.0}
-    # 10 km head-on at 145 m/s: 69 s to go, so from 9 s on it is near.
-    near = recorded(scene("mode_s = true", certain, heading=37, speed=90))
+    scans = column(away, "scan")
+    # Who is new is asked until there were two turns to measure its range rate from.
+    assert set(np.diff(scans[scans < 4])) == {1.0} and set(np.diff(scans[scans > 10])) == {5.0}
+    # 13 km head-on at 145 m/s: 90 s to go, so from 30 s on it is near, as ranges say 5 s late.
+    far = (-7800, -10_400)
+    near = recorded(scene("mode_s = true", certain, far, heading=37, speed=90))
     scans = column(near, "scan")
-    assert set(np.diff(scans[scans < 9])) <= {5.0} and set(np.diff(scans[scans > 15])) == {1.0}
+    assert set(np.diff(scans[(scans > 10) & (scans < 24)])) == {5.0}
+    assert set(np.diff(scans[scans > 38])) == {1.0}
+
+
+def test_who_is_near_is_told_by_what_is_measured(scene):
+    """At 60 s by the truth, the errors of two ranges, 4.3 m/s, make some early and some late."""
+    far = (-7800, -10_400)
+    sets = ["blocks.asker.replies='certain'"]
+    first = []
+    for seed in range(12):
+        near = scene("mode_s = true", "", far, heading=37, speed=90, seed=seed, sets=sets)
+        scans = column(recorded(near), "scan")
+        first.append(scans[:-1][(np.diff(scans) == 1.0) & (scans[:-1] > 10)].min())
+    assert len(set(first)) > 1 and 24.0 < np.mean(first) < 36.0
 
 
 def test_reach_is_by_sector():

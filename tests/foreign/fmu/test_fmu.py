@@ -2,7 +2,12 @@
 
 import math
 import os
+import signal
+import subprocess
+import sys
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -211,6 +216,41 @@ def test_one_clear_error_and_nothing_left(lab, lag, fault, said, monkeypatch):
     assert said in str(caught.value) and "\n" not in str(caught.value)
     now = _left_behind()
     assert not now[0] and now[1] <= before[1]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_nothing_is_left_when_we_are_interrupted_or_killed(lab, lag, number):
+    scene = lab.write(
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; deadline_s = 60; '
+                "start = { fault = 2 }"},
+        [], duration_s=2,
+    )  # fmt: skip
+    folder = lab.folder / "temporary"
+    folder.mkdir()
+    out = lab.folder / "out"
+    ours = subprocess.Popen(
+        [sys.executable, "-m", "dsa_des", "run", str(scene), "--out", str(out)],
+        env={**os.environ, "TMPDIR": str(folder)}, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    beats: list[Path] = []
+    for _ in range(1500):  # until it hangs: past its first communication points
+        beats = [*folder.glob("dsa_des_fmu_*/beat")]
+        if beats and int.from_bytes(beats[0].read_bytes(), "little") > 5:
+            break
+        time.sleep(0.02)
+    assert beats
+    os.kill(ours.pid, number)
+    _, said = ours.communicate(timeout=30)
+    assert ours.returncode == (-9 if number == signal.SIGKILL else 128 + number), said
+    for _ in range(200):
+        if not [*folder.iterdir()]:
+            break
+        time.sleep(0.02)
+    assert not [*folder.iterdir()] and not out.exists()
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            assert str(folder).encode() not in entry.read_bytes()
 
 
 def test_one_that_refuses_to_start_cannot_be_used(lab, lag):

@@ -1,0 +1,90 @@
+"""What came since the scan before, whatever the clock; the same alone and beside other runs."""
+
+import crooked
+import numpy as np
+import pytest
+from wired import chain
+
+import dsa_des
+from components.surveillance.squitter_clock import SquitterClocks
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.running.simulation import Simulation
+from dsa_des.time.randomness import Streams, target_keys
+
+ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 10, "reception": "certain"}
+ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-90, 90]}
+TARGETS = [{**target, "mode_s": True, "ads_b": {"nacp": 9}} for target in crooked.TARGETS]
+
+
+def recorded(*scenes, window=None):
+    sink = MemorySink()
+    loaded = [dsa_des.load_scene(scene) for scene in scenes]
+    if len(loaded) == 1:
+        Simulation(loaded[0], recorder=Recorder([sink]), window=window).run()
+    else:
+        lock_step(loaded, recorder=Recorder([sink])).run()
+    return sink.tables()
+
+
+@pytest.mark.parametrize(
+    "clock", [{}, {"jitter_s": 0.04}, {"rate_error_ppm": 90_000}, {"rate_error_ppm": -50_000}]
+)
+def test_every_position_is_reported_once(clock):
+    """At ten scans a second each message is the newest at one scan, early or late as that is."""
+    duration_s = 40
+    scene = chain({"ether": {**ADS_B, **clock}}, targets=TARGETS, duration_s=duration_s)
+    scans = recorded(scene)
+    last_s = max(scans["scans"]["time_s"].to_pylist())
+    clocks = SquitterClocks(Streams(scene["seed"]).stream("[equipage]", "position messages"))
+    for target in TARGETS:
+        name = target["name"]
+        key = target_keys((name,))
+        sent = np.concatenate([
+            clocks.latest(key, np.zeros(1, int), np.array([until_s * 10**9]), 14)[1][0]
+            for until_s in range(1, duration_s + 1)
+        ])  # fmt: skip
+        sent = np.unique(sent) / 1e9
+        rows = [row for row in scans["detections"].to_pylist() if row["target"] == name]
+        told = [row["reported_s"] for row in rows]
+        assert told == pytest.approx(sent[sent <= last_s].tolist())
+
+
+@pytest.mark.parametrize("sensor", [ADS_B, ACTIVE], ids=["ads_b", "active"])
+def test_replicas_together_are_those_alone(sensor):
+    """Other seeds, and clocks that differ in all that clocks may differ in."""
+    sensor = {**sensor, "reception": "fitted"} if sensor is ADS_B else sensor
+    scenes = []
+    for seed, clock in enumerate(({}, {"jitter_s": 0.03}, {"offset_s": 0.25}, {})):
+        one = chain({"one": {**sensor, **clock}}, targets=TARGETS, duration_s=30)
+        one["blocks"]["traffic"]["ownship"] = dict(crooked.OWNSHIP)
+        scenes.append({**one, "seed": 11 * seed})
+    together = recorded(*scenes)["detections"].to_pylist()
+    for number, scene in enumerate(scenes):
+        alone = recorded(scene)["detections"].to_pylist()
+        assert len(alone) > 10
+        mine = [row for row in together if row.pop("replica", number) == number]
+        assert repr(mine[: len(alone)]) == repr(alone)
+        together = together[len(alone) :]
+        assert repr(recorded(scene, window=3)["detections"].to_pylist()) == repr(alone)
+
+
+def test_latency_hides_nobody_at_the_start():
+    """What is sent in the first second is of before the run: the aircraft flew on towards there."""
+    sensor = {**ADS_B, "position_errors": "none", "compact": False}
+    north = {
+        "name": "kea", "north_m": 9000, "east_m": 3000, "up_m": 0, "heading_deg": 0,
+        "speed_mps": 100, "ads_b": {"latency_s": 2.0, "compensated_s": 0.5},
+    }  # fmt: skip
+    ownship = {"lat_deg": -42.0, "lon_deg": 179.99, "alt_m": 1200, "heading_deg": 217,
+               "speed_mps": 50, "roll_deg": 25}  # fmt: skip
+    scene = chain({"ether": sensor}, ownship=ownship, targets=[north], duration_s=6)
+    rows = recorded(scene)["detections"].to_pylist()
+    first_s = min(row["reported_s"] for row in rows)
+    assert first_s < 0.6
+    # Northward at 100 m/s, 150 m behind: the same line in time before 2 s as after.
+    degree_m = 6_357_000 * np.pi / 180
+    said = np.array([(row["reported_s"], row["reported_lat_deg"]) for row in rows])
+    at_start = said[:, 1] - 100.0 * said[:, 0] / degree_m
+    assert np.abs(at_start - at_start[-1]).max() * degree_m < 1.5
