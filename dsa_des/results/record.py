@@ -106,6 +106,8 @@ class Result:
         The block it is of, if that is not what stands behind the dot of its name.
     mark : (colour, marker), optional
         How figures mark that block; a study fills it in.
+    quantile : float, optional
+        Of a number: what is told of it is this quantile over the units, not the mean.
     """
 
     name: str
@@ -116,6 +118,7 @@ class Result:
     block: str | None = None
     mark: tuple[_Colour, _Marker] | None = None
     ratio: RatioOf | None = None
+    quantile: Annotated[float, Field(gt=0, lt=1)] | None = None
 
     @property
     def is_number(self) -> bool:

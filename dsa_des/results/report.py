@@ -334,7 +334,10 @@ def _methods(tables: Tables) -> str:
     known = {EVENT: "shares by Wilson's score", FRACTION: "fractions by Wilson's score",
              NUMBER: f"means by {means}"}  # fmt: skip
     known[RATIO] = "ratios of events by a gamma interval or by drawing units again, as they say"
-    return ", ".join(text for kind, text in known.items() if kind in kinds)
+    found = [text for kind, text in known.items() if kind in kinds]
+    if any(line.result.quantile is not None for line in tables.lines):
+        found.append("quantiles by order statistics")
+    return ", ".join(found)
 
 
 def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
