@@ -53,6 +53,24 @@ def turn_parameters(
             f"{math.degrees(rate_rad_s):g} deg/s): it must not exceed {LARGEST_TURN_RADIUS_M:g}; "
             "use a straight leg or waypoints"
         )
+    table = _circle(lat_deg, lon_deg, alt_m, azimuth_rad, radius, rate_rad_s, climb_mps)
+    # The circle in the chart is off the azimuth by some 1e-8 to 1e-6 rad, which turns in a row
+    # would add up: it is begun as much the other way.
+    yaw = float(turn_state(table, np.zeros(1))[3][0])
+    off_rad = math.remainder(yaw - azimuth_rad, 2.0 * math.pi)
+    return _circle(lat_deg, lon_deg, alt_m, azimuth_rad - off_rad, radius, rate_rad_s, climb_mps)
+
+
+def _circle(
+    lat_deg: float,
+    lon_deg: float,
+    alt_m: float,
+    azimuth_rad: float,
+    radius: float,
+    rate_rad_s: float,
+    climb_mps: float,
+) -> FloatArray:
+    """Return the table of a circle whose centre lies abeam of an azimuth."""
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     side = math.copysign(0.5 * math.pi, rate_rad_s)
     # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).

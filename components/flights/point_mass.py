@@ -1,13 +1,17 @@
 """Flying a sampled track: from speed, climb and turn per second to positions.
 
 Heading is 0 at time 0. Two ways, both vectorised over tracks: Euler steps of 1 s, as track files
-hold them, and a point mass with limits on its bank, its turn and its pitch rate at 0.1 s.
+hold them, and a point mass with limits on its bank, its turn and its pitch rate at 0.1 s. And how
+that point mass turns to a heading at which a pilot aims.
 """
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from components.messages.steering import SLOWEST_TURN_DEG_S
 from dsa_des.arrays.types import FloatArray
 
 FT_S_PER_KT = 6076.115485564304 / 3600.0
@@ -21,6 +25,18 @@ _MOST_ROLL_RATE = 0.524
 _MOST_BANK = np.radians(75.0)
 _ROLL_GAIN = 20.0
 _SLOWEST, _FASTEST = 1.7, 1116.0
+
+_G_M_S2 = G_FT_S2 * 0.3048
+_STEPS_PER_COMMAND = 10
+#: Less than this is left to chance by no rounding, and is turned at once: 0.2 arc seconds.
+_ALMOST_RAD = 1e-6
+_LONGEST_S = 600.0
+_SHORTEST_S = 1e-8
+#: An easing turn settles if the angle within which it eases is at least this long at full rate.
+LEAST_EASING_S = 2.0
+
+#: How long, s, at which rate, deg/s.
+Rates = list[tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -142,3 +158,80 @@ def fly_point_mass(
         psi = psi + STEP_S * turn
         v = np.clip(v + STEP_S * a, _SLOWEST, _FASTEST)
     return FlownTracks(STEP_S, north, east, up, speed, heading, climb, pitch, bank)
+
+
+def eased_turn(
+    left_rad: float,
+    left_before_rad: float,
+    rate_rad_s: float,
+    speed_mps: float,
+    most_rad_s: float,
+    eases_rad: float,
+) -> Rates:
+    """Return the rates of a turn to a heading, step by step.
+
+    A step of Euler moves along the heading at its beginning, which is half a step old: so the rates
+    begin half a step later, and path and heading agree to second order.
+
+    Once a second the pilot commands a rate in proportion to what was left to turn a second ago, up
+    to the largest; the bank follows as that of `fly_point_mass`, in level flight.
+
+    Parameters
+    ----------
+    left_rad, left_before_rad : float
+        What is left to turn, positive to the right: now, and a second ago.
+    rate_rad_s : float
+        Rate of the turn that is under way.
+    speed_mps : float
+        Over ground, above 0.
+    most_rad_s : float
+        Largest rate that is commanded.
+    eases_rad : float
+        Within so much of the heading the rate falls in proportion; at least `LEAST_EASING_S` at the
+        largest rate, or the turn would not settle.
+
+    Notes
+    -----
+    Bank and roll: em-core of MIT Lincoln Laboratory; the command: as its pilot model (release 6)
+    flies, recorded once a second.
+    """
+    left_rad -= 0.5 * STEP_S * rate_rad_s
+    rates = [(0.5 * STEP_S, math.degrees(rate_rad_s))]
+    bank = math.atan(speed_mps * rate_rad_s / _G_M_S2)
+    gain_per_s = most_rad_s / eases_rad
+    for _ in range(math.ceil(_LONGEST_S)):
+        command = max(-most_rad_s, min(most_rad_s, gain_per_s * left_before_rad))
+        left_before_rad = left_rad
+        for _ in range(_STEPS_PER_COMMAND):
+            roll = _ROLL_GAIN * (command - rate_rad_s)
+            bank += STEP_S * max(-_MOST_ROLL_RATE, min(_MOST_ROLL_RATE, roll))
+            bank = max(-float(_MOST_BANK), min(float(_MOST_BANK), bank))
+            rate_rad_s = _G_M_S2 * math.tan(bank) / speed_mps
+            rates.append((STEP_S, math.degrees(rate_rad_s)))
+            left_rad -= STEP_S * rate_rad_s
+        if max(abs(left_rad), abs(left_before_rad), abs(rate_rad_s)) < _ALMOST_RAD:
+            break
+    return _flyable([*rates, (STEP_S, math.degrees(left_rad) / STEP_S)])
+
+
+def _flyable(rates: Iterable[tuple[float, float]]) -> Rates:
+    """Return rates without turns slower than flights can have.
+
+    What is turned more slowly is turned at that rate in a part of the time, up to a second of it
+    together, and the rest is flown straight.
+    """
+    found: Rates = []
+    slow_s = slow_deg = 0.0
+    for lasts_s, rate_deg_s in [*rates, (0.0, math.inf)]:
+        is_slow = abs(rate_deg_s) < SLOWEST_TURN_DEG_S
+        if slow_s and (not is_slow or slow_s + lasts_s > 1.0):
+            turns_s = abs(slow_deg) / SLOWEST_TURN_DEG_S
+            if turns_s > _SHORTEST_S:
+                found.append((turns_s, math.copysign(SLOWEST_TURN_DEG_S, slow_deg)))
+            found.append((slow_s - turns_s, 0.0))
+            slow_s = slow_deg = 0.0
+        if is_slow:
+            slow_s, slow_deg = slow_s + lasts_s, slow_deg + lasts_s * rate_deg_s
+        elif lasts_s:
+            found.append((lasts_s, rate_deg_s))
+    return found

@@ -13,6 +13,7 @@ import numpy as np
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
+from components.flights.point_mass import eased_turn
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
@@ -110,6 +111,27 @@ class SteeredFlight:
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
 
 
+class Turning(NamedTuple):
+    """How an aircraft turns as a manoeuvre begins: track, rate, and what it turned in a second."""
+
+    track_rad: float
+    rate_rad_s: float
+    turned_rad: float
+
+    def eased(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
+        """Return the rates of an eased turn to a manoeuvre's track, the short way round."""
+        left_rad = math.remainder(manoeuvre.heading_rad - self.track_rad, 2.0 * math.pi)
+        rates = eased_turn(
+            left_rad,
+            left_rad + self.turned_rad,
+            self.rate_rad_s,
+            max(speed_mps, 1.0),
+            manoeuvre.rate_rad_s,
+            manoeuvre.eases_rad,
+        )
+        return tuple((lasts_s, rate_deg_s, 0.0) for lasts_s, rate_deg_s in rates)
+
+
 class SteeringPlan(NamedTuple):
     """What is still to be flown of turns, climbs and speeds, side by side, and what comes after.
 
@@ -141,12 +163,14 @@ class SteeringPlan(NamedTuple):
             speeds=_left(self.speeds, elapsed_s),
         )
 
-    def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float) -> SteeringPlan:
+    def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
         """Return it with the parts that a manoeuvre changes, from an altitude; the others stay."""
         plan = self
-        if manoeuvre.turn_rad != 0.0:
-            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
-            plan = plan._replace(turns=_turn(manoeuvre, speed_mps))
+        speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
+        if manoeuvre.eases_rad > 0.0:
+            plan = plan._replace(turns=turning.eased(manoeuvre, speed_now_mps))
+        elif manoeuvre.turn_rad != 0.0:
+            plan = plan._replace(turns=_turn(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
             climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
@@ -179,8 +203,7 @@ class SteeringPlan(NamedTuple):
             lasts_s = min(part[0][0] for part in parts if part)
             climb_mps = _mean(plan.climbs, lasts_s, plan.climb_mps)
             speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
-            if plan.turns:
-                rate_deg_s = plan.turns[0][1]
+            if plan.turns and (rate_deg_s := plan.turns[0][1]):
                 legs.append(Turn(lasts_s, speed_mps, climb_mps, rate_deg_s=rate_deg_s))
             else:
                 legs.append(Straight(lasts_s, speed_mps, climb_mps))
@@ -291,18 +314,40 @@ def flown_from(
             plan = SteeringPlan(
                 (), (), _own_climb((high - low) / base_s[row], manoeuvre), (), speed_mps
             )
+            turned_rad = math.remainder(
+                float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
+            )
+            rate_rad_s = turned_rad / base_s[row]
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
-            plan = earlier.plan.after(at_s - earlier.start_time_s)
-        found.append(
-            _flown_from(name, place, heading_deg, at_s, plan.with_manoeuvre(manoeuvre, here))
-        )
+            elapsed_s = at_s - earlier.start_time_s
+            plan = earlier.plan.after(elapsed_s)
+            turned_rad = math.radians(
+                _turned(earlier.plan.turns, elapsed_s)
+                - _turned(earlier.plan.turns, elapsed_s - 1.0)
+            )
+            rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
+        turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
+        plan = plan.with_manoeuvre(manoeuvre, here, turning)
+        found.append(_flown_from(name, place, heading_deg, at_s, plan))
     return found
+
+
+def _turned(turns: Pieces, elapsed_s: float) -> float:
+    """Return how far has been turned after some time, deg."""
+    turned_deg, left_s = 0.0, elapsed_s
+    for lasts_s, rate_deg_s, _ in turns:
+        if left_s <= 0.0:
+            break
+        turned_deg += min(lasts_s, left_s) * rate_deg_s
+        left_s -= lasts_s
+    return turned_deg
 
 
 def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     """Return the climb that is left of a flight's own: a turn or a climb ends it."""
-    ends = manoeuvre.turn_rad != 0.0 or manoeuvre.climb_m != 0.0
+    turns = manoeuvre.turn_rad != 0.0 or manoeuvre.eases_rad > 0.0
+    ends = turns or manoeuvre.climb_m != 0.0
     return 0.0 if ends and manoeuvre.vertical_speed_mps == 0.0 else climb_mps
 
 

@@ -38,6 +38,11 @@ class Manoeuvre(NamedTuple):
         In place of the turn's rate, above 0: the rate is what this bank gives at the speed flown.
     roll_rate_rad_s : float
         How fast the bank of the turn is built up; 0 for at once.
+    heading_rad : float
+        Track that is turned to, at up to `rate_rad_s`, in place of a change; where it is eased.
+    eases_rad : float
+        Within so much of that track the rate falls in proportion, and the bank takes its time;
+        above 0 where a track is turned to.
     """
 
     turn_rad: float = 0.0
@@ -50,6 +55,8 @@ class Manoeuvre(NamedTuple):
     vertical_acceleration_mps2: float = 0.0
     bank_rad: float = 0.0
     roll_rate_rad_s: float = 0.0
+    heading_rad: float = 0.0
+    eases_rad: float = 0.0
 
 
 @dataclass(eq=False)
@@ -72,6 +79,8 @@ class Manoeuvres(Message):
         Change of vertical speed, and how fast.
     bank_rad, roll_rate_rad_s : (rows,), optional
         Bank in place of the turn's rate, and how fast it is built up; 0 for neither.
+    heading_rad, eases_rad : (rows,), optional
+        Track that is turned to, and within how much of it the turn is eased; 0 for none.
     """
 
     row_table = "manoeuvres"
@@ -103,6 +112,13 @@ class Manoeuvres(Message):
     )
     roll_rate_rad_s: FloatArray = column(
         "rad/s", "", "rate at which the bank is built up; 0: at once", of=PER_ROW, default=None
+    )
+
+    heading_rad: FloatArray = column(
+        "rad", "NED", "track that is turned to, where the turn is eased", of=PER_ROW, default=None
+    )
+    eases_rad: FloatArray = column(
+        "rad", "", "within so much of it the turn is eased; 0 for none", of=PER_ROW, default=None
     )
 
     def __post_init__(self) -> None:

@@ -7,11 +7,12 @@ avoid maneuver decisions", MIT Lincoln Laboratory, ATC-434, 2017, tells how they
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
@@ -81,7 +82,9 @@ class Draws(NamedTuple):
     size: float
 
 
-def steering(changes: tuple[float, float], turns: bool, draws: Draws | None) -> float:
+def steering(
+    changes: tuple[float, float], turns: bool, draws: Draws | None, goes_beyond: bool = True
+) -> float:
     """Return the change that a pilot makes, of the sign of its side."""
     low, high = changes
     if math.isinf(low) and math.isinf(high):
@@ -95,8 +98,8 @@ def steering(changes: tuple[float, float], turns: bool, draws: Draws | None) -> 
     excess = CLIMB
     if turns:
         excess = TURN if to_high == smaller_is_high else TURN_OTHER_SIDE
-    beyond = excess.fixed
-    if draws is not None:
+    beyond = excess.fixed if goes_beyond else 0.0
+    if draws is not None and goes_beyond:
         beyond = gamma(draws.size, excess.shape, excess.scale) - excess.less
     size = max((high if to_high else -low) + beyond, 0.0)
     if turns:
@@ -106,15 +109,15 @@ def steering(changes: tuple[float, float], turns: bool, draws: Draws | None) -> 
 
 def response_s(
     uniforms: FloatArray | None, initial_s: float, coordination_s: float, execution_s: float
-) -> float:
-    """Return how long a pilot takes from the decision to act until the manoeuvre begins."""
+) -> tuple[float, float]:
+    """Return how long a pilot takes to react and coordinate, and then to begin the manoeuvre."""
     if uniforms is None:
-        return initial_s + coordination_s + execution_s
+        return initial_s + coordination_s, execution_s
     first, second, third = np.asarray(uniforms, dtype=np.float64).tolist()
-    found = exponential(first, initial_s) + exponential(third, execution_s)
+    waits_s = exponential(first, initial_s)
     if coordination_s > 0.0:
-        found += gamma(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)
-    return found
+        waits_s += gamma(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)
+    return waits_s, exponential(third, execution_s)
 
 
 class StochasticParameters(ConfParameters):
@@ -146,12 +149,45 @@ class StochasticParameters(ConfParameters):
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
+    chooses: Literal["acting", "before_executing"] = Field(
+        default="acting",
+        description="By which bands: those of the instant of the manoeuvre, or those of when the "
+        "time to execute begins; pauses then count from there.",
+    )
+    goes_beyond: bool = Field(
+        default=True,
+        description="Whether changes are larger than need be, by the model's sizes, or the least.",
+    )
+    track_step_deg: float = Field(
+        default=0.0,
+        ge=0,
+        le=90,
+        description="Turns lead to the nearest multiple of this as a track, deg; 0: to any.",
+    )
+    eases_deg: float = Field(
+        default=0.0,
+        ge=0,
+        le=180,
+        description="Within so much of the new track the rate of a turn falls in proportion, and "
+        "the bank takes its time, deg; by default turns begin and end at once.",
+    )
+
+    @model_validator(mode="after")
+    def _settles(self) -> Self:
+        least_deg = LEAST_EASING_S * self.turn_rate_deg_s
+        if 0.0 < self.eases_deg < least_deg:
+            raise ValueError(
+                f"eases_deg is {self.eases_deg:g}: it must be 0, or at least {least_deg:g}, "
+                f"{LEAST_EASING_S:g} s at turn_rate_deg_s, or turns would not settle"
+            )
+        return self
 
     def without_effect(self) -> list[str]:
         """Say which rate belongs to manoeuvres that are never made."""
         said = super().without_effect()
         if self.turn_share == 0.0:
-            said += self.idle("turn_rate_deg_s", because="turn_share is 0")
+            of_turns = "turn_rate_deg_s", "track_step_deg", "eases_deg"
+            said += self.idle(*of_turns, because="turn_share is 0")
         if self.turn_share == 1.0:
             said += self.idle("vertical_rate_mps", because="turn_share is 1")
         return said
@@ -163,7 +199,9 @@ class Mind(NamedTuple):
     replica: int
     decisions: int = 0  # How many there were
     since: int | None = None  # Tick from which on there was an alert
+    chooses_at: float | None = None  # Tick from which on it chooses the manoeuvre
     acts_at: float | None = None  # Tick from which on the latest decision is acted on
+    chosen: Manoeuvre | None = None  # Before it is acted on
     free_from: float = 0.0  # Tick from which on there may be a next decision
     has_acted: bool = False  # Whether this alert was acted on already
 
@@ -211,41 +249,75 @@ class Stochastic(Component):
         alerted = highest >= self.p.level
         busy = [run for run, mind in self._minds.items() if mind.since is not None]
         followed = np.isin(replica, np.union1d(replica[alerted], np.array(busy, dtype=np.int64)))
-        acting: list[tuple[int, Mind]] = []
+        choosing: list[tuple[int, Mind]] = []
+        acting: list[tuple[int, int]] = []
         for place in np.flatnonzero(followed).tolist():
             run = int(replica[place])
             mind = self._minds.get(run, Mind(run))
-            mind, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
+            mind, chooses, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
             self._minds[run] = mind
+            if chooses:
+                choosing.append((place, mind))
             if acts:
-                acting.append((place, mind))
-        manoeuvres = self._manoeuvres_at(alerts, acting)
-        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
+                acting.append((place, run))
+        return Manoeuvres.at_rows(wake.ticks, self._sent(alerts, choosing, acting))
 
-    def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
-        """Take in the highest level of an instant; return also whether the operator acts at it."""
+    def _sent(
+        self,
+        alerts: AlertLevels,
+        choosing: Sequence[tuple[int, Mind]],
+        acting: Sequence[tuple[int, int]],
+    ) -> dict[int, Manoeuvre]:
+        """Return the manoeuvres that begin, by row; what is chosen and not begun is kept."""
+        chosen = self._manoeuvres_at(alerts, choosing)
+        latest: dict[int, Manoeuvre | None] = {}
+        begins = sorted([(place, 0, mind.replica) for place, mind in choosing]
+                        + [(place, 1, run) for place, run in acting])  # fmt: skip
+        sent = {}
+        for place, acts, run in begins:
+            if not acts:
+                latest[run] = chosen.get(place)
+            elif (told := latest.get(run, self._minds[run].chosen)) is not None:
+                sent[place] = told
+        for run, told in latest.items():
+            self._minds[run] = self._minds[run]._replace(chosen=told)
+        return sent
+
+    def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool, bool]:
+        """Take in the highest level of an instant; return whether it chooses, and acts, at it."""
         per_s = self.context.ticks_per_s
         if highest < self.p.level:
-            return mind._replace(since=None, acts_at=None, has_acted=False), False
+            called_off = mind._replace(since=None, chooses_at=None, acts_at=None, has_acted=False)
+            return called_off, False, False
         since = tick if mind.since is None else mind.since
         mind = mind._replace(since=since)
+        early = self.p.chooses == "before_executing"
         held = tick - since >= self.p.held_s * per_s
-        if mind.acts_at is None and held and tick >= mind.free_from:
+        # A pause after a choice is over when it has passed, one after an act when it ends.
+        free = tick > mind.free_from if early and mind.has_acted else tick >= mind.free_from
+        if mind.acts_at is None and held and free:
             mind = mind._replace(decisions=mind.decisions + 1)
-            mind = mind._replace(acts_at=tick + self._response_s(mind, highest) * per_s)
-        if mind.acts_at is None or tick < mind.acts_at:
-            return mind, False
-        wait_s = mean_pause_s(highest)
-        if not self.p.deterministic:
-            wait_s = pause_s(highest, self._draw(mind, self._pause, 0))
-        return mind._replace(acts_at=None, has_acted=True, free_from=tick + wait_s * per_s), True
+            waits_s, executes_s = self._response_s(mind, highest)
+            acts_at = tick + (waits_s + executes_s) * per_s
+            mind = mind._replace(
+                chooses_at=tick + waits_s * per_s if early else acts_at, acts_at=acts_at
+            )
+        chooses = mind.chooses_at is not None and tick >= mind.chooses_at
+        if chooses:
+            wait_s = mean_pause_s(highest)
+            if not self.p.deterministic:
+                wait_s = pause_s(highest, self._draw(mind, self._pause, 0))
+            mind = mind._replace(chooses_at=None, free_from=tick + wait_s * per_s)
+        if mind.chooses_at is not None or mind.acts_at is None or tick < mind.acts_at:
+            return mind, chooses, False
+        return mind._replace(acts_at=None, has_acted=True), chooses, True
 
     def _draw(self, mind: Mind, stream: Any, number: int) -> float:
         """Return the draw of a number, of the latest decision."""
         decision = np.int64(first_scan(mind.replica) + mind.decisions)
         return float(stream.uniform(np.uint64(0), decision, number))
 
-    def _response_s(self, mind: Mind, highest: int) -> float:
+    def _response_s(self, mind: Mind, highest: int) -> tuple[float, float]:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s
         if mind.has_acted:
             initial_s = coordination_s = 0.0
@@ -277,12 +349,29 @@ class Stochastic(Component):
                 kind = "hdir" if turns else "alt"
                 every = changes_out(kind, self._configuration, self._alerter, alerts, rows)
                 for row, changes in zip(rows, every, strict=True):
-                    change = 0.0 if changes is None else steering(changes, turns, draws[row])
-                    if change != 0.0:
-                        found[row] = self._told(change, turns)
+                    change = 0.0
+                    if changes is not None:
+                        change = steering(changes, turns, draws[row], self.p.goes_beyond)
+                    if change != 0.0 and turns:
+                        found[row] = self._turn(change, alerts, row)
+                    elif change != 0.0:
+                        found[row] = Manoeuvre(
+                            climb_m=change, climb_rate_mps=self.p.vertical_rate_mps
+                        )
         return found
 
-    def _told(self, change: float, by_turn: bool) -> Manoeuvre:
-        if by_turn:
-            return Manoeuvre(turn_rad=change, rate_rad_s=math.radians(self.p.turn_rate_deg_s))
-        return Manoeuvre(climb_m=change, climb_rate_mps=self.p.vertical_rate_mps)
+    def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:
+        """Return a turn by a change of the track that the ownship has in a row of the alerts."""
+        own = alerts.own_motion
+        track = math.atan2(float(own["east_mps"][row]), float(own["north_mps"][row]))
+        track %= 2.0 * math.pi
+        if step := math.radians(self.p.track_step_deg):
+            change = step * round((track + change) / step) - track
+        rate_rad_s = math.radians(self.p.turn_rate_deg_s)
+        if not self.p.eases_deg:
+            return Manoeuvre(turn_rad=change, rate_rad_s=rate_rad_s)
+        return Manoeuvre(
+            rate_rad_s=rate_rad_s,
+            heading_rad=(track + change) % (2.0 * math.pi),
+            eases_rad=math.radians(self.p.eases_deg),
+        )

@@ -62,6 +62,14 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
         blocks["over"] = closest_approach_passed(dice)
         wires.append({"from": "traffic", "to": "over", **dice.pick({}, {}, {"delay_s": 0.3})})
         dice.features |= {f"{name} of ending" for name in wires[-1] if name == "delay_s"}
+    if acts == "pilot" and dice.chance(0.5, "pilot that eases its turns"):
+        blocks["actor"] |= {
+            "chooses": "before_executing", "eases_deg": 8, "goes_beyond": dice.pick(True, False),
+            "track_step_deg": dice.pick(0, 5), "execution_delay_s": dice.pick(0, 2),
+        }  # fmt: skip
+    if acts != "turn_away" and dice.chance(0.3, "filtered alerts"):
+        blocks["filter"] = {"type": "alerting.m_of_n", "hold_s": dice.pick(0, 4)}
+        wires[wires.index("alerting -> actor")] = "alerting -> filter -> actor"
     return {
         **_sections(dice),
         "extends": f"{root}/configs/detect_and_sense.toml", "duration_s": dice.pick(15, 22),

@@ -1,0 +1,1 @@
+"""Makers of docs/published.md: one module per section, each with its rows."""
