@@ -59,7 +59,7 @@ class ErrorsByRangeParameters(Parameters):
 
 
 class ErrorsByRange(Metric):
-    """Quantiles of the errors of confirmed tracks at given ranges, and how often there is a track."""
+    """Quantiles of the errors of confirmed tracks at given ranges, and the share with a track."""
 
     Parameters = ErrorsByRangeParameters
     tables = {
@@ -76,7 +76,7 @@ class ErrorsByRange(Metric):
     def results(self) -> list[Result]:
         """Return a result for each kind of error and range, and where tracks begin."""
         share = f"{100 * self.p.quantile:g} % quantile over runs"
-        found = [Result("first_track_range_nmi", NUMBER, "range at which a track is first confirmed")]
+        found = [Result("first_track_range_nmi", NUMBER, "range at the first confirmed track")]
         for r in self.p.ranges_nmi:
             found.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
             found += [
@@ -102,9 +102,7 @@ class ErrorsByRange(Metric):
                 found[name][number] = value
         return found
 
-    def _of_run(
-        self, columns: Any, rows: IntArray, scene: Scene, end_s: float
-    ) -> dict[str, float]:
+    def _of_run(self, columns: Any, rows: IntArray, scene: Scene, end_s: float) -> dict[str, float]:
         coverage = Coverage(scene)
         own, targets = coverage.aircraft
         time_s = np.arange(self.p.from_s, end_s + 1e-9, self.p.step_s)
@@ -118,7 +116,7 @@ class ErrorsByRange(Metric):
         place, there = position_in_frame(target, time_s, origin)
         range_m = np.sqrt((place**2).sum(axis=0))
         seen = coverage.holds(target, time_s) & there
-        error, of_rows, first_m = self._errors(columns, rows, target)
+        error, of_rows, first_m = self._errors(columns, rows, own, target)
         if math.isfinite(first_m):
             found["first_track_range_nmi"] = first_m / MILE_M
         for r in self.p.ranges_nmi:
@@ -134,7 +132,7 @@ class ErrorsByRange(Metric):
         return found
 
     def _errors(
-        self, columns: Any, rows: IntArray, target: Any
+        self, columns: Any, rows: IntArray, own: Any, target: Any
     ) -> tuple[dict[str, FloatArray], IntArray, float]:
         """Return errors of rows that are the target's, these rows, and the range of the first."""
         origin = np.stack([columns[name][rows] for name in _ORIGIN])
@@ -142,10 +140,12 @@ class ErrorsByRange(Metric):
         true, there = states_in_frame([target], columns["state_s"][rows], origin)
         apart = estimate - true[0]
         mine = there[0] & (np.sqrt((apart[:3] ** 2).sum(axis=0)) < self.p.within_m)
-        apart, true, rows = apart[:, mine], true[0][:, mine], rows[mine]
-        level = np.hypot(true[0], true[1])
+        apart, rows = apart[:, mine], rows[mine]
+        seen_from, _ = position_in_frame(own, columns["state_s"][rows], origin[:, mine])
+        sight = true[0][:3, mine] - seen_from
         with np.errstate(invalid="ignore", divide="ignore"):
-            across = np.abs(apart[0] * true[1] - apart[1] * true[0]) / level
+            level = np.hypot(sight[0], sight[1])
+            across = np.abs(apart[0] * sight[1] - apart[1] * sight[0]) / level
         error = dict(
             zip(
                 _ERRORS,
@@ -154,7 +154,7 @@ class ErrorsByRange(Metric):
                 strict=True,
             )
         )  # fmt: skip
-        first = float(np.sqrt((true[:3, 0] ** 2).sum())) if len(rows) else math.nan
+        first = float(np.sqrt((sight[:, 0] ** 2).sum())) if len(rows) else math.nan
         return error, rows, first
 
 

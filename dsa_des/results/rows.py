@@ -19,8 +19,8 @@ from dsa_des.results.statistics import (
     EstimatedDifference,
     fraction,
     mean,
-    quantile,
     normal_error,
+    quantile,
     share,
     symmetric,
 )
