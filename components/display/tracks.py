@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.summary import NEAR_M, TABLE, distances
+from components.display.outcomes import NEAR_M, TABLE, distances
 from components.display.symbols import Labels
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import TargetsInFrame

@@ -294,7 +294,8 @@ class NavigationReport(_Navigation):
 
     def build(self, block: Any) -> Callable[[Detections, RelativeTargets, IntArray], Detections]:
         """Return what adds the columns to a report, and to its variances what navigation knows."""
-        noise = navigation_noise(block.context)
+        nothing = (0.0, 0.0, 0.0)
+        noise = navigation_noise(block.context) if block.turned_by_belief else (nothing, nothing)
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
             return with_navigation_noise(in_the_horizons_axes(detections, targets, rows), *noise)

@@ -136,6 +136,9 @@ class Sensor(Measuring):
         "report": "(detections, targets, rows) -> detections: what is sent",
     }
     effects = SENSOR_EFFECTS
+    #: Whether lines of sight are measured in body axes, so that who turns them into the world's by
+    #: what the ownship believes of its pose has its errors in them too.
+    turned_by_belief: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -184,7 +187,7 @@ class Sensor(Measuring):
                 lasting |= {"azimuth": worst, "elevation": worst}
         unstated_m2 = 0.0
         noise = navigation_noise(self.context)
-        if any(map(any, noise)):  # differs with the pose
+        if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
             lasting = with_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}

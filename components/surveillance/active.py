@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from components.geometry.angles import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.messages.reach import Reach
+from components.navigation.errors import navigation_noise
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import rising_elevations
@@ -174,9 +175,15 @@ class Active(CooperativeSensor):
     def offer(self, port: str) -> Any:
         """Say that variances differ from answer to answer, and what of the range's lasts."""
         offer: SensorOffer = super().offer(port)
+        # The delay of a transponder and the error of an altimeter stay; of a range what is stated
+        # beyond the other errors, of an elevation nearly all.
         lasting = {
-            "range": LastingError(parts=(LastingPart(RANGE_ERROR_M**2, RANGE_CORRELATION_S),))
-        }
+            "range": LastingError(parts=(
+                LastingPart(RANGE_ERROR_M**2, RANGE_CORRELATION_S),
+                LastingPart(-(RANGE_ERROR_M**2), share=1.0),
+            )),
+            "elevation": LastingError(parts=(LastingPart(share=1.0),)),
+        }  # fmt: skip
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
@@ -326,7 +333,10 @@ class Active(CooperativeSensor):
             return least, least, least
         mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
         step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
-        across = (np.hypot(ned[0], ned[1]) * deviation) ** 2
-        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2
+        # The altitude is that of no pose; bearing and range are counted from the ownship's own.
+        position_m, attitude_rad = navigation_noise(self.context)
+        place_m2 = max(position_m[:2]) ** 2
+        across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
+        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
         high = (altimetry_variance_ft2(altitude_m / FOOT_M) + step**2 / 12.0) * FOOT_M**2
         return np.maximum(across, _LEAST_M2), along, high

@@ -196,6 +196,7 @@ class Tracker(Component):
         origin = selected(records.origin, of)
         poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
+        turned = scans.in_frame(origin)
         reported: list[Reported] = []
         for works in turns(plan.of):
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
@@ -205,7 +206,7 @@ class Tracker(Component):
                 old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
                 store, records.next_number[of_late], gone = late_step(
                     self.rules, self._association, store, old,
-                    LookBatch.of_looks(scans, plan.look[late], replicas, codes, poses),
+                    LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 in_vain = scans.sensors[plan.look[late[gone]]]
@@ -216,7 +217,7 @@ class Tracker(Component):
             if len(looks):
                 store, records.next_number[mine] = step(
                     self.rules, self._association, store,
-                    LookBatch.of_looks(scans, looks, records.replica[mine], codes, poses),
+                    LookBatch.of_looks(turned, looks, records.replica[mine], codes, poses),
                     records.next_number[mine],
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]

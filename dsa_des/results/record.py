@@ -106,6 +106,9 @@ class Result:
         The block it is of, if that is not what stands behind the dot of its name.
     mark : (colour, marker), optional
         How figures mark that block; a study fills it in.
+    least, most : float, optional
+        What no value of a number can lie below or above, such as 0 for a distance; the interval of
+        its mean ends there.
     quantile : float, optional
         Of a number: what is told of it is this quantile over the units, not the mean.
     """
@@ -118,6 +121,8 @@ class Result:
     block: str | None = None
     mark: tuple[_Colour, _Marker] | None = None
     ratio: RatioOf | None = None
+    least: float | None = None
+    most: float | None = None
     quantile: Annotated[float, Field(gt=0, lt=1)] | None = None
 
     @property

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.display.summary import distances
+from components.display.outcomes import distances
 from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
