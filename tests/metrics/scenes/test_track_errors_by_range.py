@@ -30,7 +30,8 @@ def here_nmi() -> float:
 
 def by_hand(range_nmi: float, built) -> dict[str, float]:
     """Errors at a range from the rows of the same run, by pymap3d."""
-    told = [r for r in rows(run({**built, "seed": replica_seed(0, 0)}), "state_tracks") if r["track_status"] == "confirmed"]
+    same = run({**built, "seed": replica_seed(0, 0)})
+    told = rows(same, "state_tracks", track_status="confirmed")
     times = np.arange(2.0, 6.01, 0.25)
     sight = [crooked.ned(crooked.ROLLING, t) for t in times]
     k = int(np.argmin([abs(np.linalg.norm(v) - range_nmi * MILE_M) for v in sight]))
