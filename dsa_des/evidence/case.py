@@ -183,7 +183,8 @@ class EvidenceCase:
 def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None) -> EvidenceCase:
     """Read and check a case with all its studies.
 
-    `replicas` takes the place of those that the system's study and those beside it state.
+    `replicas` takes the place of those that the system's study states, and those beside it where the
+    case states none.
 
     Raises
     ------
@@ -202,7 +203,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     for place, one in enumerate(tables.beside):
         if one.name in {*studies, SENSITIVITY}:
             raise SceneError([file.problem(("beside", place, "name"), "is given twice", one.name)])
-        many = replicas or one.replicas
+        many = one.replicas or replicas
         studies[one.name] = read_study(one.study, sets=[f"replicas={many}"] if many else [])
     varied: tuple[tuple[SensitivityKey, Any, str], ...] = ()
     if tables.sensitivity:
