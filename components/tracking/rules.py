@@ -152,8 +152,8 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
     start_climb_m_s: float | None = Field(
         default=None, gt=0,
-        description="That of its vertical speed: aircraft climb slower than they fly. By default the "
-        "same.",
+        description="That of its vertical speed, m/s: aircraft climb slower than they fly. By "
+        "default the same.",
     )  # fmt: skip
     assumed_range_m: float | None = Field(
         default=None, gt=0,

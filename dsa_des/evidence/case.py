@@ -183,8 +183,8 @@ class EvidenceCase:
 def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None) -> EvidenceCase:
     """Read and check a case with all its studies.
 
-    `replicas` takes the place of those that the system's study states, and those beside it where the
-    case states none.
+    `replicas` takes the place of those that the system's study states, and of those beside it
+    where the case states none.
 
     Raises
     ------
