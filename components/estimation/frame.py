@@ -53,10 +53,22 @@ def pose_in_frame(
         turned[:, j] = np.array(ned_to_body_unchecked(n, e, d, *attitude_rad))
     moves = None
     if velocity_m_s is not None:
-        # Along the axes of the frame, whose components in the Earth's axes are `here`.
-        in_space = sum(v * axis for v, axis in zip(velocity_m_s, there, strict=True))
-        moves = np.array([_dot(in_space, axis) for axis in here])
+        moves = _along_others(velocity_m_s, there, here)
     return SensorPose(np.array([north, east, -up]), turned, moves)
+
+
+def vectors_in_frame(
+    origin_deg_m: FloatArray, position_deg_m: FloatArray, vector: FloatArray
+) -> FloatArray:
+    """Return vectors along the horizon's axes at places, (3, n), along those of frames."""
+    here, there = ned_axes(*origin_deg_m[:2]), ned_axes(*position_deg_m[:2])
+    return _along_others(vector, there, here)
+
+
+def _along_others(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
+    """Return vectors along new axes, of those along old ones, both told in the Earth's axes."""
+    in_space = sum(v * axis for v, axis in zip(vector, old, strict=True))
+    return np.array([_dot(in_space, axis) for axis in new])
 
 
 def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:

@@ -23,15 +23,19 @@ _NEAREST_M = 1e-3
 
 @dataclass(frozen=True)
 class Kind:
-    """Which quantities are measured, in this order: azimuth, elevation, range, range rate."""
+    """Which are measured, in this order: azimuth, elevation, range, range rate, sinking.
+
+    How fast the target sinks is along the frame's third axis.
+    """
 
     has_range: bool = True
     has_range_rate: bool = False
+    has_sinking: bool = False
 
     @property
     def size(self) -> int:
         """How many quantities there are."""
-        return 2 + self.has_range + self.has_range_rate
+        return 2 + self.has_range + self.has_range_rate + self.has_sinking
 
 
 def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
@@ -47,7 +51,10 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
     if kind.has_range:
         seen[2] = distance
     if kind.has_range_rate:
-        seen[-1] = _along(away, _closing(state, pose)) / np.maximum(distance, _NEAREST_M)
+        closing = _closing(state, pose)
+        seen[2 + kind.has_range] = _along(away, closing) / np.maximum(distance, _NEAREST_M)
+    if kind.has_sinking:
+        seen[-1] = state[5]
     return seen
 
 
@@ -63,7 +70,8 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     seen = np.empty((kind.size, state.shape[-1]))
     np.arctan2(y, x, out=seen[0])
     np.arctan2(-z, level, out=seen[1])
-    jacobian = np.zeros((kind.size, 6 if kind.has_range_rate else 3, state.shape[-1]))
+    moving = kind.has_range_rate or kind.has_sinking
+    jacobian = np.zeros((kind.size, 6 if moving else 3, state.shape[-1]))
     level_square = safe * safe
     steep = z / (safe * square)
     term = np.empty_like(away)
@@ -85,9 +93,13 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     if kind.has_range_rate:
         closing = _closing(state, pose)
         rate = _along(away, closing) / distance
-        seen[-1] = rate
-        jacobian[-1, :3] = (closing - rate * unit) / distance
-        jacobian[-1, 3:6] = unit
+        row = 2 + kind.has_range
+        seen[row] = rate
+        jacobian[row, :3] = (closing - rate * unit) / distance
+        jacobian[row, 3:6] = unit
+    if kind.has_sinking:
+        seen[-1] = state[5]
+        jacobian[-1, 5] = 1.0
     return seen, jacobian
 
 

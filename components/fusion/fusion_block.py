@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import unit_vectors
-from components.messages.columns import OWN_VELOCITY, POSE
+from components.messages.columns import OWN_VELOCITY, POSE, TARGET_VELOCITY
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.false_detections import true_entries
@@ -15,6 +15,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.navigation.errors import navigation_errs
 from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
+from dsa_des.arrays.run_ticks import RunTicks, ranks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -70,6 +71,7 @@ class Fusion(Component):
             for name in reversed(best_angles)
             if offers[name].measures_range_rate
         ]
+        self._told_velocity = any(offer.measures_velocity for offer in offers.values())
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
         #: How long before a detection another one may have come to be put together with it.
         self.keep_ticks = self.gate_ticks
@@ -98,10 +100,6 @@ class Fusion(Component):
             for one in self.context.producers
         }
 
-    def serves_replicas(self) -> bool:
-        """Say no to a gate that would reach from one replica into the one before."""
-        return super().serves_replicas() and self.window_s() <= self.context.duration_s
-
     def window_s(self) -> Any:
         """Return how old a detection may be and still be put together with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
@@ -109,7 +107,7 @@ class Fusion(Component):
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
         for name, seen in self._recent.items():
-            if ended := int(np.searchsorted(seen.tick, wake.first_run * wake.span_ticks)):
+            if ended := int(np.searchsorted(seen.message.run, wake.first_run)):
                 rows = slice(ended, None)
                 self._recent[name] = Arrivals(name, seen.tick[rows], seen.message.take(rows))
         for name, new in arrivals.items():
@@ -117,27 +115,27 @@ class Fusion(Component):
             if old is not None:
                 message = Detections.concatenate([old.message, new.message])
                 ticks = np.concatenate([old.tick, new.tick])
-                if bool((ticks[1:] < ticks[:-1]).any()):  # those of each replica together
-                    order = np.argsort(ticks, kind="stable")
+                order = RunTicks(message.run, ticks).order()
+                if order is not None:  # those of each run together
                     ticks, message = ticks[order], message.take(order)
                 new = Arrivals(name, ticks, message)
             self._recent[name] = new
-        latest = max(int(wake.own_ticks(new.tick).max()) for new in arrivals.values())
+        latest = max(int(new.tick.max()) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            young = np.flatnonzero(wake.own_ticks(seen.tick) >= latest - self.keep_ticks)
+            young = np.flatnonzero(seen.tick >= latest - self.keep_ticks)
             self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
         return dict(sorted(together.items()))
 
     def combine(
         self,
-        ticks: IntArray,
+        instants: RunTicks,
         row: IntArray,
         target: IntArray,
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Build the fused rows from the best of what belongs together."""
+        """Build the fused rows of some instants from the best of what belongs together."""
         count = len(row)
         contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
@@ -147,6 +145,7 @@ class Fusion(Component):
         measured_tick = np.zeros(count, dtype=np.int64)
         pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
         moves = np.full((3, count), np.nan) if self._with_pose and self.by_range_rate else None
+        told = np.full((len(TARGET_VELOCITY), count), np.nan) if self._told_velocity else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self.by_angles:
             name = self.sensors[index]
@@ -163,6 +162,9 @@ class Fusion(Component):
             if name in found and len(found[name]):
                 range_source[found[name]] = index
                 _copy(values, _RANGES, found[name], arrivals[name], entries[name])
+                if told is not None:
+                    chosen = entries[name][found[name]]
+                    told[:, found[name]] = told_velocities(arrivals[name].message)[:, chosen]
         for index in self.by_range_rate:
             name = self.sensors[index]
             if name in found and len(found[name]):
@@ -172,8 +174,9 @@ class Fusion(Component):
                     moves[:, found[name]] = velocities(arrivals[name].message)[:, chosen]
         message = FusedWithPose if self._navigation_errs else FusedDetections
         return message(
-            tick=ticks,
-            offsets=offsets_of(row, len(ticks)),
+            tick=instants.tick,
+            run=instants.run,
+            offsets=offsets_of(row, len(instants)),
             target=target,
             contributors=contributors,
             angle_source=angle_source,
@@ -184,6 +187,7 @@ class Fusion(Component):
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
+            target_velocity=None if told is None else dict(zip(TARGET_VELOCITY, told, strict=True)),
             **values,
         )
 
@@ -208,6 +212,13 @@ def velocities(message: Detections) -> FloatArray:
     if velocity is None:
         return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)
     return np.stack(list(velocity.values()))
+
+
+def told_velocities(message: Detections) -> FloatArray:
+    """Return what each entry is told of its target's velocity, (6, entries); NaN for nothing."""
+    if message.target_velocity is None:
+        return np.full((len(TARGET_VELOCITY), len(message.target)), np.nan)
+    return np.stack([message.target_velocity[name] for name in TARGET_VELOCITY])
 
 
 def _copy(
@@ -235,25 +246,25 @@ def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
 
 
 def latest_in_gate(
-    arrivals: Arrivals, ticks: IntArray, targets: IntArray, gate_ticks: int
+    arrivals: Arrivals, asked: RunTicks, targets: IntArray, gate_ticks: int
 ) -> IntArray:
     """Return the latest entry that arrived at the instant or at most `gate_ticks` before it."""
     counts = np.diff(arrivals.message.offsets)
     if not counts.any():
-        return np.full(len(ticks), -1, dtype=np.int64)
+        return np.full(len(asked), -1, dtype=np.int64)
     # Ranks of instants stay small where ticks times targets would overflow.
-    instants, rank = np.unique(np.concatenate([arrivals.tick, ticks]), return_inverse=True)
-    span = len(instants)
-    entry_tick = np.repeat(arrivals.tick, counts)
-    entry_key = arrivals.message.target * span + np.repeat(rank[: len(arrivals.tick)], counts)
+    (came, now), span = ranks(arrivals.instants, asked)
+    row = np.repeat(np.arange(len(counts)), counts)
+    entry_key = arrivals.message.target * span + came[row]
     order = np.argsort(entry_key, kind="stable")
-    asked = targets * span + rank[len(arrivals.tick) :]
-    place = np.searchsorted(entry_key[order], asked, side="right") - 1
+    place = np.searchsorted(entry_key[order], targets * span + now, side="right") - 1
     entry = order[np.maximum(place, 0)]
+    of = row[entry]
     fits = (
         (place >= 0)
         & (arrivals.message.target[entry] == targets)
-        & (ticks - entry_tick[entry] <= gate_ticks)
+        & (arrivals.message.run[of] == asked.run)
+        & (asked.tick - arrivals.tick[of] <= gate_ticks)
     )
     return np.where(fits, entry, -1)
 

@@ -109,6 +109,10 @@ OWN_VELOCITY = {
 }
 
 
+#: The keys of `Detections.target_velocity`: m/s, and mean square errors, m²/s².
+TARGET_VELOCITY = ("north", "east", "down", "north_variance", "east_variance", "down_variance")
+
+
 def target_names(message: Any) -> Text:
     """Return the names of a message's targets, entry by entry."""
     return Text(message.target, message.roster.names)

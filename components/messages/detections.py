@@ -81,11 +81,15 @@ class LastingPart:
         Infinite for what stays the same throughout a run.
     across_m2 : float
         Variance of a place across the line of sight: that of an angle is it over the range squared.
+    share : float
+        Share of the variance that a report states, where that differs from report to report;
+        `variance` is added to it, and may be below 0 then: what of it is no part of this one.
     """
 
     variance: float = 0.0
     lasts_s: float = math.inf
     across_m2: float = 0.0
+    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,8 @@ class SensorOffer:
         Where it looks, in the ownship's body axes; None where it does not say.
     lasting : mapping of LastingError, or None
         What of its errors lasts from look to look, by quantity (``azimuth``, ``elevation``,
-        ``range``, ``range_rate``), those without are new at every look; None where it does not say.
+        ``range``, ``range_rate``, ``velocity``, ``climb``), those without are new at every look;
+        None where it does not say.
     clock : callable or None
         Returns when it looks. Asked only where it matters, and no part of the word that replicas
         compare: whoever reads clocks that differ cannot be shared by them.
@@ -136,6 +141,8 @@ class SensorOffer:
     unstated_across_m2 : float
         Variance of the ownship's own place across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
+    measures_velocity : bool
+        Whether its detections may have a `target_velocity`.
     """
 
     measures_range: bool
@@ -153,6 +160,7 @@ class SensorOffer:
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
     unstated_across_m2: float = 0.0
+    measures_velocity: bool = False
 
 
 def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
@@ -213,6 +221,9 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
+    target_velocity : dict of (entries,), or None
+        The target's own velocity over ground, where a sensor is told it (`TARGET_VELOCITY`), along
+        the axes of the horizon where the ownship believes to be; NaN where it is not told.
     looks : dict of (rows, targets), or None
         Every look at every target (`components.messages.looks`), where they are recorded.
     roster : Roster
@@ -253,6 +264,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     )
     own_velocity_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
+    target_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
     def tables(self) -> dict[str, Columns]:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from components.geometry.angles import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.messages.reach import Reach
+from components.navigation.errors import navigation_noise
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import rising_elevations
@@ -42,7 +43,6 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.gauss_markov import GaussMarkov
-from dsa_des.time.timeline import first_scan, own_scans
 
 #: A rate of climb is that of the reported altitude over so long.
 CLIMB_OVER_S = 5.0
@@ -174,9 +174,15 @@ class Active(CooperativeSensor):
     def offer(self, port: str) -> Any:
         """Say that variances differ from answer to answer, and what of the range's lasts."""
         offer: SensorOffer = super().offer(port)
+        # The delay of a transponder and the error of an altimeter stay; of a range what is stated
+        # beyond the other errors, of an elevation nearly all.
         lasting = {
-            "range": LastingError(parts=(LastingPart(RANGE_ERROR_M**2, RANGE_CORRELATION_S),))
-        }
+            "range": LastingError(parts=(
+                LastingPart(RANGE_ERROR_M**2, RANGE_CORRELATION_S),
+                LastingPart(-(RANGE_ERROR_M**2), share=1.0),
+            )),
+            "elevation": LastingError(parts=(LastingPart(share=1.0),)),
+        }  # fmt: skip
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
@@ -221,11 +227,11 @@ class Active(CooperativeSensor):
             return np.ones(len(which), dtype=bool)
         every = self.p.far_every
         turn = (cells.roster.keys_of(cells.target[which]) % np.uint64(every)).astype(np.int64)
-        due = (own_scans(cells.scan[which]) + turn) % every == 0
+        due = (cells.scan[which] + turn) % every == 0
         rest = which[~due]
         if len(rest):
             period_s = 1.0 / float(self.p.scan_rate_hz)
-            since_s = (own_scans(cells.scan[rest]) + turn[~due]) % every * period_s
+            since_s = (cells.scan[rest] + turn[~due]) % every * period_s
             ranges, known = [], np.ones(len(rest), dtype=bool)
             for ago_s in (since_s, since_s + every * period_s):
                 then = cells.seen_at(rest, -ago_s)
@@ -240,15 +246,15 @@ class Active(CooperativeSensor):
         """Return who answered in any of the last ten rounds; a run begins with one that is full."""
         last = cells.state_ns[which] // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
-        begin = first_scan(1) * cells.replica[which]
+        run = np.repeat(cells.run[which], ROUNDS)
         keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
-        drawn = self._answers.uniform(keys, (begin[:, np.newaxis] + rounds).reshape(-1))
+        drawn = self._answers.of_runs(run).uniform(keys, rounds.reshape(-1))
         p = answered_in_round(in_1_s)[:, np.newaxis]
         return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
 
     def _who(self, cells: Cells, which: AnyArray) -> Who:
         keys = cells.roster.keys_of(cells.target[which])
-        return Who(keys, cells.replica[which], cells.craft[which])
+        return Who(keys, cells.run[which], cells.craft[which])
 
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
@@ -276,7 +282,7 @@ class Active(CooperativeSensor):
         if not self._errs:
             return range_m
         who = self._who(cells, which)
-        drawn = self._ranges(who.keys, instant_ns, replica=who.replica)
+        drawn = self._ranges(who.keys, instant_ns, run=who.run)
         bias = np.where(cells.roster.equipage.mode_s[who.craft], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
@@ -293,7 +299,8 @@ class Active(CooperativeSensor):
         own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
         distance = self.measured_range_m(cells, found)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
-        drawn = self._bearings.normal(cells.roster.keys_of(cells.target[found]), cells.scan[found])
+        keys, bearings = cells.roster.keys_of(cells.target[found]), self._bearings
+        drawn = bearings.of_runs(cells.run[found]).normal(keys, cells.scan[found])
         # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
         turned = own.yaw_rad - cells.own_attitude[0][found]
         bearing = cells.azimuth_rad[found] + turned + deviation * np.clip(drawn, -CUT, CUT)
@@ -326,7 +333,10 @@ class Active(CooperativeSensor):
             return least, least, least
         mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
         step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
-        across = (np.hypot(ned[0], ned[1]) * deviation) ** 2
-        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2
+        # The altitude is that of no pose; bearing and range are counted from the ownship's own.
+        position_m, attitude_rad = navigation_noise(self.context)
+        place_m2 = max(position_m[:2]) ** 2
+        across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
+        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
         high = (altimetry_variance_ft2(altitude_m / FOOT_M) + step**2 / 12.0) * FOOT_M**2
         return np.maximum(across, _LEAST_M2), along, high

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.geometry.ellipsoid import line_of_sight_ned
-from components.messages.columns import OWN_VELOCITY
-from components.messages.detections import Detections, SensorOffer
+from components.messages.columns import OWN_VELOCITY, TARGET_VELOCITY
+from components.messages.detections import Detections, LastingError, LastingPart, SensorOffer
 from components.messages.reach import Reach
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
@@ -23,7 +23,13 @@ from components.surveillance.believed_line import (
     towards,
     variances_in_body,
 )
-from components.surveillance.broadcast import Broadcasts, Sent, Who
+from components.surveillance.broadcast import (
+    CLIMB_SCALE_M_S,
+    CORRELATION_TIME_S,
+    Broadcasts,
+    Sent,
+    Who,
+)
 from components.surveillance.cooperative import (
     PLACE,
     STEP_S,
@@ -41,7 +47,6 @@ from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
-from dsa_des.time.timeline import first_scan
 
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
@@ -185,8 +190,21 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=None, unstated_across_m2=0.0,
+            lasting=self._lasting(), unstated_across_m2=0.0, measures_velocity=True,
         )  # fmt: skip
+
+    def _lasting(self) -> dict[str, LastingError]:
+        """Return what lasts of what aircraft say: all but rounding, which is taken to last too."""
+        if self.p.position_errors == "none":
+            return {}
+        lasts_s = {"elevation": math.inf}  # an aircraft keeps its altimeter
+        if self.p.position_errors == "gauss_markov":
+            for name in ("azimuth", "range", "range_rate", "velocity"):
+                lasts_s[name] = CORRELATION_TIME_S
+        return {
+            name: LastingError(parts=(LastingPart(lasts_s=time_s, share=1.0),))
+            for name, time_s in lasts_s.items()
+        }
 
     @property
     def steps(self) -> dict[str, float]:
@@ -201,7 +219,7 @@ class AdsB(CooperativeSensor):
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
         equipage = cells.roster.equipage
-        who = Who(cells.roster.keys_of(cells.target), cells.replica, cells.craft)
+        who = Who(cells.roster.keys_of(cells.target), cells.run, cells.craft)
         here_ns = cells.state_ns
         extras = unreported(len(cells))
         own_velocity = np.full((3, len(cells)), np.nan)
@@ -235,7 +253,7 @@ class AdsB(CooperativeSensor):
         count = math.ceil(int((here_ns[asked] - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         those = who.take(asked)
         number, sent_ns, counts = self._clocks[kind].latest(
-            those.keys, those.replica, here_ns[asked], count
+            those.keys, those.run, here_ns[asked], count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
         counts &= sent_ns < (equipage.silent_after_s[those.craft] * NANOSECONDS)[:, np.newaxis]
@@ -245,9 +263,8 @@ class AdsB(CooperativeSensor):
         each = asked[row]
         ahead_s = (sent_ns[row, place] - here_ns[each]) / NANOSECONDS
         then = cells.seen_at(each, ahead_s)
-        drawn = self._received[kind].uniform(
-            those.keys[row], first_scan(1) * those.replica[row] + number[row, place]
-        )
+        stream = self._received[kind].of_runs(those.run[row])
+        drawn = stream.uniform(those.keys[row], number[row, place])
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:
             came &= ~then["hidden"]
@@ -367,8 +384,25 @@ class AdsB(CooperativeSensor):
             "range_variance_m2": variances[2],
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
+            "target_velocity": self._told_velocity(cells, found, said, moving, rate_variance),
         }
         return azimuth, elevation, distance, beside
+
+    def _told_velocity(
+        self,
+        cells: Cells,
+        found: IntArray,
+        said: dict[str, AnyArray],
+        moving: FloatArray,
+        variance: FloatArray,
+    ) -> dict[str, FloatArray]:
+        """Return velocities as `TARGET_VELOCITY`; since they were sent aircraft may have turned."""
+        age_s = cells.state_ns[found] / NANOSECONDS - said["velocity_s"]
+        turned = (_MANOEUVRE_M_S2 * age_s) ** 2
+        climb = 2.0 * CLIMB_SCALE_M_S**2 if self.p.position_errors != "none" else _LEAST_M2
+        climb += (64.0 * FOOT_M / 60.0) ** 2 / 12.0 if self.p.compact else 0.0
+        spread = [variance + turned, variance + turned, climb + turned]
+        return dict(zip(TARGET_VELOCITY, [*moving, *spread], strict=True))
 
     def _variances(
         self,
@@ -406,11 +440,17 @@ class AdsB(CooperativeSensor):
             row, velocity = self._rows
             some = np.flatnonzero(np.isfinite(velocity[0]))
             moves[:, row[some]] = velocity[:, some]
-        return replace(report, own_velocity=dict(zip(OWN_VELOCITY, moves, strict=True)))
+        told = report.target_velocity
+        if told is None:
+            told = {name: np.zeros(0) for name in TARGET_VELOCITY}
+        own = dict(zip(OWN_VELOCITY, moves, strict=True))
+        return replace(report, own_velocity=own, target_velocity=told)
 
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
 _UNKNOWN_M_S = 100.0
+#: How much aircraft change their velocity on the way from a message to a scan, a deviation.
+_MANOEUVRE_M_S2 = 1.0
 #: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
 _LEAST_M2 = 1e-4

@@ -59,7 +59,7 @@ def gated_pairs(
     direction = None
     some_angle_only = bool((~part.ranged).any())
     spread = _PairVariance(rules, part, pose, scans)
-    for code in np.flatnonzero(np.bincount(batch.code, minlength=4)).tolist():
+    for code in np.flatnonzero(np.bincount(batch.code)).tolist():
         mine = np.flatnonzero(batch.code == code)
         # What an angle-only track expects of a range says nothing: there the direction decides.
         for ranged in (True, False) if some_angle_only and code & 1 else (None,):
@@ -254,7 +254,7 @@ def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> Floa
     mine = sensors[one.detection]
     lowest = mine & -mine
     sensor = np.frexp(lowest.astype(float))[1] - 1
-    code = one.kind.has_range + 2 * one.kind.has_range_rate
+    code = one.kind.has_range + 2 * one.kind.has_range_rate + 4 * one.kind.has_sinking
     return np.asarray(rules.log_density[code].take(sensor))
 
 

@@ -274,14 +274,18 @@ def _update_by_rates(
     state: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Update new tracks by their measured range rates, in pose."""
-    which = np.flatnonzero(codes >= 2)
+    """Update new tracks by their measured range rates, in pose, and by velocities."""
+    told = np.flatnonzero(codes & 4)
+    for axis in (3, 4, 5) if len(told) else ():
+        state[axis, told] = scans.measured[axis + 1, detection[told]]
+        covariance[axis, axis, told] = scans.variance[axis + 1, detection[told]]
+    which = np.flatnonzero(codes & 2)
     if len(which) == 0:
         return
     kind, _ = kind_of(2)
     known, slope = linearised(kind, selected(state, which), pose.take(which))
     cells = detection[which]
-    rate, variance = selected(scans.measured[3:], cells), selected(scans.variance[3:], cells)
+    rate, variance = selected(scans.measured[3:4], cells), selected(scans.variance[3:4], cells)
     found = innovation(known[2:], slope[2:], selected(covariance, which), variance)
     state[:, which], covariance[:, :, which] = updated(
         selected(state, which), selected(covariance, which), found, rate - known[2:]

@@ -20,20 +20,21 @@ from components.messages.reach import Reach
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 
-_QUANTITIES = ("azimuth", "elevation", "range", "range_rate")
+_QUANTITIES = ("azimuth", "elevation", "range", "range_rate", "velocity", "climb")
+# Which of these each row of `Scans.measured` is.
+_OF_ROW = np.array([0, 1, 2, 3, 4, 4, 5])
 
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
     """What of each sensor's errors lasts."""
 
-    step: FloatArray  # (4 quantities, sensors), of the grid; 0 for none
-    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
+    step: FloatArray  # (6 quantities, sensors), of the grid; 0 for none
+    # (parts, 6 quantities, sensors), as in `LastingPart`; 0 where there is none
     variance: FloatArray
-    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
     lasts_s: FloatArray
-    # (parts, 4 quantities, sensors), as in `LastingPart`; 0 where there is none
     across_m2: FloatArray
+    share: FloatArray
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
@@ -48,14 +49,14 @@ class LastingErrors:
             return None
         most = max(len(one.parts) for one in known.values())
         step = np.zeros((len(_QUANTITIES), len(sensors)))
-        variance, across_m2 = np.zeros((2, most, *step.shape))
+        variance, across_m2, share = np.zeros((3, most, *step.shape))
         lasts_s = np.full(variance.shape, np.inf)
         for cell, one in known.items():
             step[cell] = one.step
             for k, part in enumerate(one.parts):
                 variance[k][cell], across_m2[k][cell] = part.variance, part.across_m2
-                lasts_s[k][cell] = part.lasts_s
-        return cls(step, variance, lasts_s, across_m2)
+                lasts_s[k][cell], share[k][cell] = part.lasts_s, part.share
+        return cls(step, variance, lasts_s, across_m2, share)
 
     def common(
         self,
@@ -67,11 +68,14 @@ class LastingErrors:
         range_m: FloatArray,
     ) -> FloatArray:
         """Return the covariance of measurements' errors with those of their sensors' last ones."""
-        quantity = np.array(rows)[:, np.newaxis]
+        quantity = _OF_ROW[rows][:, np.newaxis]
         step, lasts_s = self.step[quantity, source], self.lasts_s[:, quantity, source]
         lasting = self.variance[:, quantity, source]
         if self.across_m2.any():
             lasting = lasting + self.across_m2[:, quantity, source] / np.maximum(range_m, 1.0) ** 2
+        if self.share.any():
+            share = self.share[:, quantity, source]
+            lasting = np.where(share > 0.0, np.maximum(lasting + share * variance, 0.0), lasting)
         rounding = step * step / 12.0
         white = np.maximum(variance - rounding - lasting.sum(axis=0), 0.0)
         safe = np.where(step > 0.0, step, 1.0)
@@ -159,8 +163,8 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
     use_range_rate: bool = Field(
         default=True,
-        description="Whether range rates are used where a sensor states them with a variance; not "
-        "those that fold, or that are exact.",
+        description="Whether range rates, and velocities that aircraft tell, are used where a "
+        "sensor states them with a variance; not those that fold, or that are exact.",
     )
     delete_misses: int = Field(
         default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
@@ -220,7 +224,7 @@ class TrackerRules:
     estimator: Estimator
     ticks_per_s: int
     fields: tuple[Reach | None, ...]  # where each sensor looks; None is everywhere
-    # (4, sensors): logarithm of the false alarms in a scan per unit of measured volume, by kind
+    # (8, sensors): logarithm of the false alarms in a scan per unit of measured volume, by kind
     log_density: FloatArray
     start_range_m: tuple[float, float]  # mean and deviation assumed of what is seen angle-only
     rates_of: int  # mask of the sensors whose range rates are used
@@ -288,8 +292,8 @@ def why_no_range_rates(p: TrackerParameters, offer: Any) -> str:
 
 
 def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
-    """Return the logarithm of false alarms per unit of measured volume, (4 kinds, sensors)."""
-    density = np.empty((4, len(fields)))
+    """Return the logarithm of false alarms per unit of measured volume, (8 kinds, sensors)."""
+    density = np.empty((8, len(fields)))
     for i, field in enumerate(fields):
         width, height, far = 2.0 * math.pi, math.pi, _FARTHEST_M
         if field is not None:
@@ -297,8 +301,9 @@ def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArr
             width = (high - low) % (2.0 * math.pi) or 2.0 * math.pi
             height = field.elevation_rad[1] - field.elevation_rad[0] or math.pi
             far = min(field.range_max_m, _FARTHEST_M)
-        for code in range(4):
+        for code in range(8):
             volume = width * height * (far if code & 1 else 1.0)
             volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
+            volume *= _WHOLE_RATE_M_S if code & 4 else 1.0
             density[code, i] = math.log(per_scan / volume)
     return density

@@ -7,10 +7,11 @@ from typing import Self
 import numpy as np
 
 from components.estimation.batched import selected
-from components.estimation.frame import SensorPose
+from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
-from components.messages.columns import POSE
+from components.messages.columns import POSE, TARGET_VELOCITY
 from components.messages.fused import FusedDetections
+from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -26,6 +27,7 @@ class Scans:
     """Looks in the order of their arrival, and their detections."""
 
     row: IntArray  # (looks,), at which row of the wake each arrived, ascending
+    run: IntArray  # (looks,), of the scene
     tick: IntArray  # (looks,), when it was made
     sensors: IntArray  # (looks,), mask of the sensors that looked
     tells_misses: BoolArray  # (looks,) of bool, whether what is not among its detections was missed
@@ -36,24 +38,43 @@ class Scans:
     # where a look measured no range rate
     velocity: FloatArray
     offsets: IntArray  # (looks + 1,), detections ``offsets[i]:offsets[i + 1]`` belong to look i
-    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
+    # (7, detections), azimuth, elevation, range, range rate, and the target's velocity (north,
+    # east, down of the ownship's place); NaN where not measured
     measured: FloatArray
-    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
-    variance: FloatArray
+    variance: FloatArray  # (7, detections), the same
     contributors: IntArray
-    source: IntArray  # (4, detections), index of the sensor that gave each quantity; -1 for none
+    source: IntArray  # (7, detections), index of the sensor that gave each quantity; -1 for none
 
     def __len__(self) -> int:
         return len(self.row)
 
     def kinds(self, rates_of: int) -> IntArray:
-        """Return the kind of each detection: 1 with a range, 2 more with a range rate."""
+        """Return the kind of each detection: 1 with a range, 2 more with a range rate, 4 sinking.
+
+        Of a velocity that is told, and errs in the same way for minutes, a track takes over all
+        when it is born, and then only how fast the target sinks: what lasts of a velocity's error
+        adds up in the position, which a filter that takes it for new does not know.
+        """
         code = (~np.isnan(self.measured[2])).astype(np.int64)
         if rates_of and not np.isnan(self.velocity).all():
             moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
             used = moves & (self.variance[3] > 0.0) & ~np.isnan(self.measured[3])
             code += 2 * (used & (self.contributors & ~rates_of == 0))
+        told = ~np.isnan(self.measured[4:]).any(axis=0)
+        if rates_of and told.any():
+            told &= (self.variance[4:] > 0.0).all(axis=0) & (code & 1 > 0)
+            code = np.where(told, 5, code)
         return code
+
+    def in_frame(self, origin_deg_m: FloatArray) -> Self:
+        """Return the looks with targets' velocities along the axes of frames with some origins."""
+        if np.isnan(self.measured[4:]).all():
+            return self
+        look = np.repeat(np.arange(len(self)), np.diff(self.offsets))
+        measured = self.measured.copy()
+        places = selected(self.pose[:3], look)
+        measured[4:] = vectors_in_frame(selected(origin_deg_m, look), places, measured[4:])
+        return replace(self, measured=measured)
 
     def take(self, looks: IntArray) -> Self:
         """Return some looks with their detections."""
@@ -61,7 +82,8 @@ class Scans:
         offsets = np.concatenate(([0], np.cumsum(counts)))
         which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
         return type(self)(
-            self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
+            self.row[looks], self.run[looks], self.tick[looks], self.sensors[looks],
+            self.tells_misses[looks],
             selected(self.pose, looks), selected(self.velocity, looks), offsets,
             selected(self.measured, which), selected(self.variance, which),
             self.contributors[which], self.source.take(which, axis=-1),
@@ -71,7 +93,7 @@ class Scans:
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the looks of all parts, one after the other."""
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
-        names = ("row", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
+        names = ("row", "run", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
                  "variance", "contributors", "source")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
         return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
@@ -117,8 +139,9 @@ class LookBatch:
 
 def kind_of(code: int) -> tuple[Kind, list[int]]:
     """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
-    kind = Kind(bool(code & 1), bool(code & 2))
-    return kind, [0, 1, *([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
+    kind = Kind(bool(code & 1), bool(code & 2), bool(code & 4))
+    rows = [*([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
+    return kind, [0, 1, *rows, *([6] if kind.has_sinking else [])]
 
 
 def scans_of(fused: FusedDetections) -> Scans:
@@ -167,12 +190,16 @@ def scans_of(fused: FusedDetections) -> Scans:
     np.bitwise_or.at(union, number, sensors[order])
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
-    measured = np.stack([getattr(fused, name) for name in _MEASURED])
-    variance = np.stack([getattr(fused, name) for name in _VARIANCES])
+    told = np.full((len(TARGET_VELOCITY), len(mask)), np.nan)
+    if fused.target_velocity is not None:
+        told = np.stack([fused.target_velocity[name] for name in TARGET_VELOCITY])
+    measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *told[:3]])
+    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *told[3:]])
     seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
+        run=fused.run[key[0][begins]],
         tick=key[1][begins],
         sensors=union,
         tells_misses=whole,
@@ -182,7 +209,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         measured=selected(measured, entries),
         variance=selected(variance, entries),
         contributors=mask[entries],
-        source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 2)[:, entries],
+        source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )
 
 
@@ -208,12 +235,11 @@ def when_made(
         return scans, None
     if ahead is not None:
         scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
-    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick + wait_ticks))
-    span = wake.span_ticks or np.iinfo(np.int64).max
-    of_look = scans.tick // span
+    due = RunTicks(scans.run, scans.tick + wait_ticks)
+    row = np.maximum(scans.row, next_of_run(wake.instants, due))
     there = np.minimum(row, len(wake) - 1)
-    ready = (row < len(wake)) & (wake.replica[there] == of_look)
-    waiting = ~ready & (of_look >= wake.first_run)
+    ready = (row < len(wake)) & (wake.run[there] == scans.run)
+    waiting = ~ready & (scans.run >= wake.first_run)
     order = np.lexsort((scans.sensors, scans.tick, row))
     done = replace(scans, row=row).take(order[ready[order]])
     return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None

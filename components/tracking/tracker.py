@@ -167,8 +167,7 @@ class Tracker(Component):
         scans, self._ahead = when_made(came, self._ahead, wake)
         if len(scans) == 0:
             return None
-        replica = wake.replica[scans.row]
-        records = self._records.continued(records_of(replica, scans.pose[:3]))
+        records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         past = self._past
         begin = 0
@@ -177,8 +176,7 @@ class Tracker(Component):
         if past is not None and past.replica == records.replica[0]:
             begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
             scans = Scans.joined([past.scans, scans])
-            replica = np.concatenate([np.full(begin, past.replica), replica])
-        of = np.searchsorted(records.replica, replica)
+        of = np.searchsorted(records.replica, scans.run)
         if not self._remembers:
             plan, left_out = straight_plan(scans, of, records.tick)
         else:
@@ -189,6 +187,7 @@ class Tracker(Component):
         origin = selected(records.origin, of)
         poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
+        turned = scans.in_frame(origin)
         reported: list[Reported] = []
         for works in turns(plan.of):
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
@@ -198,7 +197,7 @@ class Tracker(Component):
                 old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
                 store, records.next_number[of_late], gone = late_step(
                     self.rules, self._association, store, old,
-                    LookBatch.of_looks(scans, plan.look[late], replicas, codes, poses),
+                    LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 in_vain = scans.sensors[plan.look[late[gone]]]
@@ -209,7 +208,7 @@ class Tracker(Component):
             if len(looks):
                 store, records.next_number[mine] = step(
                     self.rules, self._association, store,
-                    LookBatch.of_looks(scans, looks, records.replica[mine], codes, poses),
+                    LookBatch.of_looks(turned, looks, records.replica[mine], codes, poses),
                     records.next_number[mine],
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]

@@ -123,6 +123,8 @@ class Case:
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
     #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
+    #: How near a track must be to be a target's: coarse bearings err by more than that of others.
+    within_m: float = 300.0
 
 
 _EKF = {"type": "tracking.ekf", **STILL}
@@ -174,6 +176,17 @@ def _closing() -> list[dict[str, Any]]:
     return found
 
 
+ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "range_km": 40.0}
+ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0]}
+#: Far enough apart for bearings of 9 degrees.
+_EQUIPPED = [
+    {**STRAIGHT, "name": f"equipped{i}", "east_m": east, "north_m": north, "heading_deg": heading,
+     "mode_s": True, "ads_b": {"nacp": 8 + i, "nacv": 1 + i}}
+    for i, (east, north, heading) in enumerate(
+        ((-4000.0, -3000.0, 100.0), (3000.0, -9000.0, 330.0), (-8000.0, 2500.0, 200.0))
+    )
+]  # fmt: skip
+
 _BIASES = {"azimuth_bias_deg": 1.0, "elevation_bias_deg": 1.0, "range_bias_m": 40.0,
            "scan_rate_hz": 5}  # fmt: skip
 _LASTING = {f"{name}_correlation_time_s": 5.0 for name in ("azimuth", "elevation", "range")} | {
@@ -213,13 +226,17 @@ CASES = {
     "lasting": Case("a radar with errors that last 5 s, ekf", _EKF,
                     sensors={"radar": {**RADAR, **_LASTING}}),
     "near": Case("passes at 240 m, ekf", _EKF, [NEAR]),
+    "ads_b": Case("ADS-B of NACp 8, 9 and 10 at 1 Hz, ekf", {"type": "tracking.ekf"},
+                  _EQUIPPED, sensors={"ads_b": ADS_B}),
+    "active": Case("active surveillance of Mode S at 1 Hz, ukf", {"type": "tracking.ukf"},
+                   _EQUIPPED[:1], sensors={"active": ACTIVE}, within_m=3000.0),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip
 
 _DURATION_S = 37
 INSTANTS_S = np.arange(12.0, 37.0, 4.0)
 _FLIGHTS = 10
-_AHEAD_S, _WITHIN_M = 5.0, 300.0
+_AHEAD_S = 5.0
 #: A NEES of an honest track is above this once in 10^10.
 _LOST_ABOVE = 60.0
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
@@ -310,18 +327,19 @@ def _tracks(scenes: list[Any]) -> list[Any]:
 def nees_of(case: Case, replicas: int) -> FloatArray:
     """Return the NEES of every target's track, (targets of all replicas, instants).
 
-    NaN where no confirmed track with a range lies within 300 m, now and 5 s ahead in the mean.
+    NaN where no confirmed track with a range lies within `Case.within_m`, 300 m but for coarse
+    bearings, now and 5 s ahead in the mean.
     """
     found: list[FloatArray] = []
     with tempfile.TemporaryDirectory() as folder:
         for scenes in _scenes(case, replicas, Path(folder)):
             targets = traffic_of(scenes[0])[0].targets
             for table in _tracks(scenes):
-                found.append(_of_run(table, targets))
+                found.append(_of_run(table, targets, case.within_m))
     return np.concatenate(found)
 
 
-def _of_run(table: Any, targets: list[Any]) -> FloatArray:
+def _of_run(table: Any, targets: list[Any], within_m: float) -> FloatArray:
     columns: Callable[[str], Any] = lambda name: table[name].to_numpy(zero_copy_only=False)  # noqa: E731
     time_s = columns("time_s")
     # A track is taken as it is told by the first message at or after the instant.
@@ -346,7 +364,7 @@ def _of_run(table: Any, targets: list[Any]) -> FloatArray:
         for (i, j), name in COVARIANCE.items():
             spread[:, i, j] = spread[:, j, i] = part[name]
         for target, near in enumerate(away.argmin(axis=1).tolist()):
-            if away[target, near] < 2.0 * _WITHIN_M:
+            if away[target, near] < 2.0 * within_m:
                 e = error[target, :, near]
                 nees[target, k] = e @ np.linalg.solve(spread[near], e)
     return nees

@@ -9,7 +9,7 @@ import numpy as np
 
 from components.aircraft.known_targets import known_targets
 from components.foreign.fmu.message_columns import message_column
-from components.foreign.fmu.own_pose import own_columns
+from components.foreign.fmu.own_pose import own_columns, true_lines
 from components.foreign.fmu.parameters import FmuParameters
 from components.foreign.fmu.units import unit_of_column
 from components.foreign.signals import Signals
@@ -17,6 +17,7 @@ from components.messages.detections import Detections
 from components.messages.reach import Reach, farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.message import Message
@@ -169,10 +170,11 @@ class ForeignFmu(Component):
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
         values, traffic = self._values(wake)
-        seen_from = None
+        seen_from = truth = None
         if self.p.detections and self._sees_own:
             moves = wiring.detections.asks_for_velocity()
             seen_from, self._own = own_columns(wake, "messages", self._own, moves=moves)
+            truth = true_lines(wake, "messages", len(self._roster))
         if len(own) == 0:
             return None
         rows = np.ascontiguousarray(values[own])
@@ -182,7 +184,7 @@ class ForeignFmu(Component):
         answer = self._process.ask(
             {
                 "do": "run", "instance": self._number, "slot": self._saved.slot, "freed": freed,
-                "ticks": wake.own_ticks(wake.ticks)[own].tolist(), "per_s": wake.ticks_per_s,
+                "ticks": wake.ticks[own].tolist(), "per_s": wake.ticks_per_s,
                 "inputs": rows, "changed": changed.tolist(), "due": [due[row] for row in own],
                 "save": type(self).rewindable,
             },
@@ -197,9 +199,10 @@ class ForeignFmu(Component):
             answer[name] = answer[name][: len(own)]
         sent = self._messages(wake.ticks[own], answer, traffic, own)
         if self.p.detections:
-            seen_from = None if seen_from is None else seen_from[:, own]
+            if seen_from is not None and truth is not None:
+                seen_from, truth = seen_from[:, own], truth[:, own]
             sent["detections"] = wiring.detections.message(
-                wake.ticks[own], wake.scans[own], answer["numbers"], seen_from, self._roster
+                wake.ticks[own], wake.scans[own], answer["numbers"], seen_from, truth, self._roster
             )
         return sent
 
@@ -210,7 +213,7 @@ class ForeignFmu(Component):
 
     def _due(self, wake: Wake) -> list[list[int]]:
         """Return the clocks that tick at each row."""
-        per_s, ticks = wake.ticks_per_s, wake.own_ticks(wake.ticks)
+        per_s, ticks = wake.ticks_per_s, wake.ticks
         due: list[list[int]] = [[] for _ in ticks]
         for number, clock in enumerate(self.p.model.clocks.values()):
             given = self.p.clocks.get(clock.name)
@@ -319,7 +322,7 @@ class ForeignFmu(Component):
         self._told = told[-1].copy()
         names = list(self.p.manoeuvre)
         return Manoeuvres.at_rows(
-            ticks,
+            RunTicks.of_run(0, ticks),
             {
                 row: Manoeuvre(**dict(zip(names, told[row].tolist(), strict=True)))
                 for row in new.tolist()

@@ -1,0 +1,89 @@
+"""Tracks of what aircraft say of themselves: what lasts of it, and velocities that they tell."""
+
+import numpy as np
+import pytest
+from wired import chain, rows, run
+
+from docs.make.track_consistency import CASES, bounds, nees_of
+
+ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "reception": "certain"}
+KEA = {"name": "kea", "north_m": -9000, "east_m": -4000, "up_m": 200, "heading_deg": 80,
+       "speed_mps": 90, "climb_mps": 8, "ads_b": {"nacp": 9, "nacv": 3}}  # fmt: skip
+ERRS = {"attitude_noise_deg": [1.0, 1.0, 1.0], "position_noise_m": [20.0, 20.0, 20.0]}
+
+
+@pytest.mark.parametrize("case", ["ads_b", "active"])
+def test_covariances_are_honest(case):
+    """200 tracks: 6 in the mean, or less: a manoeuvring target is expected and flies straight."""
+    nees = nees_of(CASES[case], 200 // len(CASES[case].targets) + 1)
+    assert np.isnan(nees).mean() < 0.01
+    low, high = bounds(len(nees))
+    mean = float(np.nanmean(nees))
+    assert mean < high + 0.2 and mean > (0.7 * low)
+    assert (nees > 60.0).mean() < 0.02
+
+
+def tracked(target=KEA, tracker="tracking.ekf", duration_s=20, errors="gauss_markov", **keys):
+    scene = chain(
+        {"ether": {**ADS_B, "position_errors": errors}}, targets=[target], duration_s=duration_s,
+        fusion={"type": "fusion.pass_through"}, tracker={"type": tracker, **keys},
+    )  # fmt: skip
+    return rows(run(scene), "state_tracks")
+
+
+def velocity(row):
+    return np.array([row["north_m_s"], row["east_m_s"], row["down_m_s"]])
+
+
+TRUE = np.array([90.0 * np.cos(np.radians(80.0)), 90.0 * np.sin(np.radians(80.0)), -8.0])
+
+
+@pytest.mark.parametrize("tracker", ["tracking.ekf", "tracking.ukf", "tracking.imm"])
+def test_a_track_is_born_with_the_velocity_that_is_told(tracker):
+    told = velocity(tracked(tracker=tracker)[0])
+    assert np.abs(told - TRUE).max() < 4.0
+    alone = velocity(tracked(tracker=tracker, use_range_rate=False)[0])
+    assert np.abs(alone - TRUE).max() > 10.0
+
+
+def test_a_climb_is_told_and_kept():
+    found = tracked(duration_s=30, delete_after_s=10)
+    late = [velocity(row)[2] for row in found if row["time_s"] > 15.0]
+    assert np.mean(late) == pytest.approx(-8.0, abs=1.0) and np.std(late) < 1.5
+
+
+def test_errors_of_navigation_are_none_of_what_is_told():
+    """Whose place is told is there, however the ownship believes to be turned."""
+    radar = {"type": "radar.range_boundary", "scan_rate_hz": 1, "range_km": 30, "errors": "stated",
+             "quantised": False, "azimuth_error_deg": 0.5, "elevation_error_deg": 0.5,
+             "range_error_m": 10}  # fmt: skip
+    active = {"type": "surveillance.active", "scan_rate_hz": 1, "far_every": 1,
+              "elevation_deg": [-90, 90], "replies": "certain"}  # fmt: skip
+    scene = chain({"ether": ADS_B, "radar": radar, "active": active},
+                  targets=[{**KEA, "mode_s": True}], duration_s=6)  # fmt: skip
+    found = {}
+    for name, navigation in (("sure", {}), ("erring", ERRS)):
+        seen = run({**scene, "navigation": navigation} if navigation else scene)
+        for block in ("ether", "radar", "active"):
+            found[name, block] = np.array([
+                [row[f"{angle}_variance_rad2"] for angle in ("azimuth", "elevation")]
+                for row in rows(seen, block=block) if row["scan"] > 1
+            ]).mean(axis=0)  # fmt: skip
+    assert found["erring", "ether"] == pytest.approx(found["sure", "ether"], rel=0.1)
+    assert (found["erring", "radar"] > 3.0 * found["sure", "radar"]).all()
+    # Of active surveillance the bearing is turned with the nose, the altitude with nothing.
+    assert found["erring", "active"][0] > 1.005 * found["sure", "active"][0]
+
+
+def test_tracks_are_where_they_are_told_to_be_whatever_the_attitude():
+    def off(navigation):
+        scene = chain(
+            {"ether": {**ADS_B, "position_errors": "none"}}, targets=[KEA], duration_s=20,
+            fusion={"type": "fusion.pass_through"}, tracker={"type": "tracking.ekf"},
+            **({"navigation": navigation} if navigation else {}),
+        )  # fmt: skip
+        last = rows(run(scene), "state_tracks")[-1]
+        return np.array([last[name] for name in ("north_m", "east_m", "down_m")])
+
+    turned = {"attitude_noise_deg": [2.0, 2.0, 2.0]}
+    assert np.abs(off(turned) - off({})).max() < 3.0
