@@ -31,6 +31,7 @@ _TEXT = """
 and all else as above; {seeds} seeds each (the study as it is shipped has 1,000, and EO/IR is left
 out: no sensor of ours states a share of the range as its error):
 
+<!-- not run: 3,000 runs, some 15 minutes on a core -->
 ```
 dsa-des study degas_sensors
 ```
