@@ -201,8 +201,9 @@ def _signed(value: float) -> str:
 
 
 def draw_polar(
-    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str, title: str
-) -> None:
+    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str, title: str,
+    confidence: float,
+) -> None:  # fmt: skip
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     place = axes.index(axis)
     with drawing(6.2, 6.0, target) as figure:
@@ -227,6 +228,8 @@ def draw_polar(
             polar.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         polar.set_ylim(bottom=0.0)
         over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
+        if any(np.isfinite(line.estimate.low) for line in lines):
+            over += f"\nshaded: {100 * confidence:g} % interval"
         polar.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
             polar.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
@@ -274,18 +277,16 @@ def draw_cdf(
         axes = figure.add_subplot()
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
+            colour = _style(mark, number, len(shown))[0]
             if not len(ascending):
-                axes.plot(
-                    [],
-                    [],
-                    color=_style(mark, number, len(shown))[0],
-                    label=f"{series_label}: no value",
-                )
+                axes.plot([], [], color=colour, label=f"{series_label}: no value")
                 continue
             share = np.arange(1, len(ascending) + 1) / len(values)
+            # Wider the earlier: of curves that are alike all are seen.
+            wider = min(len(shown) - 1 - number, 3)
             axes.step(
                 np.concatenate((ascending[:1], ascending)), np.concatenate(([0.0], share)),
-                where="post", color=_style(mark, number, len(shown))[0], lw=1.4,
+                where="post", color=colour, lw=1.4 + 1.3 * wider,
                 label=_counted(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)

@@ -95,7 +95,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return True
     axis = figure.axis or axes[0]
     if figure.kind == "polar":
-        draw_polar(target, axes, lines, metric, axis, title)
+        draw_polar(target, axes, lines, metric, axis, title, confidence)
     else:
         own = tables.baseline is not None and tables.baseline[0] == axis
         compared = [c for c in tables.compared if own and c.result.name == metric]
