@@ -2,7 +2,7 @@
 
 import pytest
 
-from docs.make.published.track_bounds import BOUNDS, RANGES_NMI, draw, text_of, valid_to, verdict
+from docs.make.published.track_bounds import BOUNDS, RANGES_NMI, draw, text_of, valid_at, verdict
 
 #: At 1 and 6 nmi, in ft, kt and ft/min.
 BY_HAND = {
@@ -23,7 +23,7 @@ def lines(beyond: float | None) -> dict:
     """Lines that keep half of every bound, and are over it at ranges from `beyond` on."""
     found = {}
     for r in RANGES_NMI:
-        found["tracking.ekf", "radar", f"tracked.{r}"] = {"value": 0.9, "count": 50}
+        found["tracking.ekf", "radar", f"tracked.{r}"] = {"value": 0.9, "count": 50, "missing": 10}
         for name, _, _, bound in BOUNDS["radar"]:
             share = 2.0 if beyond is not None and r >= beyond else 0.5
             some = dict(zip(("low", "value", "high"), (0.8, 1.0, 1.2), strict=True))
@@ -45,12 +45,18 @@ def test_an_interval_lies_within_a_bound_or_not():
     assert [verdict(line, b) for b in (4.0, 3.0, 1.9)] == ["met", "not shown", "not met"]
 
 
-@pytest.mark.parametrize(("beyond", "reach"), [(None, 6.0), (6, 5.0), (3, 2.0), (1, 0.0)])
-def test_tracks_hold_up_to_where_all_bounds_are_met(beyond, reach, tmp_path):
+@pytest.mark.parametrize(
+    ("beyond", "shown"), [(None, "1, 2, 3, 4, 5, 6"), (6, "1, 2, 3, 4, 5"), (1, "none")]
+)
+def test_tracks_hold_where_all_bounds_are_met(beyond, shown, tmp_path):
     found = lines(beyond)
-    assert valid_to(found, "tracking.ekf", "radar") == reach
+    assert valid_at(found, "tracking.ekf", "radar") == [r for r in RANGES_NMI if r < (beyond or 9)]
+    found["tracking.ekf", "radar", "error_across_m.2"] = {"low": 9e9, "value": 9e9, "high": 9e9}
+    assert 2 not in valid_at(found, "tracking.ekf", "radar")
+    found = lines(beyond)
     text = text_of(found)
-    assert f"| radar | tracking.ekf | {reach:g} nmi |" in text
+    assert f"| radar | `tracking.ekf` | {shown} |" in text
+    assert "(here 60 of radar)" in text
     assert text.count("**not met**") == (0 if beyond is None else 4 * (7 - beyond))
     draw(found, tmp_path / "drawn.png")
     assert (tmp_path / "drawn.png").stat().st_size > 5000
