@@ -171,6 +171,28 @@ def test_windows_change_nothing_and_its_pose_is_the_believed_one(eye):
     assert all(abs(math.degrees(h) % 360 - 222.0) > 1e-3 for h in headings)
 
 
+def test_in_a_loop_it_looks_ahead_and_is_taken_back(eye):
+    found = scene(eye(), targets=_NAMES, duration_s=20)
+    found["blocks"] |= {
+        "fusion": {"type": "fusion.pick_best"}, "tracker": {"type": "tracking.stub"},
+        "avoid": {"type": "avoidance.turn_away", "range_km": 1.9, "turn_deg": 45},
+    }  # fmt: skip
+    found["blocks"]["eye"]["detections"] |= {"range_rate_m_s": "rate"}
+    found["wires"] += [
+        "tracker -> avoid", {"from": "avoid", "to": "traffic", "delay_s": 0.7, "holds": "nothing"}
+    ]  # fmt: skip
+    tables = []
+    for window in (None, 1):
+        sink = MemorySink()
+        simulation = Simulation(dsa_des.load_scene(found), window=window, recorder=Recorder([sink]))
+        outcome = simulation.run()
+        assert ("eye" in outcome.windowed) == (window is None)
+        tables.append(sink.tables())
+    assert tables[0]["manoeuvres"]["tick"][0].as_py() > 0
+    for name, table in tables[1].items():
+        assert table.equals(tables[0][name]), name
+
+
 def test_what_the_fmu_says_of_its_errors_goes_before_what_the_scene_says(eye):
     found = scene(eye())
     found["blocks"]["eye"]["detections"] |= {
