@@ -119,8 +119,6 @@ class Replicas(Timeline):
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
             return False
-        if self._opened and not component.goes_side_by_side():
-            return False
         differing = self._differing(name)
         if isinstance(component.p, ClockedParameters):
             differing -= _OF_THE_CLOCK
