@@ -180,9 +180,9 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
         _, first = np.unique(np.concatenate(keys), return_index=True)
         return RunTicks.joined(parts).take(first)
     every = sorted_union(keys)
-    run = every >> bits
-    every -= run << bits
-    return RunTicks(run, every + earliest if earliest else every)
+    runs = every >> bits
+    every -= runs << bits
+    return RunTicks(runs, every + earliest if earliest else every)
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
