@@ -6,12 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.summary import (
-    FusedSummary,
-    SensorSummary,
-    outcome_observers,
-    senders,
-)
+from components.display.outcomes import outcome_observers, senders
+from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.sinks import Observer
 from dsa_des.running.reports import Change, Difference

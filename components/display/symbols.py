@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.sensor.marks import EO, IR, RADAR
+from components.sensor.marks import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark, marks_of, told_apart
 from dsa_des.record.drawing import figure_text
@@ -26,7 +26,14 @@ _SPACING_PX, _MOST_MARKS = 9.0, 5000
 #: of a light colour the other way round.
 _SHADES = (0.0, 0.4, -0.35)
 _LIGHT = 0.25
-_KINDS = (("radar", RADAR), ("optical.ir", IR), ("optical", EO))
+_KINDS = (
+    ("radar", RADAR), ("laser", LASER), ("optical.ir", IR), ("optical", EO),
+    ("surveillance", COOPERATIVE), ("tracking", TRACKER), ("fusion", FUSION),
+    ("track_fusion", FUSION),
+)  # fmt: skip
+#: On the dark ground of globes, and of pages of that theme: aircraft, and levels of alerts.
+ON_DARK = {"own": "#eeeeee", "truth": "#a0a0a0"}
+LEVELS_ON_DARK = ("#f0d040", "#ff9c4a", "#ff7a7a")
 
 _NAME_PT = FONT_SIZE - 1
 Box = tuple[float, float, float, float]
@@ -50,8 +57,8 @@ def mark_of(style: Mark) -> dict[str, Any]:
     }
 
 
-def sensor_marks(types: Mapping[str, str]) -> dict[str, Mark]:
-    """Return name → mark of sensors by the types of their blocks, also those of one kind apart.
+def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
+    """Return name → mark of blocks by their types, also those of one kind apart.
 
     Markers are those of figures. Lines of sight and scans have none: colours differ too, in shades
     of that of the kind.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.summary import NEAR_M, TABLE, distances
-from components.display.symbols import Labels
+from components.display.outcomes import NEAR_M, TABLE, distances
+from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
@@ -37,6 +37,8 @@ _PLANE, _LINE = 5.991464547107979, 3.841458820694124
 _MOST_POINTS, _ELLIPSES = 400, 8
 #: More names and numbers than this cannot be told apart.
 _MOST_NAMED = 12
+#: Of more tracks than this, no ellipses and bands are drawn, which would cover each other.
+_MOST_SPREADS = 40
 _MOST_ERRORS = 2000
 _LOWEST, _HIGHEST = 0.02, 1000.0
 #: Stretches of time over which innovations are averaged.
@@ -136,10 +138,13 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
     with drawing(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
         _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
-        for position in positions:
-            _flight(plan, height, grid, position, drawn.origin[2], {"color": _TRUTH})
+        dense = len(positions) >= DENSE
+        for position in positions:  # under a density their lines only make room
+            style = {"color": _TRUTH, "alpha": 0.0 if dense else 1.0}
+            _flight(plan, height, grid, position, drawn.origin[2], style)
+        spreads = len(drawn.tracks) <= _MOST_SPREADS
         for one in drawn.tracks:
-            _draw_one(plan, height, one, drawn.origin[2])
+            _draw_one(plan, height, one, drawn.origin[2], spreads)
         plan.set_aspect("equal", adjustable="datalim")
         plan.set_xlabel("east of the origin (km)")
         plan.set_ylabel("north of the origin (km)")
@@ -150,10 +155,14 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         plan.set_title(
             f"{many} confirmed track{'s' * (many != 1)} near targets, {false} false", loc="left"
         )
-        _legend(figure, drawn.blocks, false > 0)
+        _legend(figure, drawn, false > 0, dense)
         tight(figure)
         figure.subplots_adjust(top=0.93)
         _names(figure, plan, drawn, positions, own)
+        if dense:
+            draw_density(plan, [ned_m[[1, 0]].T / 1e3 for ned_m in positions])
+            above = drawn.origin[2] - positions[:, 2]
+            draw_density(height, [np.column_stack([grid, line]) for line in above])
     return path
 
 
@@ -164,12 +173,15 @@ def _flight(
     height.plot(time_s, alt_m - ned_m[2], linewidth=0.7, zorder=1, **style)
 
 
-def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) -> None:
+def _draw_one(
+    plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float, spreads: bool
+) -> None:
     every = track.columns
     rows = np.arange(len(every["state_s"]))[:: max(1, len(every["state_s"]) // _MOST_POINTS)]
     one = {name: values[rows] for name, values in every.items()}
     colour = track.colour
-    style = {"color": colour, "linestyle": ":" if track.false else "-", "linewidth": 1.4}
+    style = {"color": colour, "linestyle": ":" if track.false else "-",
+             "linewidth": 1.4 if spreads else 0.8}  # fmt: skip
     east, north = one["east_m"] / 1e3, one["north_m"] / 1e3
     plan.plot(east, north, zorder=2, **style)
     if track.false:
@@ -177,6 +189,8 @@ def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) ->
     above = origin_alt_m - one["down_m"]
     spread = np.sqrt(_LINE * one["covariance_22_m2"])
     height.plot(one["state_s"], above, zorder=2, **style)
+    if not spreads:
+        return
     height.fill_between(
         one["state_s"], above - spread, above + spread, color=colour, alpha=0.2, linewidth=0
     )
@@ -190,12 +204,16 @@ def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) ->
         plan.plot(x, y, color=colour, linewidth=0.6, zorder=1)
 
 
-def _legend(figure: Any, blocks: list[str], false: bool) -> None:
+def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
+    blocks, many = drawn.blocks, len(drawn.tracks)
+    alone = "track, by its number" if many <= _MOST_NAMED else "track"
     entries = [
-        Line2D([], [], color=_TRUTH, linewidth=0.7, label="truth"),
+        Patch(facecolor="#777777", label="truth (darker: more)")
+        if dense
+        else Line2D([], [], color=_TRUTH, linewidth=0.7, label="truth"),
         Line2D([], [], color=_OWN, linewidth=0.7, linestyle="--", label="ownship"),
         *(
             Line2D(
@@ -203,12 +221,14 @@ def _legend(figure: Any, blocks: list[str], false: bool) -> None:
                 [],
                 color=COLOURS[place % len(COLOURS)],
                 linewidth=1.4,
-                label=figure_text(block, 16) if blocks[1:] else "track, by its number",
+                label=figure_text(block, 16) if blocks[1:] else alone,
             )
             for place, block in enumerate(blocks)
         ),
-        Patch(facecolor=_FALSE if blocks[1:] else COLOURS[0], alpha=0.3, label="95 %"),
     ]
+    if many <= _MOST_SPREADS:
+        shade = _FALSE if blocks[1:] else COLOURS[0]
+        entries.append(Patch(facecolor=shade, alpha=0.3, label="95 %"))
     if false:
         entries.append(
             Line2D([], [], color=_FALSE, linestyle=":", marker="x", label="never near a target")
@@ -256,24 +276,33 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
             shown.append((track, one["state_s"], found))
     if not shown:
         return None
-    every = np.concatenate([values[~np.isnan(values)] for _, _, values in shown])
+    of_block = {
+        block: np.concatenate([values[~np.isnan(values)] for _, _, values in told])
+        for block in drawn.blocks
+        if (told := [one for one in shown if one[0].block == block])
+    }
+    low, high = chi_square_bounds(6)
+    said = {
+        block: f"{every.mean():.3g}, {_percent((every >= low) & (every <= high))} inside"
+        for block, every in of_block.items()
+    }
     with drawing(9.0, 6.4, path) as figure:
         errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         labelled: set[str] = set()
         for track, time_s, values in shown:
             label = f"track {track.number}"
             if len(drawn.blocks) > 1:
-                label = "" if track.block in labelled else figure_text(track.block, 16)
+                words = f"{figure_text(track.block, 16)}: {said[track.block]}"
+                label = "" if track.block in labelled else words
                 labelled.add(track.block)
             errors.plot(time_s, values, color=track.colour, linewidth=0.9, label=label or None)
-        low, high = chi_square_bounds(6)
         errors.axhspan(low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0)
         errors.axhline(6.0, color="#666666", linewidth=0.8, zorder=0)
-        inside = np.mean((every >= low) & (every <= high))
+        # Trackers are not pooled: each has its own mean, in the legend.
+        pooled = "" if len(drawn.blocks) > 1 else f": mean {next(iter(said.values()))}"
         errors.set_title(
-            f"Error squared by its covariance (NEES): mean {every.mean():.3g} (honest: 6), "
-            f"{inside:.0%} inside", loc="left",
-        )  # fmt: skip
+            f"Error squared by its covariance (NEES){pooled} (honest: 6, 95 %)", loc="left"
+        )
         if len(shown) <= 6 or len(drawn.blocks) > 1:
             errors.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         _draw_innovations(innovations, drawn)
@@ -293,8 +322,10 @@ def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
         label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
         _draw_innovations_of(axes, held, drawn.time_s, COLOURS[place % len(COLOURS)], label)
     if drawn.blocks[1:]:
-        axes.set_title("Innovation squared by its covariance (NIS), per quantity (honest: 1)",
-                       loc="left")  # fmt: skip
+        axes.set_title(
+            "Innovation squared by its covariance (NIS) per quantity, stretches inside "
+            "(honest: 1, 95 %)", loc="left",
+        )  # fmt: skip
     if axes.get_legend_handles_labels()[1]:
         axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
@@ -324,10 +355,15 @@ def _draw_innovations_of(
     axes.fill_between(middle, low, high, color=colour if tracker else "#999999",
                       alpha=0.15 if tracker else 0.3, linewidth=0, zorder=0,
                       label=None if tracker else "95 %")  # fmt: skip
+    inside = (total / many >= low) & (total / many <= high)
+    said = f"{nis.sum() / freedom.sum():.3g}, {_percent(inside)}"
     axes.plot(middle, total / many, color=colour, marker=".", linewidth=0.9,
-              label=tracker or "mean per quantity")  # fmt: skip
-    inside = np.mean((total / many >= low) & (total / many <= high))
+              label=f"{tracker}: {said}" if tracker else "mean per quantity")  # fmt: skip
     axes.set_title(
-        f"Innovation squared by its covariance (NIS): {nis.sum() / freedom.sum():.3g} per quantity "
-        f"(honest: 1), {inside:.0%} of stretches inside", loc="left",
+        f"Innovation squared by its covariance (NIS) per quantity: {said} of stretches inside "
+        "(honest: 1, 95 %)", loc="left",
     )  # fmt: skip
+
+
+def _percent(inside: BoolArray) -> str:
+    return f"{100.0 * np.mean(inside):.0f} %"

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import offset_positions
+from components.display.picture import sights
 from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.export.track_places import POSE, estimated_places, held_places
 from components.formats.asterix_records import (
     ADS_B,
     NORTH_MARKER,
@@ -17,13 +18,10 @@ from components.formats.asterix_records import (
     callsign,
     write_records,
 )
-from components.geometry import body_to_ned, local_axes, spherical_from_enu
+from components.geometry import local_axes
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.errors import UsageError
 
-_POSITION = ("own_lat_deg", "own_lon_deg", "own_alt_m")
-_TURNED = ("own_heading_rad", "own_pitch_rad", "own_roll_rad")
-_STATE = ("north_m", "east_m", "down_m")
 _MOVES = ("north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 #: Largest range rate that a plot holds.
@@ -66,18 +64,6 @@ def asterix_bytes(run: RecordedTables) -> bytes:
     return write_records(records)
 
 
-def _sight(
-    line: list[FloatArray], pose: list[FloatArray]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bearings (rad from north), slant ranges, and ends (3, n) of lines in body axes."""
-    azimuth, elevation, far_m = line
-    level = np.cos(elevation) * far_m
-    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation) * far_m
-    north, east, down = body_to_ned(*body, *pose[3:])
-    bearing, _, _ = spherical_from_enu(north, east, -down)
-    return bearing, far_m, offset_positions(np.stack([north, east, down]), pose[:3])
-
-
 def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give a north marker with the radar's place for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
@@ -89,7 +75,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     yield from _scans(run, sic, radars)
     if len(there) == 0:
         return
-    pose = [run.numbers("detections", name)[there] for name in (*_POSITION, *_TURNED)]
+    pose = [run.numbers("detections", name)[there] for name in POSE]
     unknown = ~np.isfinite(pose).all(axis=0)
     if unknown.any():
         sensor = names[int(there[np.argmax(unknown)])]
@@ -99,7 +85,8 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
         )
     lit = run.numbers("detections", "illuminated_s")[there]
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
-    bearing, far_m, ends = _sight([part[there] for part in lines], pose)
+    azimuth, elevation, far_m = (part[there] for part in lines)
+    bearing, ends = sights(azimuth, elevation, far_m, pose)
     rate_m_s = run.numbers("detections", "range_rate_m_s")[there]
     for k, row in enumerate(there.tolist()):
         yield AsterixRecord(
@@ -161,7 +148,7 @@ def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecor
 def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
-    places = zip(*(run.numbers("scans", name).tolist() for name in _POSITION), strict=True)
+    places = zip(*(run.numbers("scans", name).tolist() for name in POSE[:3]), strict=True)
     times = run.numbers("scans", "time_s").tolist()
     for name, time_s, place in zip(run.texts("scans", "block"), times, places, strict=True):
         if (name or "") in radars:
@@ -184,14 +171,10 @@ def _track(
 
 def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give estimated tracks, at the instants that their states speak of."""
-    if "state_tracks" not in run.tables:
-        return
-    ned = np.stack([run.numbers("state_tracks", name) for name in _STATE])
-    rows = np.flatnonzero(np.isfinite(ned).all(axis=0))
+    rows, places = estimated_places(run)
     if len(rows) == 0:
         return
     origin = [run.numbers("state_tracks", name)[rows] for name in _ORIGIN]
-    places = offset_positions(ned[:, rows], origin)
     # Velocities are along the axes of the frame's origin; the track's own have turned a little.
     moves = [run.numbers("state_tracks", name)[rows] for name in _MOVES]
     east, north, up = local_axes(origin[0], origin[1])
@@ -227,44 +210,17 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
 
 def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give what trackers hold of each target, once for each measurement, at its instant."""
-    if "tracks" not in run.tables:
+    rows, places = held_places(run)
+    if len(rows) == 0:
         return
-    lines = [run.numbers("tracks", name) for name in ("azimuth_rad", "elevation_rad", "range_m")]
-    measured_s = run.numbers("tracks", "measured_s")
-    ranged = np.flatnonzero(np.isfinite(lines).all(axis=0))
     names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
+    measured_s = run.numbers("tracks", "measured_s")
     number: dict[tuple[str, str], int] = {}
-    told: dict[tuple[str, str], float] = {}
-    rows = []
-    for row in ranged.tolist():
+    for k, row in enumerate(rows.tolist()):
         key = blocks[row] or "", names[row] or ""
         number.setdefault(key, len(number) + 1)
-        if told.get(key) != measured_s[row]:
-            told[key] = float(measured_s[row])
-            rows.append(row)
-    if not rows:
-        return
-    pose = _own_pose(run, measured_s[rows], rows)
-    _, _, places = _sight([part[rows] for part in lines], pose)
-    for k, row in enumerate(rows):
-        key = blocks[row] or "", names[row] or ""
         what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), places[:, k]
         yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
-
-
-def _own_pose(run: RecordedTables, time_s: FloatArray, rows: list[int]) -> list[FloatArray]:
-    """Return the ownship's pose of tracks: as believed where that is recorded, else the truth."""
-    if _POSITION[0] in run.table("tracks").column_names:
-        return [run.numbers("tracks", name)[rows] for name in (*_POSITION, *_TURNED)]
-    own = run.flights().get(OWNSHIP, {"time_s": np.zeros(0)})
-    at = np.searchsorted(own["time_s"], time_s)
-    if len(own["time_s"]) == 0 or (own["time_s"][np.minimum(at, len(own["time_s"]) - 1)]
-                                   != time_s).any():  # fmt: skip
-        raise UsageError(
-            f"{run.folder}: truth.parquet does not say where the ownship was when tracks were "
-            "measured: record it with truth = true under [record]"
-        )
-    return [own[name.removeprefix("own_")][at] for name in (*_POSITION, *_TURNED)]
 
 
 def _own(run: RecordedTables) -> Iterator[AsterixRecord]:

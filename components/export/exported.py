@@ -1,8 +1,9 @@
-"""``dsa-des export``: a run in another format, of which CSV, MATLAB and ``.daa`` are made here."""
+"""``dsa-des export``: a run in another format, of which CSV and MATLAB are made here."""
 
 import io
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,30 +11,30 @@ import numpy as np
 
 from components.display.recorded_run import RecordedTables, read_tables
 from components.export.asterix_export import asterix_bytes
-from components.export.globe import czml_text, kml_text
+from components.export.czml import czml_text
+from components.export.flight_files import STEP_S, daa_text, xyz_text
+from components.export.kml import kml_text, undulation_of
 from components.export.mcap_export import mcap_bytes
 from components.export.operator_answers import operator_csv
-from components.geometry import line_of_sight_ned, local_axes
-from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import named
 from dsa_des.terminal.terminal import say
 
 _MATLAB_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,62}")
-_DAA_HEAD = (
-    "NAME, lat, lon, alt, trk, gs, vs, heading, time",
-    "[], [deg], [deg], [m], [deg], [m/s], [m/s], [deg], [s]",
-)
-_XYZ_HEAD = (
-    "NAME, sx, sy, sz, vx, vy, vz, heading, time",
-    "[], [m], [m], [m], [m/s], [m/s], [m/s], [deg], [s]",
-)
 _ENDINGS = {"operator-csv": "-operator.csv", "asterix": ".ast"}
 
 
-def export_run(run: str, to: str, out: str | None) -> None:
+#: Options, with the formats that have them.
+_ONLY_OF = {"step_s": ("daa", "xyz"), "geoid_m": ("kml",)}
+_LEAST_STEP_S, _MOST_GEOID_M = 1e-3, 200.0
+
+
+def export_run(
+    run: str, to: str, out: str | None, step_s: float | None = None, geoid_m: float | None = None
+) -> None:
     """Write a run in another format; ``dsa-des export``."""
+    _check_options(to, step_s=step_s, geoid_m=geoid_m)
     tables = read_tables(run)
     folder = tables.folder.resolve()
     target = (
@@ -45,12 +46,47 @@ def export_run(run: str, to: str, out: str | None) -> None:
         _write_folder(tables, target if out is not None else folder.with_name(f"{folder.name}-csv"))
         return
     check_file(target)
-    content = _OF_ONE_FILE[to](tables)
+    said = ""
+    if to in _ONLY_OF["step_s"]:
+        text = daa_text if to == "daa" else xyz_text
+        content = text(tables, STEP_S if step_s is None else step_s).encode("utf-8")
+    elif to == "kml":
+        said, geoid_m = _geoid(tables, geoid_m)
+        content = kml_text(tables, geoid_m).encode("utf-8")
+    else:
+        content = _OF_ONE_FILE[to](tables)
     try:
         write_file(target, content)
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
-    say(f"wrote {target}")
+    say(f"wrote {target}{said}")
+
+
+def _check_options(to: str, **given: float | None) -> None:
+    for name, value in given.items():
+        option = f"--{name.replace('_', '-')}"
+        if value is None:
+            continue
+        if to not in _ONLY_OF[name]:
+            raise UsageError(f"{option} belongs to --to {' or '.join(_ONLY_OF[name])}, not {to}")
+        if name == "step_s" and value != 0 and not _LEAST_STEP_S <= value < math.inf:
+            raise UsageError(
+                f"{option} {value:g}: at least {_LEAST_STEP_S:g} s, or 0 for the recorded instants"
+            )
+        if name == "geoid_m" and not abs(value) <= _MOST_GEOID_M:
+            raise UsageError(f"{option} {value:g}: the geoid is within ±{_MOST_GEOID_M:g} m")
+
+
+def _geoid(tables: RecordedTables, given_m: float | None) -> tuple[str, float]:
+    """Return the geoid's height above the ellipsoid, and what is to be said of it."""
+    known_m = undulation_of(tables)
+    if given_m is not None:
+        said, geoid_m = "", given_m
+    elif known_m is not None:
+        said, geoid_m = f" (geoid {known_m:g} m above the ellipsoid, as the terrain's)", known_m
+    else:
+        said, geoid_m = " (heights above the ellipsoid as above sea level: --geoid-m is 0)", 0.0
+    return said, geoid_m
 
 
 def _write_folder(tables: RecordedTables, target: Path) -> None:
@@ -125,83 +161,8 @@ def _struct(table: Any) -> dict[str, Any]:
     return found
 
 
-def daa_text(run: RecordedTables) -> str:
-    """Return the true flights as DAIDALUS and `traffic.daa_file` read them, by instants.
-
-    The ownship comes first; a name that such a file cannot hold is refused.
-    """
-
-    def columns(flight: Mapping[str, FloatArray]) -> list[FloatArray]:
-        north, east = flight["velocity_north_m_s"], flight["velocity_east_m_s"]
-        return [
-            flight["lat_deg"], flight["lon_deg"], flight["alt_m"],
-            np.degrees(np.arctan2(east, north)) % 360.0, np.hypot(north, east),
-            -flight["velocity_down_m_s"], np.degrees(flight["heading_rad"]) % 360.0,
-        ]  # fmt: skip
-
-    return "\n".join([*_DAA_HEAD, *_rows(run, columns)]) + "\n"
-
-
-def xyz_text(run: RecordedTables) -> str:
-    """Return the true flights as east, north (m) of a reference point, and altitudes.
-
-    The point is where the ownship is first, at altitude 0; a comment says it. `read_daa` with that
-    reference gives the flights again.
-    """
-    own = next(iter(run.flights().values()))
-    lat, lon = float(own["lat_deg"][0]), float(own["lon_deg"][0])
-    there = local_axes(np.array([lat]), np.array([lon]))
-
-    def columns(flight: Mapping[str, FloatArray]) -> list[FloatArray]:
-        place = flight["lat_deg"], flight["lon_deg"]
-        here = local_axes(*place)
-        # Altitudes stay what they are; east and north are those of the point of the tangent plane's
-        # frame that lies so high above the plane, straight above or below the place.
-        _, _, down = line_of_sight_ned(lat, lon, 0.0, *place, np.zeros_like(place[0]))
-        height = (flight["alt_m"] + down) / _dot(here[2], there[2])
-        north, east, _ = line_of_sight_ned(lat, lon, 0.0, *place, height)
-        moves = (
-            flight["velocity_east_m_s"], flight["velocity_north_m_s"], -flight["velocity_down_m_s"],
-        )  # fmt: skip
-        earth = [sum(v * axis[i] for v, axis in zip(moves, here, strict=True)) for i in range(3)]
-        # The heading whose line above the plane, seen along the aircraft's own horizon, is its own.
-        s, c = np.sin(flight["heading_rad"]), np.cos(flight["heading_rad"])
-        nose = np.arctan2(
-            s * _dot(here[1], there[1]) - c * _dot(here[0], there[1]),
-            c * _dot(here[0], there[0]) - s * _dot(here[1], there[0]),
-        )
-        along = [_dot(earth, axis) for axis in there]
-        return [east, north, flight["alt_m"], *along, np.degrees(nose) % 360.0]
-
-    head = f"# reference point: lat {lat!r} deg, lon {lon!r} deg, alt 0 m"
-    return "\n".join([head, *_XYZ_HEAD, *_rows(run, columns)]) + "\n"
-
-
-def _dot(one: Sequence[Any], other: Sequence[Any]) -> Any:
-    return sum(a * b for a, b in zip(one, other, strict=True))
-
-
-def _rows(
-    run: RecordedTables, columns: Callable[[Mapping[str, FloatArray]], Sequence[FloatArray]]
-) -> list[str]:
-    """Return a row for each aircraft and instant: its name, columns of its flight, the time."""
-    rows: list[tuple[float, int, str]] = []
-    for number, (name, flight) in enumerate(run.flights().items()):
-        if any(c in name for c in ",;\t\n\r ") or not name:
-            raise UsageError(f"{run.folder}: the name {name!r} holds what separates cells: rename")
-        made = (*columns(flight), flight["time_s"])
-        for cells in zip(*(column.tolist() for column in made), strict=True):
-            text = ", ".join([name, *(repr(cell) for cell in cells)])
-            rows.append((cells[-1], number, text))
-    rows.sort(key=lambda row: row[:2])
-    return [text for _, _, text in rows]
-
-
-_OF_ONE_FILE = {
-    "kml": lambda tables: kml_text(tables).encode("utf-8"),
+_OF_ONE_FILE: dict[str, Callable[[RecordedTables], bytes]] = {
     "czml": lambda tables: czml_text(tables).encode("utf-8"),
-    "daa": lambda tables: daa_text(tables).encode("utf-8"),
-    "xyz": lambda tables: xyz_text(tables).encode("utf-8"),
     "asterix": asterix_bytes,
     "mcap": mcap_bytes,
     "mat": mat_bytes,

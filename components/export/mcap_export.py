@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_run import RecordedTables
-from components.export.globe import START, detected
+from components.export.globe_run import DETECTION_LASTS_S, START, Seen, marks_in, seen_places
 from components.geometry import line_of_sight_ned
-from components.sensor.marks import RADAR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors.extras import library
 
 _NANO = 10**9
 #: The frame of all that is drawn: east, north and up of where the first aircraft begins.
 _FRAME = "map"
-#: How long a detection is shown, and how large.
-_SHOWN_S, _SIZE_M = 4, 60.0
+#: How large a detection is shown.
+_SIZE_M = 60.0
 
 
 def _object(**properties: Any) -> dict[str, Any]:
@@ -148,23 +147,26 @@ def _drawn(run: RecordedTables) -> Iterator[_Message]:
             pose = {"timestamp": _stamp(when), "frame_id": _FRAME,
                     "pose": {"position": offset, "orientation": turn}}  # fmt: skip
             yield _message(f"/aircraft/{name}/pose", "foxglove.PoseInFrame", when, pose)
-    ends = list(detected(run))
+    ends = list(seen_places(run))
     if not ends:
         return
-    lon, lat, alt = np.array([end[3:] for end in ends]).T
+    lon, lat, alt = np.array([end.place for end in ends]).T
     origin = origin or (float(lat[0]), float(lon[0]), float(alt[0]))
+    marks = marks_in(run, {end.sensor for end in ends})
     for number, (end, offset) in enumerate(zip(ends, _offsets(origin, lat, lon, alt), strict=True)):
-        yield _message("/detections", "foxglove.SceneUpdate", *_ball(number, end, offset))
+        ball = _ball(number, end, offset, marks[end.sensor].colour)
+        yield _message("/detections", "foxglove.SceneUpdate", *ball)
 
 
 def _message(topic: str, name: str, at_ns: int, content: dict[str, Any]) -> _Message:
     return topic, name, _FOXGLOVE[name], at_ns, content
 
 
-def _ball(number: int, end: Any, offset: dict[str, float]) -> tuple[int, dict[str, Any]]:
-    sensor, target, time_s, *_ = end
-    when = _instant(time_s)
-    colour = [int(RADAR.colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+def _ball(
+    number: int, end: Seen, offset: dict[str, float], painted: str
+) -> tuple[int, dict[str, Any]]:
+    when = _instant(end.time_s)
+    colour = [int(painted[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
     sphere = {
         "pose": {"position": offset, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}},
         "size": dict.fromkeys("xyz", _SIZE_M),
@@ -172,8 +174,10 @@ def _ball(number: int, end: Any, offset: dict[str, float]) -> tuple[int, dict[st
     }
     entity = {
         "timestamp": _stamp(when), "frame_id": _FRAME, "id": f"detection/{number}",
-        "lifetime": {"sec": _SHOWN_S, "nsec": 0}, "frame_locked": False,
-        "metadata": [{"key": "sensor", "value": sensor}, {"key": "target", "value": target}],
+        "lifetime": {"sec": int(DETECTION_LASTS_S), "nsec": 0}, "frame_locked": False,
+        "metadata": [
+            {"key": "sensor", "value": end.sensor}, {"key": "target", "value": end.target}
+        ],
         "spheres": [sphere],
     }  # fmt: skip
     return when, {"deletions": [], "entities": [entity]}

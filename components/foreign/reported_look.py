@@ -11,7 +11,7 @@ from components.messages.detections import EXTRAS, Detections
 from components.messages.reach import CULLED, SKIP_REASONS
 from dsa_des.arrays.types import IntArray
 
-_TRUE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
+TRUE_LINE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
 
 
 def reported_looks(
@@ -52,7 +52,7 @@ def reported_looks(
         elevation_rad=entries["elevation_rad"],
         range_m=entries.get("range_m", nothing),
         confidence=entries.get("confidence", nothing),
-        **{name: entries.get(name, nothing) for name in (*_TRUE, *MEASURED)},
+        **{name: entries.get(name, nothing) for name in (*TRUE_LINE, *MEASURED)},
         extras={name: entries[name] for name in EXTRAS if name in entries},
         roster=roster,
         **{name: looks[name] for name in POSE if name in looks},

@@ -65,11 +65,12 @@ class FirstDetection(TargetMetric):
                 ),
                 Result(
                     f"first_detection_time_s.{name}", NUMBER, time, cut,
-                    Told(label, "sees a target earlier", "sees a target later"), block,
+                    Told(label, "sees a target earlier", "sees a target later"), block, least=0.0,
                 ),
                 Result(
                     f"first_detection_range_m.{name}", NUMBER, "true slant range then, m", cut,
                     Told(label, "first sees it nearer", "first sees it farther away"), block,
+                    least=0.0,
                 ),
             ]  # fmt: skip
         return found
@@ -198,11 +199,15 @@ class Declaration(TargetMetric):
                 ),
                 Result(
                     f"declaration_time_s.{name}", NUMBER, "first declaration, s", cut,
-                    Told(label, "declares a target earlier", "declares a target later"),
+                    Told(label, "declares a target earlier", "declares a target later"), least=0.0,
                 ),
-                Result(f"declaration_range_m.{name}", NUMBER, "true slant range then, m", cut),
                 Result(
-                    f"declaration_delay_s.{name}", NUMBER, "from first detection to declaration, s"
+                    f"declaration_range_m.{name}", NUMBER, "true slant range then, m", cut,
+                    least=0.0,
+                ),
+                Result(
+                    f"declaration_delay_s.{name}", NUMBER, "from first detection to declaration, s",
+                    least=0.0,
                 ),
             ]  # fmt: skip
         return found

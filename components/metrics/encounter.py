@@ -126,8 +126,8 @@ class ClosestApproach(_Encounter):
     def results(self) -> list[Result]:
         """Return distance, time, and times from detection and declaration."""
         found = [
-            Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF),
-            Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF),
+            Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF, least=0.0),
+            Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF, least=0.0),
         ]
         for name in [*self.sensors, ANY]:
             seen, declared = (f"{what}_to_closest_cut_off.{name}" for what in _BEFORE)
@@ -172,7 +172,13 @@ class WellClear(_Encounter):
         found = [
             Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
             Result("nmac", EVENT, _cylinder_text(self.p.sizes_m[1], _NMAC)),
-            Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
+            Result(
+                "well_clear_loss_time_s",
+                NUMBER,
+                "when well clear is lost, s",
+                _LOSS_CUT_OFF,
+                least=0.0,
+            ),
         ]
         found += [
             Result(
@@ -266,7 +272,9 @@ class AlertTimes(TargetMetric):
         found = []
         for name in self._blocks:
             found += [
-                Result(f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s"),
+                Result(
+                    f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s", least=0.0
+                ),
                 Result(f"alert_to_loss_s.{name}", NUMBER, "from it to loss of well clear, s"),
                 Result(f"alert_to_nmac_s.{name}", NUMBER, "to a near mid-air collision, s"),
                 Result(f"alert_missed.{name}", EVENT, "well clear lost without an alert before"),

@@ -118,7 +118,13 @@ class Severity(TargetMetric):
     def results(self) -> list[Result]:
         """Return both."""
         return [
-            Result("slowc_percent", NUMBER, "largest severity of the loss of well clear, percent"),
+            Result(
+                "slowc_percent",
+                NUMBER,
+                "largest severity of the loss of well clear, percent",
+                least=0.0,
+                most=100.0,
+            ),
             Result("pnmac", FRACTION, "probability of an NMAC, errors of the altimeters included"),
         ]
 

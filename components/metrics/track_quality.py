@@ -90,8 +90,15 @@ class AgeOfInformation(TargetMetric):
     def results(self) -> list[Result]:
         """Return mean and 95th percentile."""
         return [
-            Result("age_of_information_mean_s", NUMBER, "mean age of what the fusion holds, s"),
-            Result("age_of_information_p95_s", NUMBER, "age exceeded 5 % of the time, s"),
+            Result(
+                "age_of_information_mean_s",
+                NUMBER,
+                "mean age of what the fusion holds, s",
+                least=0.0,
+            ),
+            Result(
+                "age_of_information_p95_s", NUMBER, "age exceeded 5 % of the time, s", least=0.0
+            ),
         ]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
@@ -200,10 +207,15 @@ class TrackUpdates(TargetMetric):
     def results(self) -> list[Result]:
         """Return interval, continuity and breaks."""
         return [
-            Result("track_update_interval_s", NUMBER, "mean time between updates of a track, s"),
-            Result("track_update_interval_p95_s", NUMBER, "95th percentile of it, s"),
+            Result(
+                "track_update_interval_s",
+                NUMBER,
+                "mean time between updates of a track, s",
+                least=0.0,
+            ),
+            Result("track_update_interval_p95_s", NUMBER, "95th percentile of it, s", least=0.0),
             Result("track_continuity", FRACTION, "share of a track's time that it is not broken"),
-            Result("track_breaks", NUMBER, "number of breaks"),
+            Result("track_breaks", NUMBER, "number of breaks", least=0.0),
         ]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
@@ -248,8 +260,12 @@ class PositionError(TargetMetric):
     def results(self) -> list[Result]:
         """Return the error of positions (where there is a range) and of directions."""
         return [
-            Result("fused_position_error_m", NUMBER, "distance to the true position, rms, m"),
-            Result("fused_angle_error_deg", NUMBER, "angle to the true direction, rms, deg"),
+            Result(
+                "fused_position_error_m", NUMBER, "distance to the true position, rms, m", least=0.0
+            ),
+            Result(
+                "fused_angle_error_deg", NUMBER, "angle to the true direction, rms, deg", least=0.0
+            ),
         ]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:

@@ -132,11 +132,11 @@ class Tracking(Metric):
         """Return errors, honesty, distances of sets, and identities."""
         of = "" if self.p.block is None else f".{self.p.block}"
         series = [
-            Result(_at(end, of), NUMBER, f"normalised error squared up to {end:g} s")
+            Result(_at(end, of), NUMBER, f"normalised error squared up to {end:g} s", least=0.0)
             for end in self._ends_s
         ]
         whole = [
-            Result(name + of, FRACTION if says.startswith("share") else NUMBER, says)
+            Result(name + of, FRACTION if says.startswith("share") else NUMBER, says, least=0.0)
             for name, says in _RESULTS.items()
         ]
         return [*whole, *series]

@@ -12,18 +12,17 @@ from pydantic import model_validator
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
+from components.sensor.marks import COOPERATIVE
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Output
-from dsa_des.block.mark import Mark
 from dsa_des.errors import Disagreements
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
 PLACE = ("lat_deg", "lon_deg", "alt_m")
-_MARK = Mark("#56B4E9", "P", 5.5)
 
 #: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
 _MEASURED_KEYS = (
@@ -60,7 +59,7 @@ class CooperativeParameters(SensorParameters):
 class CooperativeSensor(Sensor):
     """A sensor of aircraft that say where they are, or answer; axes are the ownship's."""
 
-    mark = _MARK
+    mark = COOPERATIVE
     measures_range = True
     #: Where an aircraft says that it is, it is, however the ownship believes to be turned.
     turned_by_belief = False

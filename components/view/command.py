@@ -8,15 +8,17 @@ from dsa_des.commands.group import plain_errors
 
 
 @click.command()
-@click.argument("run", metavar="RUN")
-@click.option("--out", metavar="FILE.html", help="The page [default: beside RUN, with its name].")
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
+@click.option(
+    "--out", metavar="FILE.html", help="The page [default: beside the first RUN, named as all are]."
+)
 @plain_errors
 def view(**options: Any) -> None:
     """Make a page that replays RUN: plan, altitudes, scans, detections, tracks, alerts.
 
-    RUN is a run's folder or a .daa file. The page holds all its data and asks for nothing else; it
-    opens from disk.
+    RUN is a run's folder or a .daa file; two or three stand beside each other on one clock. The
+    page holds all its data and asks for nothing else; it opens from disk.
     """
-    from components.view.run_picture import make_view
+    from components.view.make_view import make_view
 
     make_view(**options)

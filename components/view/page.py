@@ -4,7 +4,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
@@ -42,6 +42,7 @@ class RunPicture:
     start_s: float = 0.0
     sensors: list[dict[str, Any]] = field(default_factory=list)
     targets: list[str] = field(default_factory=list)
+    trackers: list[str] = field(default_factory=list)
     tables: dict[str, dict[str, AnyArray]] = field(default_factory=dict)
 
     def packed(self) -> dict[str, Any]:
@@ -72,18 +73,45 @@ def page_text(picture: RunPicture) -> str:
     it on screen as text.
     """
     script, digest = page_program(_PACKAGE, SCRIPTS)
-    policy = (
-        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
-        "base-uri 'none'; form-action 'none'"
-    )
     contents = {
-        "policy": escape(policy, quote=True),
+        "policy": _policy(digest),
         "title": escape(printable(picture.title)),
         "style": page_part(_PACKAGE, "style.css"),
         "data": _json(picture.packed()),
         "script": script,
     }
     return page_filled(_PACKAGE, "view.html", contents)
+
+
+def pages_beside(pictures: Sequence[RunPicture]) -> str:
+    """Return one page with those of several pictures beside each other, on one clock.
+
+    Each stands in a frame of its own, as text of this page: nothing is fetched for it either.
+    """
+    script = page_part(_PACKAGE, "beside.js")
+    _, inner = page_program(_PACKAGE, SCRIPTS)
+    frames = [
+        f'<iframe title="{escape(printable(one.title), quote=True)}" '
+        f'srcdoc="{escape(page_text(one), quote=True)}"></iframe>'
+        for one in pictures
+    ]
+    contents = {
+        "policy": _policy(_digest(script), inner),
+        "title": escape(printable(" | ".join(one.title for one in pictures))),
+        "frames": "\n".join(frames),
+        "script": script,
+    }
+    return page_filled(_PACKAGE, "beside.html", contents)
+
+
+def _policy(*digests: str) -> str:
+    """Return a policy that lets the browser run programs of these digests and fetch nothing."""
+    programs = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return escape(
+        f"default-src 'none'; script-src {programs}; style-src 'unsafe-inline'; "
+        "base-uri 'none'; form-action 'none'",
+        quote=True,
+    )
 
 
 def _json(content: dict[str, Any]) -> str:
@@ -105,7 +133,11 @@ def page_program(package: str, scripts: Iterable[str]) -> tuple[str, str]:
     parts = [page_part("components.view", name) for name in ("canvas.js", "labels.js")]
     parts += [page_part(package, name) for name in scripts]
     script = "\n".join(parts)
-    return script, base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return script, _digest(script)
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def page_filled(package: str, name: str, contents: Mapping[str, str]) -> str:

@@ -11,17 +11,14 @@ import numpy as np
 
 from components.display.picture import TangentPlane, offset_positions, sights
 from components.display.recorded_run import RecordedTables, read_table
-from components.display.symbols import sensor_marks
+from components.display.symbols import block_marks
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
-from components.view.page import RunPicture, page_text
+from components.view.page import RunPicture
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
-from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import named
-from dsa_des.terminal.terminal import say
+from dsa_des.errors import UsageError
 
 _NO_TARGET = -1
 #: What the page shows of a run; the first two are in every run.
@@ -50,36 +47,6 @@ class _RunColumns(dict[str, Any]):
         return self[name]
 
 
-def make_view(run: str, out: str | None) -> None:
-    """Write the page of a run's folder or of a ``.daa`` file; ``dsa-des view``."""
-    source = Path(run)
-    if source.is_dir():
-        try:
-            with np.errstate(invalid="ignore", over="ignore"):
-                page = page_text(run_picture(source))
-        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
-            # Any of its files may be another program's: what they lack is met anywhere.
-            raise UsageError(
-                f"{run}: its tables are not those of a run ({str(error)[:200]})"
-            ) from error
-        target = source.resolve().with_name(f"{source.resolve().name}.html")
-    elif source.suffix == ".daa" and source.is_file():
-        page = page_text(encounter_picture(source))
-        target = source.with_suffix(".html")
-    elif source.exists():
-        raise UsageError(f"{run}: is neither a run's folder nor a .daa file")
-    else:
-        raise UsageError(f"{run}: there is no such folder or file")
-    if out is not None:
-        target = named(out)
-    check_file(target)
-    try:
-        write_file(target, page.encode("utf-8"))
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
-    say(f"wrote {target}")
-
-
 def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run; `UsageError` where the folder holds none."""
     info = _json(folder / "run.json")
@@ -102,7 +69,7 @@ def run_picture(folder: Path) -> RunPicture:
     )
     sensors = sorted(set(_text(found["scans"]["block"])) | set(_text(detections["block"])))
     blocks = {name: scene.get("blocks", {}).get(name, {}) for name in sensors}
-    marks = sensor_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
+    marks = block_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
     picture.sensors = [_sensor(name, blocks[name], marks[name]) for name in sensors]
     targets = {name: number for number, name in enumerate(names)}
     picture.tables["own"] = _own_columns(own, plane)
@@ -129,15 +96,20 @@ def run_picture(folder: Path) -> RunPicture:
                 "target": _codes(table["target"], targets),
                 **_seen(table, _pose_at(own, table["time_s"]), plane),
                 **({"age_s": table["age_s"]} if "age_s" in table else {}),
+                **_sources(table),
             }
     if "state_tracks" in found:
-        picture.tables["tracks"] = _estimates(found["state_tracks"], own, plane)
+        table = found["state_tracks"]
+        picture.trackers = sorted(set(_text(table["block"]))) if "block" in table else []
+        picture.tables["tracks"] = _estimates(table, picture.trackers, own, plane)
     if "alerts" in found:
         table = found["alerts"]
         picture.tables["alerts"] = {
             "time_s": table["time_s"],
             "target": _codes(table["target"], targets),
             "level": table["level"],
+            **_sources(table),
+            **({"track": _whole(table["track"])} if "track" in table else {}),
             **{name: table[name] for name in _LEVELS if name in table},
         }
     if "manoeuvres" in found:
@@ -192,6 +164,19 @@ def _codes(column: list[str | None], names: Any) -> AnyArray:
     known = names if isinstance(names, dict) else {name: i for i, name in enumerate(names)}
     codes = (_NO_TARGET if text is None else known.get(text, _NO_TARGET) for text in column)
     return np.fromiter(codes, dtype=np.int64, count=len(column))
+
+
+def _sources(table: _RunColumns) -> dict[str, AnyArray]:
+    """Return by number which block each row is of."""
+    if "block" not in table:
+        return {}
+    return {"source": _codes(table["block"], sorted(set(_text(table["block"]))))}
+
+
+def _whole(column: Any) -> AnyArray:
+    """Return numbers of tracks, -1 where there is none."""
+    numbers = np.asarray(column, dtype=float)
+    return np.where(np.isfinite(numbers), numbers, _NO_TARGET).astype(np.int64)
 
 
 def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
@@ -278,7 +263,7 @@ def _truth(
 
 
 def _estimates(
-    table: _RunColumns, own: Mapping[str, FloatArray], plane: TangentPlane
+    table: _RunColumns, trackers: list[str], own: Mapping[str, FloatArray], plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
     keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
@@ -296,6 +281,7 @@ def _estimates(
     return {
         "time_s": time_s,
         "number": np.asarray(table["track"])[keep],
+        **({"source": _codes(table["block"], trackers)[keep]} if trackers else {}),
         "tentative": np.array([status == "tentative" for status in statuses], dtype=bool),
         "from_east_m": from_east,
         "from_north_m": from_north,

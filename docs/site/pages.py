@@ -1,6 +1,7 @@
 """Pages that the site adds while it is built: one for each block type, cut from reference.md."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -9,7 +10,10 @@ _PAGE, _FOLDER = "reference.md", "reference/blocks"
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add a page for each block type."""
+    """Add a page for each block type, and what the theme lacks for those who do not see colours."""
+    for part in ("site.css", "site.js"):
+        text = (Path(__file__).parent / part).read_text(encoding="utf-8")
+        files.append(File.generated(config, f"assets/{part}", content=text))
     page = files.get_file_from_path(_PAGE)
     for name, text in _blocks(page.content_string):
         content = f"---\nhide: [toc]\n---\n# {name}\n{text}\n[All block types](../../{_PAGE})\n"

@@ -35,8 +35,17 @@ def raised_in(trace: TracebackType | None) -> str:
     return name
 
 
+#: The exit code of what another program's failure ends.
+_A_FOREIGN_PART = 3
+
+
 def error_at(error: BaseException, cls: type) -> str:
-    """Return what an exception says, and the line of a class's own package where it came from."""
+    """Return what an exception says, and the line of a class's own package where it came from.
+
+    One that ends a command with 3 says all itself: a program or an FMU has failed, not the class.
+    """
+    if getattr(error, "exit_code", 1) == _A_FOREIGN_PART:
+        return str(error) or error_text(error)
     package = cls.__module__.partition(".")[0]
     trace, place = error.__traceback__, None
     while trace is not None:

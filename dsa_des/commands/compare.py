@@ -32,7 +32,7 @@ from dsa_des.results.labels import short
 from dsa_des.results.printing import interval_text, times
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.rows import paired_units
-from dsa_des.results.statistics import difference
+from dsa_des.results.statistics import changes_of, difference
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import load_scene
@@ -224,8 +224,10 @@ def _farthest_apart(
     """List the runs in which a result differs most, with a command that opens each."""
     first, second = units[0].values(metric), units[1].values(metric)
     both = [key for key in first if key in second and not np.isnan(first[key] - second[key])]
-    both.sort(key=lambda key: (-abs(second[key] - first[key]), key))
-    both = [key for key in both if first[key] != second[key]][:_MOST_SHOWN]
+    pairs = (np.array([side[key] for key in both]) for side in (first, second))
+    changes = dict(zip(both, changes_of(*pairs).tolist(), strict=True))
+    both.sort(key=lambda key: (-abs(changes[key]), key))
+    both = [key for key in both if changes[key] != 0.0][:_MOST_SHOWN]
     if not both:
         return
     say()

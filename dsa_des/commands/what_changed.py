@@ -9,6 +9,7 @@ import numpy as np
 
 from dsa_des.results.labels import short, unit_of
 from dsa_des.results.record import EVENT, Result
+from dsa_des.results.statistics import changes_of
 from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
@@ -143,8 +144,9 @@ def _change(result: Result, pair: Pair) -> _Change:
     before = np.array([first[key] for key in keys])
     after = np.array([second[key] for key in keys])
     known = ~np.isnan(before) & ~np.isnan(after)
-    mean = float((after[known] - before[known]).mean()) if known.any() else float("nan")
-    fell, rose = before[known] > after[known], before[known] < after[known]
+    changes = changes_of(before[known], after[known])
+    mean = float(changes.mean()) if known.any() else float("nan")
+    fell, rose = changes < 0.0, changes > 0.0
     gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
     counts = [int(which.sum()) for which in (fell, rose, gone, come)]
     return _Change(result, len(keys), counts[0], counts[1], counts[2], counts[3], mean)

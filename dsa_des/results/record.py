@@ -106,6 +106,9 @@ class Result:
         The block it is of, if that is not what stands behind the dot of its name.
     mark : (colour, marker), optional
         How figures mark that block; a study fills it in.
+    least, most : float, optional
+        What no value of a number can lie below or above, such as 0 for a distance; the interval of
+        its mean ends there.
     """
 
     name: str
@@ -116,6 +119,8 @@ class Result:
     block: str | None = None
     mark: tuple[_Colour, _Marker] | None = None
     ratio: RatioOf | None = None
+    least: float | None = None
+    most: float | None = None
 
     @property
     def is_number(self) -> bool:

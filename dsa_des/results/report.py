@@ -56,14 +56,19 @@ font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figu
 img{max-width:100%;height:auto}.note{color:var(--note)}
 nav{position:sticky;top:0;background:var(--paper);padding:.4em 0;
 border-bottom:1px solid var(--line)}
-nav a{margin-right:.8em;color:inherit}details{margin:.6em 0}summary{cursor:pointer}
+nav a{margin-right:.8em;color:inherit;display:inline-block;padding:.25em 0}
+details{margin:.6em 0}summary{cursor:pointer}
 h2{scroll-margin-top:3em}
 @media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}
 table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
 @media print{.wide{overflow:visible}}
 </style></head><body>
 {% macro table(heads, rows) %}{% if rows %}
-<div class='wide'><table><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr>
+<div class='wide' tabindex='0'><table>
+{% if heads | join %}
+<tr>{% for head in heads %}{% if head %}<th scope='col'>{{ head }}</th>{% else %}<td></td>\
+{% endif %}{% endfor %}</tr>
+{% endif %}
 {% for row in rows %}
 <tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}
@@ -72,14 +77,15 @@ table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
 {% macro where(scene, first) %}{% if scene.where %}
 <p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
 {% endif %}{% endmacro %}
-<h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
-{{ tables.rows.failed }} without result; made by dsa_des {{ version }}</p>
+<header><h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
+{{ tables.rows.failed }} without result; made by dsa_des {{ version }}</p>\
+</header>
 <nav><a href="#question">Question</a> <a href="#answer">Answer</a>
 {% if ratios %} <a href="#risk">Risk</a>{% endif %}
 {% if differences %} <a href="#differences">Differences</a>{% endif %}
 {% if others_drawn %} <a href="#figures">Figures</a>{% endif %} <a href="#models">Models</a> \
 <a href="#effects">Effects</a> <a href="#results">All results</a> <a href="#runs">Runs</a> \
-<a href="#repeat">To repeat it</a></nav>
+<a href="#repeat">To repeat it</a></nav><main>
 <h2 id="question">The question</h2>
 {{ table(("axis", "values", ""), axes) }}{{ table(("", ""), asked) }}
 <h2 id="answer">The answer</h2>
@@ -197,7 +203,7 @@ run's own seed is in the column <code>seed</code> of the parts.</p>
 <h2 id="repeat">To repeat it</h2>{{ commands | verbatim }}<p class='note'>Any other run: the same \
 with the seed, axes and draws that stand in its row of the parts; rows of failed runs hold it as \
 <code>command</code>.</p>
-</body></html>
+</main></body></html>
 """
 
 

@@ -14,6 +14,8 @@ FEW = 10
 #: trials that hang together says little.
 FEW_UNLIKE = 5
 _RESAMPLES = 2000
+#: Of the largest of some values: a smaller difference is one of rounding.
+_ALIKE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,27 @@ class Estimate:
     def half_width(self) -> float:
         """Half of the interval's width."""
         return (self.high - self.low) / 2.0
+
+
+def within(found: Estimate, least: float | None, most: float | None) -> Estimate:
+    """Return an estimate whose interval holds nothing that no value can be."""
+    low = found.low if least is None else max(least, found.low)
+    high = found.high if most is None else min(most, found.high)
+    # A NaN is kept: the comparison with it is false.
+    return replace(found, low=low, high=high) if found.low <= found.high else found
+
+
+def changes_of(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return second minus first; 0 where the two are alike but for how they were rounded.
+
+    That is, within 1e-9 of the largest of them: a quantity is never known so well, and rounding
+    adds up to far less.
+    """
+    changes = second - first
+    both = np.abs(np.concatenate([first, second]))
+    finite = both[np.isfinite(both)]
+    resolution = _ALIKE * float(finite.max(initial=0.0))
+    return np.where(np.abs(changes) <= resolution, 0.0, changes)
 
 
 def wilson(successes: float, trials: float, confidence: float) -> tuple[float, float]:
@@ -228,12 +251,15 @@ def difference(
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
-    changes = second[both] - first[both]
+    changes = changes_of(first[both], second[both])
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
     paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
     apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
-    unpaired = (_counted_apart if apart else _welch)(first[both], second[both], confidence)
+    if apart:
+        unpaired = _counted_apart(first[both], second[both], confidence)
+    else:
+        unpaired = _welch(first[both], changes, confidence)
     if kind != "number":
         paired, unpaired = _of_shares(paired), _of_shares(unpaired)
     return EstimatedDifference(
@@ -246,7 +272,7 @@ def difference(
 
 def _of_shares(found: Estimate) -> Estimate:
     """Return a difference of shares whose interval holds nothing that none can be."""
-    return replace(found, low=max(-1.0, found.low), high=min(1.0, found.high))
+    return within(found, -1.0, 1.0)
 
 
 def _counted(changes: FloatArray, confidence: float) -> Estimate:
@@ -277,12 +303,12 @@ def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> 
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 
-def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimate:
     count = len(first)
     if count < 2:
         return Estimate(math.nan, math.nan, math.nan, count, True)
-    value = math.fsum(second) / count - math.fsum(first) / count
-    one, other = standard_error(first) ** 2, standard_error(second) ** 2
+    value = math.fsum(changes) / count
+    one, other = standard_error(first) ** 2, standard_error(first + changes) ** 2
     if one + other == 0.0:
         return Estimate(value, value, value, count, count < FEW)
     degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)

@@ -17,6 +17,7 @@ from dsa_des.results.statistics import (
     Estimate,
     EstimatedDifference,
     difference,
+    within,
 )
 
 
@@ -61,6 +62,7 @@ def summarise(
                     other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
             else:
                 estimate, missing = rows.estimate(result, chosen, confidence, method)
+                estimate = within(estimate, result.least, result.most)
             known = expected.get((result.name, at))
             cut_off = rows.cut_off(result, chosen)
             lines.append(

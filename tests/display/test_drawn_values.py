@@ -444,8 +444,8 @@ def test_how_wrong_tracks_are_and_say(drawn):
     )
     inside = np.mean([(low <= value <= high) for value in every])
     assert errors.get_title(loc="left") == (
-        f"Error squared by its covariance (NEES): mean {np.mean(every):.3g} (honest: 6), "
-        f"{inside:.0%} inside"
+        f"Error squared by its covariance (NEES): mean {np.mean(every):.3g}, "
+        f"{100 * inside:.0f} % inside (honest: 6, 95 %)"
     )
     told = table["nis_freedom"] > 0
     time_s, nis, freedom = (table[n][told] for n in ("state_s", "nis", "nis_freedom"))
@@ -461,8 +461,9 @@ def test_how_wrong_tracks_are_and_say(drawn):
     (line,) = [one for one in innovations.lines if one.get_marker() == "."]
     assert line.get_xydata() == pytest.approx(np.array(points))
     assert innovations.get_title(loc="left") == (
-        f"Innovation squared by its covariance (NIS): {nis.sum() / freedom.sum():.3g} per quantity "
-        f"(honest: 1), {np.mean(good):.0%} of stretches inside"
+        "Innovation squared by its covariance (NIS) per quantity: "
+        f"{nis.sum() / freedom.sum():.3g}, {100 * np.mean(good):.0f} % of stretches inside "
+        "(honest: 1, 95 %)"
     )
 
 

@@ -1,10 +1,16 @@
 """``tracks.png`` and ``consistency.png``: what a tracker confirmed, and how honest it is."""
 
+from copy import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
+from scipy.stats import chi2
 
 import dsa_des
-from components.display.summary import distances
+from components.display.outcomes import distances
 from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
@@ -58,6 +64,69 @@ def test_tracks_are_false_that_never_come_near_a_target(tmp_path, shown):
     assert draw_consistency(tmp_path / "none.png", wrong) is None
     draw_tracks(tmp_path / "false.png", wrong)
     assert shown.tracks and not any(one.false for one in shown.tracks)
+
+
+def drawn_figure(monkeypatch, draw, path, drawn):
+    """The figure that is drawn, before it is a picture."""
+    found = []
+    monkeypatch.setattr(
+        FigureCanvasAgg, "print_png", lambda canvas, *_, **__: found.append(canvas.figure)
+    )
+    draw(path, drawn)
+    return found[0]
+
+
+def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
+    """Two trackers, of which one is twice as sure of itself as it ought to be: not pooled."""
+    two = copy(shown)
+    sure = {name: shown.tracks[0].columns[name] / 4.0 for name in COVARIANCE.values()}
+    two.blocks = ["honest", "sure"]
+    two.tracks = [
+        replace(shown.tracks[0], block="honest"),
+        replace(shown.tracks[0], block="sure", columns=shown.tracks[0].columns | sure),
+    ]
+    figure = drawn_figure(monkeypatch, draw_consistency, tmp_path / "x.png", two)
+    errors, innovations = figure.axes
+    assert "mean" not in errors.get_title(loc="left") + innovations.get_title(loc="left")
+    columns = shown.tracks[0].columns
+    found, known = errors_squared(columns, two.targets.states(columns["state_s"]))
+    assert known.all()
+    low, high = chi2.ppf([0.025, 0.975], 6)
+    words = [text.get_text() for text in errors.get_legend().get_texts()]
+    for word, block, values in zip(words, two.blocks, (found, 4.0 * found), strict=True):
+        share = 100.0 * np.mean((values >= low) & (values <= high))
+        assert word == f"{block}: {values.mean():.3g}, {share:.0f} % inside"
+    assert [text.get_text()[:4] for text in innovations.get_legend().get_texts()] == [
+        "hone", "sure"]  # fmt: skip
+
+
+@pytest.mark.parametrize("many", [3, 100])
+def test_of_many_aircraft_the_density_is_drawn(tmp_path, monkeypatch, shown, many):
+    """And of many tracks no spreads, which would cover each other."""
+    crowd = copy(shown)
+    crowd.tracks = [shown.tracks[0]] * many
+    at, names = shown.targets.at, shown.targets.names
+
+    class Copies:
+        def __getattr__(self, name):
+            return getattr(shown.targets, name)
+
+        def at(self, time_s):
+            rows = at(time_s)
+            shift = 20.0 * np.arange(many)[:, np.newaxis, np.newaxis]
+            return np.resize(rows[0], (many, *rows.shape[1:])) + shift
+
+    crowd.targets = Copies()
+    crowd.targets.names = names * many
+    figure = drawn_figure(monkeypatch, draw_tracks, tmp_path / "x.png", crowd)
+    for axes in figure.axes:
+        meshes = [one for one in axes.collections if isinstance(one, QuadMesh)]
+        assert len(meshes) == (many >= 100)
+        truth = [one for one in axes.lines if one.get_color() == "#000000"]
+        assert {one.get_alpha() for one in truth} == {0.0 if meshes else 1.0}
+    assert bool(figure.axes[0].patches) == (many < 100)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert ("truth (darker: more)" in words) == (many >= 100) == ("95 %" not in words)
 
 
 def one_track(rng):

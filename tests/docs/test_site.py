@@ -63,6 +63,10 @@ def test_the_site_builds_without_warnings_and_loads_nothing(tmp_path: Path) -> N
         text = page.read_text(encoding="utf-8")
         assert not LOADED.search(text), page
         assert "::: " not in re.sub(r"<code.*?</code>", "", text, flags=re.DOTALL), page
+    # What the theme lacks for those who do not see colours, or have no mouse.
+    home = (site / "index.html").read_text(encoding="utf-8")
+    for part in ("assets/site.css", "assets/site.js"):
+        assert (site / part).is_file() and f'"{part}"' in home
 
 
 @pytest.mark.parametrize(

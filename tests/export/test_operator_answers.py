@@ -47,11 +47,12 @@ def test_every_alert_has_the_first_answers_while_it_lasts():
     assert first["highest_level"] == "3" and first["shown_s"] == "2.25"
     assert (first["looked_s"], first["look_response_s"]) == ("4.0", "2.0")
     assert (first["judged_s"], first["judged_as"]) == ("5.0", "rejected")
-    assert (first["acted_s"], first["action"], first["value"]) == ("7.5", "turn", "-30.0")
+    assert (first["acted_s"], first["action"], first["turn_deg"]) == ("7.5", "turn", "-30.0")
+    assert first["climb_m"] == other["turn_deg"] == ""
     assert first["act_response_s"] == "5.5" and float(first["acted_wall_s"]) == WALL + 7.5
     assert (other["looked_s"], other["shown_s"], other["judged_s"]) == ("2.5", "", "")
-    assert (other["action"], other["value"]) == ("climb", "152.4")  # one manoeuvre, one alert
-    assert (again["shown_s"], again["value"], again["looked_s"]) == ("13.0", "-300.0", "")
+    assert (other["action"], other["climb_m"]) == ("climb", "152.4")  # one manoeuvre, one alert
+    assert (again["shown_s"], again["climb_m"], again["looked_s"]) == ("13.0", "-300.0", "")
 
 
 def test_decisions_about_a_track_belong_to_its_alert():

@@ -5,7 +5,6 @@ import json
 import math
 import shutil
 import sys
-import xml.etree.ElementTree as ElementTree
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -22,10 +21,10 @@ from scipy.spatial.transform import Rotation
 import dsa_des
 from components.display.recorded_run import RecordedTables
 from components.export.command import export
-from components.export.exported import daa_text, xyz_text
-from components.export.globe import czml_text, kml_text
+from components.export.flight_files import daa_text, xyz_text
 from components.formats.daa_file import read_daa
 from components.view.command import view
+from docs.make.reference import recorded_tables
 from tests.view.test_page import SCENE
 
 NAME = "a<b&'c"
@@ -68,7 +67,7 @@ def test_daa_is_read_again(run):
     assert call(run, "--to", "daa").exit_code == 0
     found = read_daa(run.with_name("run.daa"))
     own, other = found.ownship, found.intruders[0]
-    time_s = np.array([0.5, 3.0, 5.5])
+    time_s = np.array([0.5, 3.0, 4.5])  # rows are at whole seconds, up to 5
     state = other.at(time_s)
     lat, lon, alt = flown(time_s)
     assert state.lat_deg == pytest.approx(lat, abs=2e-6)
@@ -89,7 +88,7 @@ def flights_of_xyz(path):
 @pytest.mark.parametrize("to", ["daa", "xyz"])
 def test_flights_out_and_in_again_agree_within_their_digits(run, to, tmp_path):
     path = tmp_path / f"run.{to}"
-    assert call(run, "--to", to, "--out", path).exit_code == 0
+    assert call(run, "--to", to, "--step-s", 0, "--out", path).exit_code == 0
     found = read_daa(path).aircraft if to == "daa" else flights_of_xyz(path)
     truth = pq.read_table(run / "truth.parquet").to_pylist()
     assert [craft.name for craft in found] == ["ownship", "a<b&c"]
@@ -106,12 +105,57 @@ def test_flights_out_and_in_again_agree_within_their_digits(run, to, tmp_path):
         assert not craft.velocity_was_ignored
 
 
+def turning(time_s):
+    """A turn of 3 deg/s at 60 m/s that climbs with 4 m/s, by pymap3d: places and velocities."""
+    angle = math.radians(3.0) * np.asarray(time_s) + math.radians(200.0)
+    radius_m = 60.0 / math.radians(3.0)
+    place = pymap3d.enu2geodetic(
+        -radius_m * np.cos(angle), radius_m * np.sin(angle), 4.0 * np.asarray(time_s),
+        -41.3, 179.99, 800.0,
+    )  # fmt: skip
+    return *place, 60.0 * np.cos(angle), 60.0 * np.sin(angle), angle
+
+
+def test_rows_are_at_even_steps_of_a_turn_that_was_recorded_at_odd_times():
+    """Half a second and less apart, with an aircraft that comes late and goes early."""
+    random = np.random.default_rng(8)
+    recorded_s = 0.17 + np.cumsum(random.uniform(0.05, 0.5, 40))
+    truth = {"target": [], "time_s": [], "pitch_rad": [], "roll_rad": []}
+    columns = ("lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
+               "heading_rad", "velocity_down_m_s")  # fmt: skip
+    parts: dict = {name: [] for name in columns}
+    for name, kept in ((None, recorded_s), ("late", recorded_s[7:23])):
+        truth["target"] += [name] * len(kept)
+        truth["time_s"] += kept.tolist()
+        values = (*turning(kept), np.full(len(kept), -4.0))
+        for column, value in zip(columns, values, strict=True):
+            parts[column] += value.tolist()
+    truth["pitch_rad"] = truth["roll_rad"] = [0.0] * len(truth["target"])
+    run = RecordedTables(Path("run"), {"truth": pa.table(truth | parts)})
+    for step_s, text in ((1.0, daa_text(run)), (0.4, daa_text(run, 0.4))):
+        rows = [line.split(", ") for line in text.splitlines()[2:]]
+        for name, kept in (("ownship", recorded_s), ("late", recorded_s[7:23])):
+            found = np.array([row[1:] for row in rows if row[0] == name], dtype=float)
+            lat, lon, alt, track, speed, climb, heading, time_s = found.T
+            wanted = [k * step_s for k in range(100) if kept[0] <= k * step_s <= kept[-1]]
+            assert time_s == pytest.approx(wanted, abs=1e-9)
+            exact = turning(time_s)
+            east, north, up = pymap3d.geodetic2enu(lat, lon, alt, -41.3, 179.99, 800.0)
+            there = pymap3d.geodetic2enu(*exact[:3], -41.3, 179.99, 800.0)
+            assert np.stack([east, north, up]) == pytest.approx(np.stack(there), abs=2e-3)
+            ways = speed * np.exp(1j * np.radians(track))
+            assert ways == pytest.approx(exact[3] + 1j * exact[4], abs=0.03)
+            assert climb == pytest.approx(4.0)
+            turned = np.exp(1j * (np.radians(heading) - exact[5]))
+            assert turned == pytest.approx(1.0 + 0.0j, abs=1e-6)
+
+
 def test_velocities_of_xyz_are_along_the_axes_of_its_reference_point(tmp_path):
     """Far from the point, where the aircraft's own axes have turned by some degrees."""
     run, truth, _ = crafted()
     truth["lon_deg"][1::2] += 5.0
     far = RecordedTables(run.folder, {"truth": pa.table(truth)})
-    rows = [line.split(", ") for line in xyz_text(far).splitlines()[3:]]
+    rows = [line.split(", ") for line in xyz_text(far, 0.0).splitlines()[3:]]
     for k, row in enumerate(rows):
         x, y, z = (float(cell) for cell in row[4:7])
         place = [truth[key][k] for key in ("lat_deg", "lon_deg")]
@@ -186,24 +230,6 @@ def test_matlab_has_numbers_and_texts(run):
     assert np.isnan(found["detections"]["range_m"]).sum() == table["range_m"].null_count
 
 
-def test_kml_is_well_formed_and_in_place(run):
-    assert call(run, "--to", "kml").exit_code == 0
-    space = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
-    root = ElementTree.parse(run.with_name("run.kml")).getroot()
-    tracks = root.findall(".//gx:Track/..", space)
-    assert [t.findtext("k:name", namespaces=space) for t in tracks] == ["ownship", "a<b&c"]
-    coordinates = [c.text.split() for c in tracks[1].findall(".//gx:coord", space)]
-    lat, lon, alt = flown(np.array([0.0]))
-    assert [float(x) for x in coordinates[0]] == pytest.approx([lon[0], lat[0], alt[0]], abs=1e-3)
-    points = root.findall(".//k:Point/k:coordinates", space)
-    assert len(points) == 12
-    for point in points:
-        east, north, _ = pymap3d.geodetic2enu(
-            *[float(x) for x in np.array(point.text.split(","))[[1, 0, 2]]], -41.3, 179.98, 2200
-        )
-        assert math.hypot(east + 2500, north + 3500) < 700  # along 6 s of its flight
-
-
 def crafted():
     """Climbing, turning flights and banked detections at odd times, as Arrow tables."""
     random = np.random.default_rng(5)
@@ -232,61 +258,9 @@ def crafted():
     return RecordedTables(Path("run"), tables), truth, detections
 
 
-def seconds(text):
-    """Seconds of a globe's time from its second 0, by what ISO 8601 says."""
-    return (datetime.fromisoformat(text) - datetime(2000, 1, 1, tzinfo=UTC)).total_seconds()
-
-
-def where_seen(d, k):
-    """Longitude, latitude and height of a detection, by SciPy's rotations and pymap3d."""
-    body = [math.cos(d["elevation_rad"][k]) * math.cos(d["azimuth_rad"][k]),
-            math.cos(d["elevation_rad"][k]) * math.sin(d["azimuth_rad"][k]),
-            -math.sin(d["elevation_rad"][k])]  # fmt: skip
-    angles = [d[f"own_{name}_rad"][k] for name in ("heading", "pitch", "roll")]
-    ned = Rotation.from_euler("ZYX", angles).apply(d["range_m"][k] * np.array(body))
-    place = [d[f"own_{name}"][k] for name in ("lat_deg", "lon_deg", "alt_m")]
-    lat, lon, alt = pymap3d.ned2geodetic(*ned, *place)
-    return lon, lat, alt
-
-
-def test_globes_hold_every_row_at_its_time():
-    run, truth, d = crafted()
-    packets = json.loads(czml_text(run))
-    assert packets[0]["clock"]["currentTime"] == "2000-01-01T00:00:00Z"
-    ends = [seconds(t) for t in packets[0]["clock"]["interval"].split("/")]
-    assert ends == pytest.approx([0.0, truth["time_s"][-1]], abs=2e-6)
-    space = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
-    marks = ElementTree.fromstring(kml_text(run)).findall(".//k:Placemark", space)
-    for place, (name, first) in enumerate((("ownship", 0), ("a", 1))):
-        rows = np.stack(
-            [truth[key][first::2] for key in ("time_s", "lon_deg", "lat_deg", "alt_m")], 1
-        )
-        position = packets[1 + place]["position"]
-        assert (packets[1 + place]["name"], seconds(position["epoch"])) == (name, 0.0)
-        assert np.reshape(position["cartographicDegrees"], (-1, 4)) == pytest.approx(rows, abs=1e-9)
-        track = marks[place].find("gx:Track", space)
-        times = [seconds(w.text) for w in track.findall("k:when", space)]
-        coordinates = [c.text.split() for c in track.findall("gx:coord", space)]
-        assert times == pytest.approx(rows[:, 0], abs=1e-6)
-        assert np.array(coordinates, dtype=float) == pytest.approx(rows[:, 1:], abs=1e-9)
-        assert track.findtext("k:altitudeMode", namespaces=space) == "absolute"
-    for k, who in enumerate(("radar a", "eo", "ir a")):
-        packet, mark = packets[3 + k], marks[2 + k]
-        assert packet["name"] == mark.findtext("k:name", namespaces=space) == who
-        shown = [seconds(t) for t in packet["availability"].split("/")]
-        assert shown == pytest.approx([d["time_s"][k], d["time_s"][k] + 4.0], abs=1e-6)
-        when = mark.findtext("k:TimeStamp/k:when", namespaces=space)
-        assert seconds(when) == pytest.approx(d["time_s"][k], abs=1e-6)
-        point = mark.findtext("k:Point/k:coordinates", namespaces=space).split(",")
-        for lon, lat, alt in (packet["position"]["cartographicDegrees"], map(float, point)):
-            expected = where_seen(d, k)
-            assert (lon, lat) == pytest.approx(expected[:2], abs=1e-8)
-            assert alt == pytest.approx(expected[2], abs=1e-3)
-
-
 def test_daa_holds_every_row_in_its_units():
     run, truth, _ = crafted()
-    head, units, *rows = [line.split(", ") for line in daa_text(run).splitlines()]
+    head, units, *rows = [line.split(", ") for line in daa_text(run, 0.0).splitlines()]
     assert dict(zip(head, units, strict=True)) == {
         "NAME": "[]", "lat": "[deg]", "lon": "[deg]", "alt": "[m]", "trk": "[deg]", "gs": "[m/s]",
         "vs": "[m/s]", "heading": "[deg]", "time": "[s]",
@@ -385,3 +359,17 @@ def test_what_cannot_be_exported_is_refused(run, tmp_path):
     done = call(bare, "--to", "kml")
     assert done.exit_code == 2 and "truth" in done.output
     assert [p.name for p in tmp_path.iterdir()] == ["bare"]
+
+
+def test_columns_name_their_units():
+    """CSV and MATLAB have nothing else to say them with."""
+    endings = {
+        "dB": "_db", "deg": "_deg", "m": "_m", "m/s": ("_m_s", "_mps"),
+        "m/s²": ("_m_s2", "_mps2"), "m²": "_m2", "m²/s": "_m2_s", "m²/s²": "_m2_s2",
+        "pixels": ("_px", "pixels"), "rad": "_rad", "rad/s": "_rad_s", "rad²": "_rad2", "s": "_s",
+    }  # fmt: skip
+    # Counts, and what a sensor is as sure by as its own kind has it.
+    without = {"", "messages", "targets", "dB or signature"}
+    for table, columns in recorded_tables().items():
+        for name, column in columns.items():
+            assert column.unit in without or name.endswith(endings[column.unit]), (table, name)

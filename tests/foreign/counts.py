@@ -1,6 +1,8 @@
 """A program whose state is how often it was asked: it turns at every so many calls."""
 
 import json
+import os
+import signal
 import struct
 import sys
 
@@ -16,7 +18,7 @@ def frame(table, batch, **about):
     return struct.pack("<Q", len(content)) + content
 
 
-asked, every, snapshots = 0, 0, False
+asked, every, snapshots, dies_at = 0, 0, False, None
 while True:
     answer = b""
     while length := struct.unpack("<Q", sys.stdin.buffer.read(8) or sys.exit())[0]:
@@ -24,16 +26,20 @@ while True:
         name = table.schema.metadata[b"table"]
         if name == b"hello":
             snapshots = table.schema.metadata[b"snapshots"] == b"true"
-            every = json.loads(table.schema.metadata[b"arguments"])["every"]
+            told = json.loads(table.schema.metadata[b"arguments"])
+            every, dies_at, marker = told["every"], told.get("dies_at"), told.get("marker", "")
             empty = pa.RecordBatch.from_pydict({})
             answer += frame("hello", empty, version="1", snapshots="true")
         if name == b"state":
             asked = int(table.column("state")[0].as_py())
         if name == b"call":
             asked += 1
+            if asked == dies_at and not os.path.exists(marker):
+                open(marker, "w").close()
+                os.kill(os.getpid(), signal.SIGKILL)
             if asked % every == 0:
-                told = {"turn_rad": [0.01 * asked], "rate_rad_s": [0.05]}
-                answer += frame("manoeuvres", pa.RecordBatch.from_pydict(told))
+                turn = {"turn_rad": [0.01 * asked], "rate_rad_s": [0.05]}
+                answer += frame("manoeuvres", pa.RecordBatch.from_pydict(turn))
     if snapshots:
         answer += frame("state", pa.RecordBatch.from_pydict({"state": [str(asked).encode()]}))
     sys.stdout.buffer.write(answer + struct.pack("<Q", 0))

@@ -262,7 +262,7 @@ def test_first_light_exported_read_back_and_tracked_gives_the_same_tracks(tmp_pa
     again.write_text(
         'extends = "scene.toml"\nwires = ["radar -> fusion -> tracker"]\n'
         'blocks.remove = ["traffic", "transform", "gate"]\n[blocks.radar]\n'
-        'type = "sensor.recorded"\nfile = "run.ast"\nmodel = "scene.toml"\n'
+        'type = "sensor.recorded"\nfile = "run.ast"\nblock = "0/1"\nmodel = "scene.toml"\n'
         f"azimuth_error_deg = {angle}\nelevation_error_deg = {angle}\n"
         f"range_error_m = {math.sqrt(stated['range_variance_m2'])}\n"
     )

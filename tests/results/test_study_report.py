@@ -67,6 +67,21 @@ def test_the_page_holds_what_was_asked_and_what_came_of_it(folder: Path) -> None
     assert again.read_bytes() == first
 
 
+def test_a_program_that_reads_it_aloud_finds_its_way(folder: Path) -> None:
+    """Landmarks around everything, heads with words, wide tables that a keyboard moves."""
+    call("report", folder)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    body = page.partition("<body>")[2].partition("</body>")[0]
+    outside = re.sub(r"<(header|nav|main)>.*?</\1>", "", body, flags=re.DOTALL)
+    assert re.sub(r"<[^>]*>|\s", "", outside) == ""
+    assert [page.count(mark) for mark in ("<main>", "<h1>", "<nav>")] == [1, 1, 1]
+    heads = re.findall(r"<th[^>]*>(.*?)</th>", page)
+    assert len(heads) > 20 and all(heads)
+    wide = re.findall(r"<div class='wide'[^>]*>", page)
+    assert wide and all("tabindex='0'" in one for one in wide)
+    assert all('alt="' in one for one in re.findall(r"<img[^>]*>", page))
+
+
 def test_it_can_stand_elsewhere_and_says_what_is_no_study(folder: Path, tmp_path: Path) -> None:
     assert call("report", folder, "--out", tmp_path / "page.html", "--no-figures").exit_code == 0
     assert (tmp_path / "page.html").stat().st_size > 3000

@@ -1,12 +1,16 @@
 """Shares, means and differences of a study's runs, from tables written by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pyarrow as pa
 import pytest
 from scipy import stats
 
+from dsa_des.commands.what_changed import Units, say_what_changed
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.summary import compare_axis
+from dsa_des.results.statistics import difference
+from dsa_des.results.summary import compare_axis, summarise
 from tests.results.conftest import rows_of_table
 
 
@@ -48,3 +52,47 @@ def test_runs_of_one_encounter_are_one_unit():
     assert (found.value, found.count) == (pytest.approx(11.0), 2)
     expected = stats.ttest_1samp([2.0, 20.0], 0.0).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_no_interval_reaches_beyond_what_values_can_be():
+    """Of distances with one far from all others, whose interval by Student is a wide one."""
+    values = [0.1, 0.2, 0.1, 0.3, 9.0]
+    rows = rows_of_table(table(replica=[0, 1, 2, 3, 4], x=values), [], [])
+    plain = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
+    assert plain.low < 0.0 and plain.high > 4.0
+    bounds = {
+        (None, None): (plain.low, plain.high), (0.0, None): (0.0, plain.high),
+        (None, 4.0): (plain.low, 4.0), (0.0, 100.0): (0.0, plain.high),
+    }  # fmt: skip
+    for (least, most), expected in bounds.items():
+        result = Result("x", NUMBER, "a distance", least=least, most=most)
+        (line,) = summarise(rows, [result], 0.95, "t", {})
+        assert (line.estimate.low, line.estimate.high) == pytest.approx(expected)
+        assert line.estimate.value == pytest.approx(np.mean(values))
+    alone = rows_of_table(table(replica=[0], x=[3.0]), [], [])
+    (line,) = summarise(alone, [Result("x", NUMBER, "a distance", least=0.0)], 0.95, "t", {})
+    assert line.estimate.value == 3.0 and np.isnan([line.estimate.low, line.estimate.high]).all()
+
+
+ROUNDED = [0.1 + 0.2, 1e6 / 3.0 * 3.0, 7.0, 0.7 + 0.1]
+EXACT = [0.3, 1e6, 7.0, 0.8]
+
+
+def said_of(first, second, capsys):
+    runs = table(rate=[1] * 4 + [2] * 4, replica=[0, 1, 2, 3] * 2, x=[*first, *second])
+    tables = SimpleNamespace(rows=rows_of_table(runs, ["rate"], []))
+    sides = Units(tables, np.arange(4)), Units(tables, np.arange(4, 8))
+    say_what_changed(("a", "b"), [("", sides)], [NUMBERED])
+    return capsys.readouterr().out
+
+
+def test_what_differs_by_rounding_only_has_not_changed(capsys):
+    assert EXACT != ROUNDED
+    assert "1 other results are the same in every run" in said_of(EXACT, ROUNDED, capsys)
+    assert "changed: x" in said_of(EXACT, [*ROUNDED[:3], 0.81], capsys)
+    found = difference(np.array(EXACT), np.array(ROUNDED), 0.95)
+    assert (found.paired.value, found.paired.low, found.paired.high) == (0.0, 0.0, 0.0)
+    assert found.unpaired.value == 0.0
+    # Small numbers that differ are no rounding, whatever their size.
+    small = difference(1e-20 * np.array(EXACT), 2e-20 * np.array(EXACT), 0.95)
+    assert small.paired.value == pytest.approx(1e-20 * np.mean(EXACT))

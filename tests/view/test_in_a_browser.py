@@ -3,7 +3,6 @@
 Left out by name where Playwright's Python package or a Chromium is missing.
 """
 
-import itertools
 import shutil
 
 import numpy as np
@@ -185,31 +184,4 @@ def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
         opened.evaluate("t => App.seek(t)", row["illuminated_s"])
         (beam,) = opened.evaluate("App.state().beams")
         assert beam["azimuth_deg"] == pytest.approx(np.degrees(row["azimuth_rad"]), abs=1.5)
-    opened.close()
-
-
-def test_names_of_a_swarm_do_not_cover_each_other(browser, tmp_path):
-    text = SCENE.format(title="t", name="swarm 0")
-    first = text[text.index("[[blocks.traffic.intruders]]") :]
-    for number in range(1, 8):
-        moved = first.replace("north_m = -3500", f"north_m = {-3500 + 15 * number}")
-        text += moved.replace("swarm 0", f"swarm {number}")
-    text += first.replace("swarm 0", "alone").replace("east_m = -2500", "east_m = 1500")
-    (tmp_path / "scene.toml").write_text(text)
-    dsa_des.run(dsa_des.load_scene(tmp_path / "scene.toml"), out=tmp_path / "run")
-    assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
-    opened = browser.new_page()
-    opened.goto(f"file://{tmp_path / 'run.html'}#t=3.1")
-    boxes = opened.evaluate("App.state().labels")
-    assert {f"swarm {k}" for k in range(8)} | {"alone"} == {box["words"] for box in boxes}
-    for one, other in itertools.combinations(boxes, 2):
-        beside = one["left"] >= other["right"] or other["left"] >= one["right"]
-        assert beside or one["top"] >= other["low"] or other["top"] >= one["low"], (one, other)
-    # Who has room keeps to its place: the track's name above, the target's below.
-    x, y = opened.evaluate(
-        "(() => { const at = Data.truths(3.1).find(one => Data.targets[one.target] === 'alone');"
-        " return Plan.place(at.east, at.north); })()"
-    )
-    (box,) = [box for box in boxes if box["words"] == "alone" and box["low"] > y]
-    assert (box["left"], box["low"]) == pytest.approx((x + 7.0, y + 15.0))
     opened.close()

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import struct
+from html import unescape
 
 import numpy as np
 import pymap3d
@@ -14,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.display.symbols import sensor_marks
+from components.display.symbols import block_marks
 from components.sensor import marks
 from components.view.command import view
 
@@ -127,7 +128,7 @@ def test_sensors_of_one_kind_differ_in_marker_and_shade():
     types = {f"radar{k}": "radar.swerling" for k in range(3)}
     types |= {"eo0": "optical.eo", "eo1": "optical.projection", "my": "a:B",
               "ir0": "optical.ir", "ir1": "optical.ir"}  # fmt: skip
-    found = sensor_marks(types)
+    found = block_marks(types)
     assert [found[name].colour for name in ("radar0", "eo0", "ir0")] == [
         marks.RADAR.colour, marks.EO.colour, marks.IR.colour
     ]  # fmt: skip
@@ -162,6 +163,26 @@ def test_only_the_program_inside_may_run_and_nothing_is_fetched(run):
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert policy.startswith("default-src &#x27;none&#x27;") and f"sha256-{digest}" in policy
     assert not re.search(r"https?://|src=|@import|url\(|fetch\(|XMLHttp|WebSocket", page)
+
+
+def test_pages_beside_each_other_run_their_two_programs_and_nothing_else(run, tmp_path):
+    """Frames take the policy of the page that they stand in, beside their own."""
+    assert call(run[0], run[0], "--out", tmp_path / "two.html").exit_code == 0
+    page = (tmp_path / "two.html").read_text(encoding="utf-8")
+    frames = [unescape(text) for text in re.findall(r'srcdoc="([^"]*)"', page)]
+    assert len(frames) == 2
+    for frame in frames:
+        assert "<script>alert" not in frame and data_of(frame)["targets"] == [HOSTILE]
+    outer = re.sub(r'srcdoc="[^"]*"', "", page)
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', outer)
+    programs = [
+        re.findall(r"<script>(.*?)</script>", text, re.S)[-1] for text in (outer, frames[0])
+    ]
+    allowed = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+               for text in programs]  # fmt: skip
+    assert policy.startswith("default-src &#x27;none&#x27;")
+    assert re.findall(r"sha256-([^&]*)&", policy) == allowed
+    assert "<script>alert" not in outer and outer.count("<script") == 1
 
 
 def test_the_same_run_gives_the_same_page(run, tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 
 from components.aircraft.known_targets import known_targets
 from components.foreign.fmu.message_columns import message_column
-from components.foreign.fmu.own_pose import own_columns
+from components.foreign.fmu.own_pose import own_columns, true_lines
 from components.foreign.fmu.parameters import FmuParameters
 from components.foreign.fmu.units import unit_of_column
 from components.foreign.signals import Signals
@@ -169,10 +169,11 @@ class ForeignFmu(Component):
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
         values, traffic = self._values(wake)
-        seen_from = None
+        seen_from = truth = None
         if self.p.detections and self._sees_own:
             moves = wiring.detections.asks_for_velocity()
             seen_from, self._own = own_columns(wake, "messages", self._own, moves=moves)
+            truth = true_lines(wake, "messages", len(self._roster))
         if len(own) == 0:
             return None
         rows = np.ascontiguousarray(values[own])
@@ -197,9 +198,10 @@ class ForeignFmu(Component):
             answer[name] = answer[name][: len(own)]
         sent = self._messages(wake.ticks[own], answer, traffic, own)
         if self.p.detections:
-            seen_from = None if seen_from is None else seen_from[:, own]
+            if seen_from is not None and truth is not None:
+                seen_from, truth = seen_from[:, own], truth[:, own]
             sent["detections"] = wiring.detections.message(
-                wake.ticks[own], wake.scans[own], answer["numbers"], seen_from, self._roster
+                wake.ticks[own], wake.scans[own], answer["numbers"], seen_from, truth, self._roster
             )
         return sent
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.foreign.fmu.model import TEXT_KINDS, FmuModel
-from components.foreign.reported_look import reported_looks
+from components.foreign.reported_look import TRUE_LINE, reported_looks
 from components.geometry import wrap_pi
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
 from components.messages.detections import Detections, SensorOffer
@@ -120,8 +120,6 @@ class DetectionOutputs:
 
     def _judge(self) -> None:
         if not self._columns and not self.wrong:
-            if self.targets:
-                self.wrong.append("targets: without detections there are none to name")
             return
         self.wrong += [
             f"detections: {name} is needed" for name in _NEEDED
@@ -199,7 +197,7 @@ class DetectionOutputs:
 
     def message(
         self, tick: IntArray, scan: IntArray, numbers: FloatArray, own: FloatArray | None,
-        roster: Roster,
+        truth: FloatArray | None, roster: Roster,
     ) -> Detections:  # fmt: skip
         """Return the looks.
 
@@ -210,6 +208,8 @@ class DetectionOutputs:
             Of the FMU.
         own : (9, rows), or None
             The ownship's pose and velocity (`own_pose`), where blocks upstream say it.
+        truth : (3, rows, targets), or None
+            True azimuth, elevation and range of the roster's targets, where a line of sight came.
         roster : Roster
 
         Raises
@@ -247,6 +247,9 @@ class DetectionOutputs:
         of_rows = dict(zip(_OF_ROWS, unsaid if own is None else own, strict=True))
         of_rows |= {name: values[name][:, 0].copy() for name in _OF_ROWS if name in values}
         places = [roster.names.index(name) for name in self.targets] or [-1] * self.count
+        target = np.array(places, dtype=np.int64)[which]
+        if truth is not None and self.targets:
+            entries |= dict(zip(TRUE_LINE, truth[:, row, target], strict=True))
         counts = np.bincount(row, minlength=rows)
         more: dict[str, Any] = {}
         if "range_rate_m_s" in entries:
@@ -257,5 +260,5 @@ class DetectionOutputs:
         looks = {name: of_rows[name] for name in POSE} if says else {}
         return reported_looks(
             tick, scan, np.concatenate(([0], np.cumsum(counts))), entries, looks,
-            np.array(places, dtype=np.int64)[which], roster, **more,
+            target, roster, **more,
         )  # fmt: skip

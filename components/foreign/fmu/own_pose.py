@@ -1,4 +1,4 @@
-"""What messages say of the ownship: its pose as believed, its velocity; held until news come."""
+"""What messages say of the ownship, held until news come, and where targets truly are."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from components.messages.targets import RelativeTargets, TrafficStates, own_velo
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
-_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+_STATE_OF_OWN = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 
 
@@ -60,12 +60,30 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
     if isinstance(message, TrafficStates):
-        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _BELIEVED]
+        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _STATE_OF_OWN]
         return found
     if message.believed is not None:
-        found[: len(POSE)] = [message.believed[name] for name in _BELIEVED]
+        found[: len(POSE)] = [message.believed[name] for name in _STATE_OF_OWN]
     if moves:
         state: IntArray = message.tick if message.state_tick is None else message.state_tick
         time_s = wake.own_ticks(state) / wake.ticks_per_s
         found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
+    return found
+
+
+def true_lines(wake: Wake, port: str, targets: int) -> FloatArray:
+    """Return where targets truly are, (3, rows, targets); NaN where no line of sight came then.
+
+    Azimuth and elevation in the ownship's body axes, and range.
+    """
+    found = np.full((3, len(wake), targets), np.nan)
+    for arrivals in wake.arrivals(port):
+        message = arrivals.message
+        if not isinstance(message, RelativeTargets):
+            continue
+        row, place = np.nonzero(wake.ticks[:, np.newaxis] == arrivals.tick)
+        lines = (message.body_azimuth_rad, message.body_elevation_rad, message.range_m)
+        for k, values in enumerate(lines):
+            seen = np.where(message.present[place], values[place], np.nan)
+            found[k][row[:, np.newaxis], message.columns] = seen
     return found

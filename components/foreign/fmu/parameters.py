@@ -40,7 +40,8 @@ class FmuParameters(Parameters):
     inputs: dict[str, str] = Field(
         default={},
         description='Where inputs come from: "BLOCK.COLUMN", "BLOCK.COLUMN[TARGET]", and of '
-        'another FMU "BLOCK.VARIABLE"; a whole terminal as "BLOCK" or "BLOCK[TARGET]".',
+        'another FMU "BLOCK.VARIABLE"; a whole terminal as "BLOCK" or "BLOCK[TARGET]". With '
+        '"BLOCK.COLUMN[*]" an array, or "plane[*].range", takes the values of all `targets`.',
     )
     outputs: list[str] | None = Field(
         default=None, description="Variables that are sent and recorded; by default all outputs."
@@ -66,7 +67,8 @@ class FmuParameters(Parameters):
     )
     targets: list[str] = Field(
         default=[],
-        description="Names of the targets that these are, one by one; without, trackers decide.",
+        description="Names of the targets that inputs of [*] and detections are of, one by one; "
+        "without, trackers decide whose detections they are.",
     )
     deadline_s: float = Field(
         default=10.0, gt=0, description="Longest time for one communication point, s."
@@ -96,6 +98,13 @@ class FmuParameters(Parameters):
         Disagreements.refuse(wiring.wrong)
         self._wiring = wiring
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys change nothing."""
+        starred = any(source.endswith("[*]") for source in self.inputs.values())
+        if self.detections or starred:
+            return []
+        return self.idle("targets", because="without detections and inputs of [*]")
 
     def clock_spec(self) -> ClockSpec | None:
         """Return when it communicates, if that does not follow from what arrives."""

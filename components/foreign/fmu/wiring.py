@@ -145,7 +145,7 @@ class Wiring:
                 given |= {v: f"{block}.{member}{tail}" for member, v in inputs.items()}
         groups: dict[str, list[Variable]] = {}
         parsed: list[tuple[Variable, int, str]] = []
-        for name, source in given.items():
+        for name, source in self._of_each_target(given):
             try:
                 variable, place = self._input(name)
             except ValueError as error:
@@ -176,6 +176,25 @@ class Wiring:
         self.discrete = any(
             variable.variability != "continuous" for group in groups.values() for variable in group
         )
+
+    def _of_each_target(self, given: Mapping[str, str]) -> list[tuple[str, str]]:
+        """Return the inputs with their sources; one of ``BLOCK.COLUMN[*]`` is one of each target.
+
+        Of an array these are its elements, of ``plane[*].range`` the inputs of that number.
+        """
+        found = []
+        for name, source in given.items():
+            if not source.endswith("[*]"):
+                found.append((name, source))
+                continue
+            if not self.p.targets:
+                self.wrong.append(f"inputs: {name!r} is {source!r}: targets must name them")
+            numbered = name if "*" in name else f"{name}[*]"
+            found += [
+                (numbered.replace("*", str(k)), f"{source[:-3]}[{target}]")
+                for k, target in enumerate(self.p.targets, start=1)
+            ]
+        return found
 
     def _is_input(self, name: str) -> bool:
         variable = self.model.variables.get(name)

@@ -25,7 +25,7 @@ const Altitude = (() => {
     }
     const far = marks.reduce((most, m) => Math.max(most, m.far), 1000) * 1.1;
     const apart = marks.reduce((most, m) => Math.max(most, Math.abs(m.alt - own.alt)), 100) * 1.2;
-    const left = 58, bottom = 18;
+    const left = 65, bottom = 18;
     const x = (m) => left + (m / far) * (width - left - 6);
     const y = (alt) => (height - bottom) / 2 - ((alt - own.alt) / apart) * ((height - bottom) / 2 - 4);
     c.strokeStyle = Symbols.colours.line;
@@ -39,7 +39,7 @@ const Altitude = (() => {
       Canvas.text(c, `${+(m / 1000).toFixed(2)} km`, x(m), height - 4, Symbols.colours.faint, "center");
     }
     for (const up of [-apart / 1.2, 0, apart / 1.2]) {
-      Canvas.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
+      Canvas.text(c, `${Math.round(own.alt + up)} m`, left - 11, y(own.alt + up) + 4,
         Symbols.colours.faint, "right");
     }
     if (options.bands) {  // altitudes that lose separation, beside the scale

@@ -3,7 +3,7 @@
 const App = (() => {
   const get = (id) => document.getElementById(id);
   const root = document.documentElement;
-  const state = { t: 0, playing: false, speed: 1, steps: -1, dirty: true, shownAt: 0 };
+  const state = { t: 0, playing: false, speed: 1, steps: -1, dirty: true, keepsTime: true };
   const options = {
     sensors: new Set(Data.sensors.map((_, number) => number)),
     truth: Boolean(Data.tables.truth), tracks: true, fields: true, bands: Boolean(Data.tables.bands),
@@ -12,15 +12,53 @@ const App = (() => {
   let drawn = {};
   let frames = { count: 0, spent_ms: 0 };
 
-  function seek(t) {
-    state.t = Math.min(Math.max(t, 0), Data.duration_s);
+  // What is done to one page is done to all beside it (view A B): they share clock, scale and theme.
+  // The first of them keeps the time.
+  let beside = [];
+  const shared = {
+    seek(t) { state.t = Math.min(Math.max(t, 0), Data.duration_s); },
+    play(on) {
+      state.playing = on;
+      get("play").textContent = on ? "Pause" : "Play";
+    },
+    speed(factor) {
+      state.speed = factor;
+      get("speed").value = String(factor);
+    },
+    scale(perPixel) { Plan.view.perPixel = perPixel; },
+    pan(dx, dy) { Plan.pan(dx, dy); },
+    near() { Plan.near(state.t); },
+    all() { Plan.all(state.t); },
+    follow(on) {
+      options.follow = on;
+      get("follow").setAttribute("aria-pressed", String(on));
+    },
+    headingUp(on) {
+      options.headingUp = on;
+      get("up").textContent = on ? "Heading up" : "North up";
+    },
+    theme(name) {
+      root.dataset.theme = name;
+      Symbols.readTheme();
+      Timeline.forget();
+    },
+  };
+  function perform(what, ...values) {
+    shared[what](...values);
     state.dirty = true;
   }
+  function tell(what, ...values) {
+    perform(what, ...values);
+    for (const other of beside) other.perform(what, ...values);
+  }
+  function seek(t) { tell("seek", t); }
   function play(on) {
     if (on && state.t >= Data.duration_s) seek(0);
-    state.playing = on;
-    get("play").textContent = on ? "Pause" : "Play";
-    state.dirty = true;
+    tell("play", on);
+  }
+  function fit(what) {
+    tell(what);
+    if (beside.length) tell("scale", Math.max(...[App, ...beside].map((one) => one.scale())));
   }
   function step(direction) {
     play(false);
@@ -58,7 +96,7 @@ const App = (() => {
   }
   let last = null;
   function frame(now) {
-    if (state.playing && last !== null) {
+    if (state.playing && last !== null && state.keepsTime) {
       seek(state.t + (state.speed * Math.min(now - last, 250)) / 1000);
       if (state.t >= Data.duration_s) play(false);
     }
@@ -67,36 +105,22 @@ const App = (() => {
     requestAnimationFrame(frame);
   }
 
-  function toggle(name, button) {
-    options[name] = !options[name];
-    if (button) button.setAttribute("aria-pressed", String(options[name]));
-    state.dirty = true;
-  }
-  function turnUp() {
-    options.headingUp = !options.headingUp;
-    get("up").textContent = options.headingUp ? "Heading up" : "North up";
-    state.dirty = true;
-  }
-  function theme(name) {
-    root.dataset.theme = name;
-    Symbols.readTheme();
-    Timeline.forget();
-    state.dirty = true;
-  }
   function link() {
     const hash = `#t=${+(state.t + Data.start_s).toFixed(6)}${options.headingUp ? "&up=heading" : ""}`;
-    history.replaceState(null, "", hash);
+    page.history.replaceState(null, "", hash);
     get("note").textContent = `address ends in ${hash}`;
-    if (navigator.clipboard) navigator.clipboard.writeText(location.href).catch(() => {});
+    if (navigator.clipboard) navigator.clipboard.writeText(page.location.href).catch(() => {});
   }
+  // Pages beside each other stand in one, whose address it is.
+  const page = window.frameElement ? window.parent : window;
   function readLink() {
-    const parts = new URLSearchParams(location.hash.slice(1));
+    const parts = new URLSearchParams(page.location.hash.slice(1));
     const t = Number(parts.get("t"));
     if (parts.has("t") && Number.isFinite(t)) {
       play(false);
       seek(t - Data.start_s);
     }
-    if (parts.get("up") === "heading" && !options.headingUp) turnUp();
+    if (parts.get("up") === "heading") tell("headingUp", true);
   }
 
   // A sensor's marker as it stands on the plan; its colour holds in both themes.
@@ -132,19 +156,19 @@ const App = (() => {
   }
   get("steps").add(new Option("all shown", "-1", true, true));
   Data.sensors.forEach((s, n) => get("steps").add(new Option(s.name, String(n))));
-  get("facts").textContent = Object.entries(Data.facts)
+  document.querySelector("h1").title = document.title;
+  get("facts").title = get("facts").textContent = Object.entries(Data.facts)
     .map(([k, v]) => (k === "description" ? v : `${k} ${v}`)).join(" · ");
 
   const press = {
     play: () => play(!state.playing), back: () => step(-1), forth: () => step(1),
-    up: turnUp, follow: () => toggle("follow", get("follow")), link,
-    in: () => { Plan.zoom(1 / 1.4); state.dirty = true; },
-    out: () => { Plan.zoom(1.4); state.dirty = true; },
-    fit: () => { Plan.fit(); state.dirty = true; },
-    theme: () => theme(root.dataset.theme === "dark" ? "light" : "dark"),
+    up: () => tell("headingUp", !options.headingUp), follow: () => tell("follow", !options.follow),
+    link, in: () => tell("scale", Plan.zoomed(1 / 1.4)), out: () => tell("scale", Plan.zoomed(1.4)),
+    near: () => fit("near"), all: () => fit("all"),
+    theme: () => tell("theme", root.dataset.theme === "dark" ? "light" : "dark"),
   };
   for (const [id, act] of Object.entries(press)) get(id).addEventListener("click", act);
-  get("speed").addEventListener("change", (e) => { state.speed = Number(e.target.value); });
+  get("speed").addEventListener("change", (e) => tell("speed", Number(e.target.value)));
   get("steps").addEventListener("change", (e) => { state.steps = Number(e.target.value); });
   get("time").addEventListener("change", (e) => {
     const t = Number(e.target.value);
@@ -155,7 +179,7 @@ const App = (() => {
     " ": press.play, ArrowRight: (e) => (e.shiftKey ? seek(state.t + 1) : step(1)),
     ArrowLeft: (e) => (e.shiftKey ? seek(state.t - 1) : step(-1)),
     Home: () => seek(0), End: () => seek(Data.duration_s), "+": press.in, "=": press.in,
-    "-": press.out, 0: press.fit, n: press.up, f: press.follow, l: press.link, d: press.theme,
+    "-": press.out, 0: press.near, a: press.all, n: press.up, f: press.follow, l: press.link, d: press.theme,
   };
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -175,16 +199,14 @@ const App = (() => {
   });
   Plan.canvas.addEventListener("pointermove", (e) => {
     if (!dragged) return;
-    if (options.follow) toggle("follow", get("follow"));
-    Plan.pan(e.clientX - dragged[0], e.clientY - dragged[1]);
+    if (options.follow) tell("follow", false);
+    tell("pan", e.clientX - dragged[0], e.clientY - dragged[1]);
     dragged = [e.clientX, e.clientY];
-    state.dirty = true;
   });
   Plan.canvas.addEventListener("pointerup", () => { dragged = null; });
   Plan.canvas.addEventListener("wheel", (e) => {
     e.preventDefault();
-    Plan.zoom(e.deltaY > 0 ? 1.15 : 1 / 1.15);
-    state.dirty = true;
+    tell("scale", Plan.zoomed(e.deltaY > 0 ? 1.15 : 1 / 1.15));
   }, { passive: false });
   const slide = (e) => { play(false); seek(Timeline.timeAt(e.offsetX)); };
   Timeline.canvas.addEventListener("pointerdown", (e) => {
@@ -194,16 +216,31 @@ const App = (() => {
   Timeline.canvas.addEventListener("pointermove", (e) => { if (e.buttons) slide(e); });
 
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
-  dark.addEventListener("change", () => theme(dark.matches ? "dark" : "light"));
+  dark.addEventListener("change", () => perform("theme", dark.matches ? "dark" : "light"));
   window.addEventListener("resize", () => { Timeline.forget(); state.dirty = true; });
-  window.addEventListener("hashchange", readLink);
-  theme(dark.matches ? "dark" : "light");
-  Plan.fit();
+  page.addEventListener("hashchange", readLink);
+  perform("theme", dark.matches ? "dark" : "light");
+  Plan.near(0);
   readLink();
   requestAnimationFrame(frame);
 
+  // Stand beside other pages: `lasts_s` is the longest of all.
+  function join(others, keepsTime, lasts_s) {
+    beside = others;
+    state.keepsTime = keepsTime;
+    Data.duration_s = lasts_s;
+    Timeline.forget();
+    root.classList.add("beside");
+    root.classList.toggle("listens", !keepsTime);
+    if (keepsTime) {
+      fit("near");
+      readLink();
+    }
+  }
+
   // What is on screen, for those who look at it by program.
   return {
+    join, perform, scale: () => Plan.view.perPixel, lasts_s: Data.duration_s,
     state: () => { render(true); return { ...drawn, playing: state.playing }; },
     seek, play, step, options,
     timing: () => ({ ...frames, mean_ms: frames.spent_ms / Math.max(1, frames.count) }),

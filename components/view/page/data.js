@@ -107,6 +107,88 @@ const Data = (() => {
     return found;
   }
 
+  // Rows of the last instant of each source (a column: who sends) not after t. What a source says
+  // stands until it may say something else: two and a half of its steps.
+  const lasting = new Map();
+  function lasts(name, column) {
+    if (!lasting.has(name)) {
+      const { time_s } = tables[name], before = new Map(), steps = [];
+      for (let i = 0; i < time_s.length; i++) {
+        const who = column ? column[i] : 0, step = time_s[i] - before.get(who);
+        if (step > 0) steps.push(step);
+        before.set(who, time_s[i]);
+      }
+      steps.sort((a, b) => a - b);
+      lasting.set(name, Math.max(1, 2.5 * (steps[steps.length >> 1] || 0)));
+    }
+    return lasting.get(name);
+  }
+  function standing(name, t) {
+    const table = tables[name];
+    if (!table) return [];
+    const found = [], newest = new Map(), oldest = t - lasts(name, table.source);
+    for (let i = after(table.time_s, t) - 1; i >= 0 && table.time_s[i] >= oldest; i--) {
+      const who = table.source ? table.source[i] : 0;
+      if (!newest.has(who)) newest.set(who, table.time_s[i]);
+      if (newest.get(who) === table.time_s[i]) found.push(i);
+    }
+    return found.reverse();
+  }
+  // What a track is called, and which tracker's it is where there are several.
+  function trackName(number, source) {
+    const who = raw.trackers && raw.trackers.length > 1 && source >= 0 ? raw.trackers[source] : "track";
+    return `${who} ${number}`;
+  }
+  // The highest level of each aircraft with an alert, whoever alerts.
+  function alertsAt(t) {
+    const a = tables.alerts, found = new Map();
+    for (const i of standing("alerts", t)) {
+      const target = a.target[i], track = a.track ? a.track[i] : -1;
+      const who = target >= 0 ? target : `track ${track}`;
+      if (a.level[i] > 0 && !(found.has(who) && found.get(who).level >= a.level[i])) {
+        found.set(who, { target, track, level: a.level[i] });
+      }
+    }
+    return [...found.values()];
+  }
+
+  // How far around the ownship that happens which matters: alerts, else detections, else the last
+  // minute before the closest approach.
+  function nearReach() {
+    const spanOf = new Map(spans.map((span) => [span.target, span]));
+    function apart(target, t) {
+      const span = spanOf.get(target);
+      const at = span && between(tables.truth.time_s, [tables.truth.east_m, tables.truth.north_m], t,
+        span.from, span.to);
+      const here = ownship(t);
+      return at ? Math.hypot(at[0] - here.east, at[1] - here.north) : NaN;
+    }
+    const a = tables.alerts, d = tables.detections;
+    const far = [];
+    for (let i = 0; a && i < a.count; i++) if (a.level[i] > 0) far.push(apart(a.target[i], a.time_s[i]));
+    const alerted = far.filter(Number.isFinite);
+    if (alerted.length) return alerted.reduce((most, one) => Math.max(most, one));
+    const seen = [];
+    for (let i = 0; d && i < d.count; i++) {
+      if (d.target[i] < 0) continue;
+      const here = Number.isFinite(d.east_m[i])
+        ? Math.hypot(d.east_m[i] - d.from_east_m[i], d.north_m[i] - d.from_north_m[i])
+        : apart(d.target[i], d.time_s[i]);
+      if (Number.isFinite(here)) seen.push(here);
+    }
+    if (seen.length) return seen.sort((x, y) => x - y)[Math.floor(0.9 * (seen.length - 1))];
+    let closest = { far: Infinity, t: 0, target: -1 };
+    for (const span of spans) {
+      for (let i = span.from; i < span.to; i++) {
+        const far = apart(span.target, tables.truth.time_s[i]);
+        if (far < closest.far) closest = { far, t: tables.truth.time_s[i], target: span.target };
+      }
+    }
+    const span = spanOf.get(closest.target);
+    if (!span) return 5000;
+    return apart(closest.target, Math.max(closest.t - 60, tables.truth.time_s[span.from]));
+  }
+
   // Times of detections by sensor and target, with the range at the first.
   const looks = raw.sensors.map(() => new Map());
   if (tables.detections) {
@@ -125,7 +207,8 @@ const Data = (() => {
   const scanTimes = scans.map((rows) => Float64Array.from(rows, (i) => tables.scans.time_s[i]));
 
   return {
-    ...raw, tables, after, ownship, truths, recent, latest, bandsAt, looks, scanTimes,
+    ...raw, tables, after, ownship, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
+    looks, scanTimes, reach: { near_m: nearReach() },
     scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
   };
 })();

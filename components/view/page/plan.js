@@ -2,9 +2,30 @@
 // The plan: east and north of the start, north or heading up.
 const Plan = (() => {
   const canvas = document.getElementById("plan");
-  const MOST_NAMES = 100;  // more names cover each other, and take longest to draw
+  const MOST_NAMES = 100;  // of many aircraft the nearest are named
+  const STEPS = 5;  // how many lines a name may stand away from what it names
   const LINES_FADE = 1;  // lines cover much of the plan, and fade soon
   const view = { east: 0, north: 0, perPixel: 40, turn: 0, width: 1, height: 1 };
+  // Every aircraft has one name on the plan, whoever knows it: by the name, where and how far.
+  const names = new Map();
+  function name(words, x, y, far, colour, level = 0) {
+    const known = names.get(words);
+    if (!known) names.set(words, { words, x, y, far, colour, level });
+    else if (level > known.level) Object.assign(known, { colour, level });
+  }
+  function writeNames(own) {
+    const [x, y] = place(own.east, own.north);
+    Labels.block(x, y, 11, 11);
+    // Alerts have the first choice of room, then who is near.
+    const all = [...names.values()].sort((a, b) => a.level - b.level || b.far - a.far);
+    for (const one of all.slice(-MOST_NAMES)) Labels.block(one.x, one.y, 5, 5);
+    for (const one of all.slice(-MOST_NAMES)) {
+      const words = one.level ? `${one.words} · alert ${one.level}` : one.words;
+      Labels.add(words, one.x, one.y, one.level ? 17 : 11, 4, one.colour, STEPS);
+    }
+    names.clear();
+    return all.length;
+  }
 
   function place(east, north) {
     const x = (east - view.east) / view.perPixel;
@@ -26,9 +47,16 @@ const Plan = (() => {
       c.beginPath();
       c.arc(x, y, (i * step) / view.perPixel, 0, 2 * Math.PI);
       c.stroke();
+    }
+    return step;
+  }
+  // Behind the ownship, where less is to be seen.
+  function ringWords(c, own, step) {
+    const [x, y] = place(own.east, own.north);
+    for (let i = 1; (i * step) / view.perPixel < view.height; i++) {
       const km = (i * step) / 1000;
       Labels.keep(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
-        y - (i * step) / view.perPixel - 3, Symbols.colours.faint);
+        y + (i * step) / view.perPixel - 4, Symbols.colours.faint, Symbols.colours.ground);
     }
   }
 
@@ -98,8 +126,7 @@ const Plan = (() => {
     c.setLineDash([]);
   }
 
-  function truth(c, t, options, drawn) {
-    const few = Data.targets.length <= MOST_NAMES;
+  function truth(c, t, own, drawn) {
     c.strokeStyle = Symbols.colours.truth;
     c.lineWidth = 1;
     c.beginPath();
@@ -113,9 +140,13 @@ const Plan = (() => {
         const [u, v] = place(one.east + 10 * one.rate[0], one.north + 10 * one.rate[1]);
         c.moveTo(x, y); c.lineTo(u, v);
       }
-      if (few) Labels.add(Data.targets[one.target], x, y, 7, 12, Symbols.colours.faint);
+      name(Data.targets[one.target], x, y, away(one, own), Symbols.colours.faint);
     }
     c.stroke();
+  }
+
+  function away(one, own) {
+    return Math.hypot(one.east - own.east, one.north - own.north);
   }
 
   function detections(c, t, options, drawn) {
@@ -173,24 +204,22 @@ const Plan = (() => {
     c.setLineDash([8, 4]);
     c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
     c.setLineDash([]);
-    Labels.add(label, p, q, 6, 0, Symbols.colours.track);
+    if (label) name(label, p, q, Infinity, Symbols.colours.track);
   }
 
-  function tracks(c, t, drawn) {
+  function tracks(c, t, own, drawn) {
     const k = Data.tables.tracks;
-    const [from, to] = Data.latest("tracks", t);
     c.strokeStyle = Symbols.colours.track;
     c.lineWidth = 1.5;
     const sure = new Path2D(), tentative = new Path2D();
-    const few = to - from <= MOST_NAMES;
-    for (let i = from; i < to; i++) {
-      const label = k.number ? `#${k.number[i]}` : Data.targets[k.target[i]];
+    for (const i of Data.standing("tracks", t)) {
+      const label = k.number ? Data.trackName(k.number[i], k.source ? k.source[i] : -1) : Data.targets[k.target[i]];
       if (drawn.tracks) {
         drawn.tracks.push({ label, time_s: k.time_s[i], east_m: k.east_m[i],
           north_m: k.north_m[i] });
       }
       if (!Number.isFinite(k.east_m[i])) {
-        directionOnly(c, k, i, few ? label : "");
+        directionOnly(c, k, i, label);
         continue;
       }
       const [x, y] = place(k.east_m[i], k.north_m[i]);
@@ -206,7 +235,8 @@ const Plan = (() => {
         path.moveTo(x, y);
         path.lineTo(u, v);
       }
-      if (few) Labels.add(label, x, y, 10, -6, Symbols.colours.track);
+      const far = away({ east: k.east_m[i], north: k.north_m[i] }, own);
+      if (label) name(label, x, y, far, Symbols.colours.track);
     }
     c.stroke(sure);
     c.setLineDash([3, 3]);
@@ -214,21 +244,19 @@ const Plan = (() => {
     c.setLineDash([]);
   }
 
-  function alerts(c, t, drawn) {
-    const a = Data.tables.alerts;
-    if (!a) return;
-    const [from, to] = Data.latest("alerts", t);
+  // A ring for each aircraft with an alert, in the colour of the highest.
+  function alerts(c, t, own, drawn) {
     const where = new Map(Data.truths(t).map((one) => [one.target, one]));
-    for (let i = from; i < to; i++) {
-      if (a.level[i] <= 0) continue;
-      drawn.alerts.push({ target: Data.targets[a.target[i]], level: a.level[i] });
-      const one = where.get(a.target[i]) || lastSeen(a.target[i], t);
+    for (const { target, track, level } of Data.alertsAt(t)) {
+      const words = target >= 0 ? Data.targets[target] : Data.trackName(track);
+      drawn.alerts.push({ target: words, level });
+      const one = where.get(target) || (target >= 0 ? lastSeen(target, t) : trackAt(track, t));
       if (!one) continue;
       const [x, y] = place(one.east, one.north);
-      c.strokeStyle = Symbols.level(a.level[i]);
-      c.lineWidth = 1 + a.level[i];
+      c.strokeStyle = Symbols.level(level);
+      c.lineWidth = 1 + level;
       c.beginPath(); c.arc(x, y, 14, 0, 2 * Math.PI); c.stroke();
-      Labels.add(`alert ${a.level[i]}`, x, y, 17, -7, Symbols.level(a.level[i]));
+      if (inside(x, y)) name(words, x, y, away(one, own), Symbols.level(level), level);
     }
   }
   function lastSeen(target, t) {
@@ -236,6 +264,15 @@ const Plan = (() => {
     for (let i = Data.after(d.time_s, t) - 1; i >= 0 && d.time_s[i] > t - 20; i--) {
       if (d.target[i] === target && Number.isFinite(d.east_m[i])) {
         return { east: d.east_m[i], north: d.north_m[i] };
+      }
+    }
+    return null;
+  }
+  function trackAt(number, t) {
+    const k = Data.tables.tracks;
+    for (const i of Data.standing("tracks", t)) {
+      if (k.number && k.number[i] === number && Number.isFinite(k.east_m[i])) {
+        return { east: k.east_m[i], north: k.north_m[i] };
       }
     }
     return null;
@@ -248,25 +285,27 @@ const Plan = (() => {
     const own = Data.ownship(t);
     view.turn = options.headingUp ? own.heading : 0;
     if (options.follow) [view.east, view.north] = [own.east, own.north];
-    rings(c, own);
+    const step = rings(c, own);
     drawn.beams = [];
     if (options.fields) {
       fields(c, own, options.sensors);
       for (const number of options.sensors) beam(c, t, own, number, drawn);
     }
     if (options.bands) bands(c, t, own, drawn);
-    if (options.truth) truth(c, t, options, drawn);
+    if (options.truth) truth(c, t, own, drawn);
     detections(c, t, options, drawn);
-    if (options.tracks) tracks(c, t, drawn);
-    alerts(c, t, drawn);
-    drawn.labels = Labels.draw(c);
+    if (options.tracks) tracks(c, t, own, drawn);
+    alerts(c, t, own, drawn);
+    ringWords(c, own, step);
+    drawn.named = writeNames(own);
+    drawn.labels = Labels.draw(c, Symbols.colours.ground);
     const [x, y] = place(own.east, own.north);
     Symbols.aircraft(c, x, y, own.heading - view.turn, 11, Symbols.colours.own);
     drawn.own = own;
   }
 
-  function zoom(factor) {
-    view.perPixel = Math.min(Math.max(view.perPixel * factor, 0.05), 5000);
+  function zoomed(factor) {
+    return Math.min(Math.max(view.perPixel * factor, 0.05), 5000);
   }
   function pan(dx, dy) {
     const cos = Math.cos(view.turn), sin = Math.sin(view.turn);
@@ -274,22 +313,24 @@ const Plan = (() => {
     view.north += view.perPixel * (dx * sin + dy * cos);
   }
 
-  function fit() {
-    let far = 1000;
-    const own = Data.ownship(0);
-    const look = (east, north) => {
-      for (let i = 0; i < east.length; i++) {
-        const away = Math.hypot(east[i] - own.east, north[i] - own.north);
-        if (Number.isFinite(away)) far = Math.max(far, away);
-      }
-    };
-    for (const name of ["own", "truth", "detections"]) {
-      const table = Data.tables[name];
-      if (table) look(table.east_m, table.north_m);
-    }
-    view.perPixel = (2.2 * far) / Math.max(200, Math.min(canvas.clientWidth, canvas.clientHeight));
+  function frame(far, own) {
+    const size = Math.min(canvas.clientWidth, canvas.clientHeight);
+    view.perPixel = (2.3 * Math.max(far, 500)) / Math.max(200, size);
     [view.east, view.north] = [own.east, own.north];
   }
+  // What matters in the whole run, around the ownship.
+  function near(t) { frame(Data.reach.near_m, Data.ownship(t)); }
+  // All that is there now.
+  function all(t) {
+    const own = Data.ownship(t), d = Data.tables.detections;
+    let far = Data.truths(t).reduce((most, one) => Math.max(most, away(one, own)), 1000);
+    const [from, to] = Data.recent("detections", t, 4);
+    for (let i = from; i < to; i++) {
+      const seen = away({ east: d.east_m[i], north: d.north_m[i] }, own);
+      if (Number.isFinite(seen)) far = Math.max(far, seen);
+    }
+    frame(far, own);
+  }
 
-  return { canvas, view, draw, zoom, pan, fit, place };
+  return { canvas, view, draw, zoomed, pan, near, all, place };
 })();

@@ -74,10 +74,10 @@ const Timeline = (() => {
     c.drawImage(still.copy, 0, 0, canvas.clientWidth, canvas.clientHeight);
     c.fillStyle = Symbols.colours.own;
     c.fillRect(x(t) - 1, 0, 2, canvas.clientHeight - 16);
+    canvas.setAttribute("aria-valuemax", String(Data.duration_s));
     canvas.setAttribute("aria-valuenow", t.toFixed(3));
     canvas.setAttribute("aria-valuetext", `${(t + Data.start_s).toFixed(2)} s`);
   }
   function forget() { still = null; }
-  canvas.setAttribute("aria-valuemax", String(Data.duration_s));
   return { canvas, draw, timeAt, forget };
 })();

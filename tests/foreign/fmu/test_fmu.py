@@ -214,6 +214,7 @@ def test_one_clear_error_and_nothing_left(lab, lag, fault, said, monkeypatch):
         lab.run(scene)
     assert caught.value.exit_code == 3
     assert said in str(caught.value) and "\n" not in str(caught.value)
+    assert ".py" not in str(caught.value)  # where it was noticed is of no use to anybody
     now = _left_behind()
     assert not now[0] and now[1] <= before[1]
 

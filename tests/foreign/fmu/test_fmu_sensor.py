@@ -34,10 +34,14 @@ def scene(path, version=3, *, duration_s=4, **keys):
     found = chain({}, duration_s=duration_s, fusion={"type": "fusion.pass_through"},
                   tracker={"type": "tracking.ekf"})  # fmt: skip
     inputs = {}
-    for i, name in enumerate(_NAMES, start=1):
-        for what, column in _IN.items():
-            place = f"{what}_in[{i}]" if version == 3 else f"plane[{i}].{what}_in"
-            inputs[place] = f"transform.{column}[{name}]"
+    for what, column in _IN.items():
+        name = f"{what}_in" if version == 3 else f"plane[*].{what}_in"
+        inputs[name] = f"transform.{column}[*]"
+        if "targets" not in keys:  # the same, one by one
+            del inputs[name]
+            name = name if "*" in name else f"{name}[*]"
+            for i, target in enumerate(_NAMES, start=1):
+                inputs[name.replace("*", str(i))] = f"transform.{column}[{target}]"
     said = {"detected": "seen", "azimuth_rad": "azimuth", "elevation_rad": "elevation",
             "range_m": "range"}  # fmt: skip
     if version == 2:
@@ -82,6 +86,9 @@ def test_what_it_sees_is_fused_in_body_axes_under_the_names_it_is_given(eye, ver
         assert row["azimuth_rad"] == pytest.approx(azimuth, abs=1e-6)
         assert row["elevation_rad"] == pytest.approx(elevation, abs=1e-6)
         assert row["range_m"] == pytest.approx(far, rel=1e-6) and far < 2500.0
+        # What is true of it is known, for metrics.
+        assert row["true_azimuth_rad"] == pytest.approx(azimuth, abs=1e-6)
+        assert row["true_range_m"] == pytest.approx(far, rel=1e-6)
     near = {key for key, (_, _, far) in truth.items() if key[1] in _NAMES and far < 2500.0}
     assert {(row["tick"], row["target"]) for row in rows} == near
 
@@ -126,6 +133,26 @@ def test_a_tracker_takes_it_as_any_sensor_of_ours(eye):
         assert told == pytest.approx(own[f"velocity_{axis}_m_s"], abs=1e-4)
 
 
+def test_the_own_velocity_is_that_of_each_look(eye):
+    found = scene(eye(), duration_s=6)
+    own = found["blocks"]["traffic"]["ownship"]
+    for name in ("yaw_deg", "pitch_deg", "roll_deg"):
+        own.pop(name)
+    own["legs"] = [{"kind": "turn", "rate_deg_s": 6, "angle_deg": 120}, {"kind": "straight"}]
+    found["blocks"]["eye"]["detections"] |= {"range_rate_m_s": "rate"}
+    found["record"] = {"truth": True}
+    run = dsa_des.run(found)
+    truth = {row["tick"]: row for row in run.truth.to_pylist() if row["target"] is None}
+    scans = [row for row in run.scans.to_pylist() if row["block"] == "eye"]
+    assert len(scans) == 30
+    for row in scans:
+        for axis in ("north", "east", "down"):
+            moves = truth[row["tick"]][f"velocity_{axis}_m_s"]
+            error = 0.06 if row["tick"] == 0 else 0.01  # a flight that begins has one side
+            assert row[f"own_velocity_{axis}_m_s"] == pytest.approx(moves, abs=error)
+    assert abs(scans[0]["own_velocity_north_m_s"] - scans[-1]["own_velocity_north_m_s"]) > 20
+
+
 def test_windows_change_nothing_and_its_pose_is_the_believed_one(eye):
     found = scene(eye(), start={"reach": 2500.0})
     found["navigation"] = {"attitude_bias_deg": [3.0, 0.0, 0.0]}
@@ -142,6 +169,28 @@ def test_windows_change_nothing_and_its_pose_is_the_believed_one(eye):
     rows = tables[0]["scans"].to_pylist()
     headings = {row["own_heading_rad"] for row in rows if row["block"] == "eye"}
     assert all(abs(math.degrees(h) % 360 - 222.0) > 1e-3 for h in headings)
+
+
+def test_in_a_loop_it_looks_ahead_and_is_taken_back(eye):
+    found = scene(eye(), targets=_NAMES, duration_s=20)
+    found["blocks"] |= {
+        "fusion": {"type": "fusion.pick_best"}, "tracker": {"type": "tracking.stub"},
+        "avoid": {"type": "avoidance.turn_away", "range_km": 1.9, "turn_deg": 45},
+    }  # fmt: skip
+    found["blocks"]["eye"]["detections"] |= {"range_rate_m_s": "rate"}
+    found["wires"] += [
+        "tracker -> avoid", {"from": "avoid", "to": "traffic", "delay_s": 0.7, "holds": "nothing"}
+    ]  # fmt: skip
+    tables = []
+    for window in (None, 1):
+        sink = MemorySink()
+        simulation = Simulation(dsa_des.load_scene(found), window=window, recorder=Recorder([sink]))
+        outcome = simulation.run()
+        assert ("eye" in outcome.windowed) == (window is None)
+        tables.append(sink.tables())
+    assert tables[0]["manoeuvres"]["tick"][0].as_py() > 0
+    for name, table in tables[1].items():
+        assert table.equals(tables[0][name]), name
 
 
 def test_what_the_fmu_says_of_its_errors_goes_before_what_the_scene_says(eye):
@@ -202,6 +251,10 @@ def test_what_is_wrong_is_said_with_its_key(eye, keys, said):
 
 
 def test_targets_are_those_of_the_scene_and_one_for_each(eye):
+    found = scene(eye(), targets=_NAMES)
+    del found["blocks"]["eye"]["targets"]
+    with pytest.raises(SceneError, match=r"'azimuth_in' is .*: targets must name them"):
+        dsa_des.load_scene(found)
     with pytest.raises(SceneError, match="has 1 names where there are 2 detections"):
         dsa_des.load_scene(scene(eye(), targets=["rolling"]))
     with pytest.raises(SceneError, match="'rollin' is not in the scene; did you mean 'rolling'"):

@@ -1,0 +1,88 @@
+"""Alerts of a recorded run: when each came, changed its level and ended."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from components.display.recorded_run import RecordedTables
+
+
+@dataclass
+class Alert:
+    """An alert of a target, or of a track, from when its level rises above 0 until it is 0 again.
+
+    Parameters
+    ----------
+    block : str
+        The alerting block.
+    target : str or None
+        The target; of a track the one it was near when the alert came, None for none.
+    track : int or None
+        The tracker's number, where alerts are of tracks.
+    levels : list of (time_s, level)
+        The changes, the first when the alert came.
+    end_s : float or None
+        When it ended; None if it lasts until the run ends.
+    """
+
+    block: str
+    target: str | None
+    track: int | None
+    levels: list[tuple[float, int]]
+    end_s: float | None = None
+
+    @property
+    def start_s(self) -> float:
+        """When it came."""
+        return self.levels[0][0]
+
+    @property
+    def track_name(self) -> str | None:
+        """What displays call its track."""
+        return None if self.track is None else f"track {self.track}"
+
+    @property
+    def name(self) -> str | None:
+        """What it is about: a target, or else a track."""
+        return self.target or self.track_name
+
+    def stretches(self, run_end_s: float) -> Iterator[tuple[float, float, int]]:
+        """Give start, end and level of each stretch of one level."""
+        ends = [time_s for time_s, _ in self.levels[1:]]
+        ends.append(run_end_s if self.end_s is None else self.end_s)
+        for (start_s, level), end_s in zip(self.levels, ends, strict=True):
+            yield start_s, end_s, level
+
+
+def alerts_of(run: RecordedTables) -> list[Alert]:
+    """Return the alerts of a run in the order in which they came; none where nothing alerts."""
+    if "alerts" not in run.tables:
+        return []
+    on: dict[Any, Alert] = {}
+    found = []
+    rows = sorted(run.tables["alerts"].to_pylist(), key=_look)
+    for (time_s, block), look in groupby(rows, key=_look):
+        now = {(block, _about(row)): row for row in look}
+        # A track that its block no longer tells of is gone, and its alert with it.
+        for about in [a for a in on if a[0] == block and isinstance(a[1], int) and a not in now]:
+            on.pop(about).end_s = time_s
+        for about, row in now.items():
+            level = row["level"]
+            if level <= 0:
+                if about in on:
+                    on.pop(about).end_s = time_s
+            elif about not in on:
+                on[about] = Alert(block, row["target"], row.get("track"), [(time_s, level)])
+                found.append(on[about])
+            elif on[about].levels[-1][1] != level:
+                on[about].levels.append((time_s, level))
+    return found
+
+
+def _look(row: dict[str, Any]) -> tuple[float, str]:
+    return float(row["time_s"]), row.get("block", "")
+
+
+def _about(row: dict[str, Any]) -> Any:
+    return row["target"] if row.get("track") is None else row["track"]

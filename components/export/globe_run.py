@@ -1,0 +1,212 @@
+"""What globes show of a run: flights, tracks, alerts and detections, in the colours of the kit."""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from components.display.picture import sights
+from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
+from components.export.alert_levels import Alert, alerts_of
+from components.export.track_places import POSE, estimated_places, held_places
+from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.mark import Mark
+
+#: A run has no date; its second 0 is put here.
+START = datetime(2000, 1, 1, tzinfo=UTC)
+#: How long a detection is shown, s.
+DETECTION_LASTS_S = 4.0
+_PLACE = ("lon_deg", "lat_deg", "alt_m")
+
+
+@dataclass(frozen=True)
+class Course:
+    """Where something was: a flight, a track, or what an alert was about while it lasted.
+
+    Parameters
+    ----------
+    name : str
+    colour : str
+        ``#rrggbb``.
+    time_s : (n,)
+        Ascending.
+    place : (n, 3)
+        Longitude, latitude (deg) and height above the ellipsoid (m).
+    group : str
+        The tracker or the alerting block; empty of a flight.
+    level : int
+        Of an alert, else 0.
+    """
+
+    name: str
+    colour: str
+    time_s: FloatArray
+    place: FloatArray
+    group: str = ""
+    level: int = 0
+
+    def between(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
+        """Return times and places from start to end, both straight between the neighbours."""
+        start_s, end_s = (float(np.clip(t, *self.time_s[[0, -1]])) for t in (start_s, end_s))
+        inside = (self.time_s > start_s) & (self.time_s < end_s)
+        time_s = np.unique(np.concatenate(([start_s], self.time_s[inside], [end_s])))
+        lon, lat, alt = self.place.T
+        # Across the date line longitudes go on.
+        columns = (np.unwrap(lon, period=360.0), lat, alt)
+        found = np.stack([np.interp(time_s, self.time_s, column) for column in columns], axis=1)
+        found[:, 0] = (found[:, 0] + 180.0) % 360.0 - 180.0
+        return time_s, found
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A detection with a range: who detected whom, when and where (as in `Course`)."""
+
+    sensor: str
+    target: str
+    time_s: float
+    place: tuple[float, float, float]
+
+    @property
+    def name(self) -> str:
+        """The sensor, and the target if it is one."""
+        return f"{self.sensor} {self.target}".strip()
+
+
+@dataclass(frozen=True)
+class GlobeRun:
+    """All of it; ``marks`` are those of the sensors."""
+
+    name: str
+    end_s: float
+    flights: list[Course]
+    tracks: list[Course]
+    alerts: list[Course]
+    seen: list[Seen]
+    marks: Mapping[str, Mark]
+
+
+def globe_run(run: RecordedTables) -> GlobeRun:
+    """Return what globes show of a run; `UsageError` where its tables are not those of one."""
+    flights = [
+        Course(
+            name, ON_DARK["own" if name == OWNSHIP else "truth"], flight["time_s"],
+            np.stack([flight[key] for key in _PLACE], axis=1),
+        )
+        for name, flight in run.flights().items()
+    ]  # fmt: skip
+    end_s = max(float(one.time_s[-1]) for one in flights)
+    seen = list(seen_places(run))
+    tracks = [*_estimated(run), *_held(run)]
+    marks = marks_in(run, {one.sensor for one in seen} | {one.group for one in tracks})
+    painted = [
+        Course(one.name, marks[one.group].colour, one.time_s, one.place, one.group)
+        for one in tracks
+    ]
+    alerts = [
+        Course(
+            f"{alert.name}: alert {level}", LEVELS_ON_DARK[min(level, 3) - 1],
+            *about.between(start_s, stop_s), alert.block, level,
+        )
+        for alert in alerts_of(run)
+        if (about := _about(alert, flights, tracks)) is not None
+        for start_s, stop_s, level in alert.stretches(end_s)
+        if start_s <= about.time_s[-1] and stop_s >= about.time_s[0]
+    ]  # fmt: skip
+    name = run.folder.resolve().name
+    return GlobeRun(name, end_s, flights, painted, alerts, seen, marks)
+
+
+def when(time_s: float) -> str:
+    """Return an instant of a run as globes have it (ISO 8601)."""
+    moment = START + timedelta(microseconds=round(1e6 * time_s))
+    return moment.isoformat().replace("+00:00", "Z")
+
+
+def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
+    """Return how blocks of a run are marked, by the types that its scene gives them."""
+    try:
+        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
+        blocks: Any = scene.get("blocks", {})
+        types = {name: str(blocks.get(name, {}).get("type", "")) for name in names}
+    except (OSError, ValueError, AttributeError):
+        types = dict.fromkeys(names, "")
+    return block_marks(types)
+
+
+def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) -> Course | None:
+    """Return the flight of an alert's target, or else its track's course."""
+    if alert.target is not None:
+        return next((one for one in flights if one.name == alert.target), None)
+    # Several trackers may have a track of that number.
+    end = f" #{alert.track}"
+    mine = [one for one in tracks if one.name.endswith(end) and one.time_s[0] <= alert.start_s]
+    return max(mine, key=lambda one: float(one.time_s[-1]), default=None)
+
+
+def seen_places(run: RecordedTables) -> Iterator[Seen]:
+    """Give the detections that have a range."""
+    if "detections" not in run.tables:
+        return
+    number: dict[str, FloatArray] = {
+        name: run.numbers("detections", name)
+        for name in ("time_s", "azimuth_rad", "elevation_rad", "range_m", *POSE)
+    }
+    there = np.flatnonzero(~np.isnan(list(number.values())).any(axis=0))
+    run.refuse_large("detections", {n: np.where(np.isnan(v), 0.0, v) for n, v in number.items()})
+    if len(there) == 0:
+        return
+    number = {name: values[there] for name, values in number.items()}
+    directions = number["azimuth_rad"], number["elevation_rad"], number["range_m"]
+    _, (lat, lon, alt) = sights(*directions, [number[name] for name in POSE])
+    sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
+    places = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
+    for row, time_s, place in zip(there.tolist(), number["time_s"].tolist(), places, strict=True):
+        yield Seen(sensors[row] or "", targets[row] or "", time_s, place)
+
+
+def _estimated(run: RecordedTables) -> Iterator[Course]:
+    """Give tracks that were ever confirmed, until they are deleted."""
+    rows, places = estimated_places(run)
+    if len(rows) == 0:
+        return
+    status = np.array(run.texts("state_tracks", "track_status"), dtype=object)[rows]
+    numbers = np.asarray(run.values("state_tracks", "track"))[rows].tolist()
+    blocks = run.texts("state_tracks", "block")
+    names = [(blocks[row] or "", f"#{n}") for row, n in zip(rows.tolist(), numbers, strict=True)]
+    lives = status != "deleted"
+    sure = np.isin(status, [STATUSES[CONFIRMED], STATUSES[COASTED]])
+    for name, mine in _grouped(names):
+        if sure[mine].any():
+            mine = mine[lives[mine]]
+            yield _course(name, run.numbers("state_tracks", "state_s")[rows[mine]], places[:, mine])
+
+
+def _held(run: RecordedTables) -> Iterator[Course]:
+    rows, places = held_places(run)
+    blocks, targets = (
+        (run.texts("tracks", name) for name in ("block", "target")) if len(rows) else ([], [])
+    )
+    names = [(blocks[row] or "", targets[row] or "") for row in rows.tolist()]
+    for name, mine in _grouped(names):
+        yield _course(name, run.numbers("tracks", "measured_s")[rows[mine]], places[:, mine])
+
+
+def _grouped(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
+    """Give each name and the places in the sequence at which it stands, in order of names."""
+    found: dict[tuple[str, str], list[int]] = {}
+    for place, name in enumerate(names):
+        found.setdefault(name, []).append(place)
+    for name, places in sorted(found.items()):
+        yield name, np.array(places)
+
+
+def _course(name: tuple[str, str], time_s: FloatArray, places: FloatArray) -> Course:
+    time_s, first = np.unique(time_s, return_index=True)
+    lat, lon, alt = places[:, first]
+    return Course(" ".join(name), "", time_s, np.stack([lon, lat, alt], axis=1), name[0])

@@ -1,0 +1,158 @@
+"""A run as KML (OGC 07-147r2, with Google's tracks), whose heights are above sea level."""
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from xml.sax.saxutils import escape
+
+from components.display.recorded_run import RecordedTables
+from components.display.symbols import LEVELS_ON_DARK
+from components.export.globe_run import Course, GlobeRun, Seen, globe_run, when
+from dsa_des.arrays.types import FloatArray
+from dsa_des.text.safe_text import printable
+
+#: Google's icons, which globes know by their addresses, for markers of figures.
+_ICON = "http://maps.google.com/mapfiles/kml/shapes/{}.png"
+_ICONS = {
+    "o": "placemark_circle", "s": "placemark_square", "^": "triangle", "v": "triangle",
+    "<": "triangle", ">": "triangle", "*": "star", "D": "polygon", "d": "polygon",
+    "P": "cross-hairs", "X": "cross-hairs",
+}  # fmt: skip
+_DOT, _RING, _PLANE = "shaded_dot", "donut", "airports"
+
+
+def undulation_of(run: RecordedTables) -> float | None:
+    """Return the geoid's height above the ellipsoid (m) that a run's scene says of its terrain."""
+    try:
+        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
+        terrain = scene.get("terrain", {})
+        return float(terrain["raster_offset_m"]) if "raster" in terrain else None
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
+def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
+    """Return a KML document: folders of aircraft, tracks, alerts and detections, with styles.
+
+    A run's heights are above the ellipsoid, those of KML's ``absolute`` above the geoid (EGM96):
+    `geoid_m`, the height of the one above the other, is taken off, and the document says so.
+    """
+    shown = globe_run(run)
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">',
+        "<Document>",
+        f"<name>{_xml(shown.name)}</name>",
+        f"<description>Heights above sea level: those of the run, above the WGS 84 ellipsoid, less "
+        f"{geoid_m:g} m for the geoid. Second 0 is {when(0.0)}.</description>",
+        *_look_at(shown, geoid_m),
+        *_styles(shown),
+    ]
+    lines += _folder("Aircraft", _courses(shown.flights, "aircraft", geoid_m))
+    for group in sorted({one.group for one in shown.tracks}):
+        mine = [one for one in shown.tracks if one.group == group]
+        lines += _folder(f"Tracks of {group}", _courses(mine, f"track-{group}", geoid_m))
+    lines += _folder("Alerts", _courses(shown.alerts, "level", geoid_m))
+    for sensor in sorted({one.sensor for one in shown.seen}):
+        mine_seen = [one for one in shown.seen if one.sensor == sensor]
+        lines += _folder(f"Detections of {sensor}", _points(mine_seen, geoid_m))
+    return "\n".join([*lines, "</Document>", "</kml>", ""])
+
+
+def _look_at(shown: GlobeRun, geoid_m: float) -> list[str]:
+    """Return where a globe looks when it opens the file: at where the ownship begins."""
+    lon, lat, alt = shown.flights[0].place[0].tolist()
+    return [
+        "<LookAt>",
+        f"<longitude>{lon}</longitude><latitude>{lat}</latitude>",
+        f"<altitude>{alt - geoid_m}</altitude><heading>0</heading><tilt>45</tilt>",
+        "<range>20000</range><altitudeMode>absolute</altitudeMode>",
+        "</LookAt>",
+    ]
+
+
+def _styles(shown: GlobeRun) -> Iterator[str]:
+    own, *others = shown.flights
+    for one, number in ((own, 0), *((other, 1) for other in others[:1])):
+        yield from _style(f"aircraft-{number}", one.colour, _PLANE, 0.7, 2)
+    for group in sorted({one.group for one in shown.tracks}):
+        yield from _style(f"track-{group}", shown.marks[group].colour, _DOT, 0.5, 1.5)
+    for level, colour in enumerate(LEVELS_ON_DARK, start=1):
+        yield from _style(f"level-{level}", colour, _RING, 0.9, 2 + level)
+    for sensor in sorted({one.sensor for one in shown.seen}):
+        mark = shown.marks[sensor]
+        # Names of detections are in the list beside the globe: on it they would cover everything.
+        yield from _style(
+            f"sensor-{sensor}", mark.colour, _ICONS.get(mark.marker, _DOT), 0.4, 1, named=0
+        )
+
+
+def _style(
+    name: str, colour: str, icon: str, scale: float, width: float, named: float = 0.8
+) -> Iterator[str]:
+    painted = _colour(colour)
+    yield f'<Style id="{_id(name)}">'
+    yield (
+        f"<IconStyle><color>{painted}</color><scale>{scale}</scale>"
+        f"<Icon><href>{_ICON.format(icon)}</href></Icon></IconStyle>"
+    )
+    yield f"<LabelStyle><color>{painted}</color><scale>{named}</scale></LabelStyle>"
+    yield f"<LineStyle><color>{painted}</color><width>{width}</width></LineStyle>"
+    yield "</Style>"
+
+
+def _colour(colour: str) -> str:
+    """Return a colour as KML has it: opacity, blue, green, red."""
+    return f"ff{colour[5:7]}{colour[3:5]}{colour[1:3]}".lower()
+
+
+def _id(name: str) -> str:
+    """Return a name as an identifier of XML, which letters, digits and a few marks make up."""
+    return "".join(
+        c if c.isascii() and (c.isalnum() or c in "-_") else f".{ord(c):x}" for c in name
+    )
+
+
+def _folder(name: str, content: Sequence[str]) -> list[str]:
+    return [f"<Folder><name>{_xml(name)}</name>", *content, "</Folder>"] if content else []
+
+
+def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]:
+    lines = []
+    for number, one in enumerate(courses):
+        if style == "aircraft":
+            of_one = f"aircraft-{min(number, 1)}"
+        else:
+            of_one = f"level-{min(one.level, len(LEVELS_ON_DARK))}" if one.level else style
+        lines += [
+            f"<Placemark><name>{_xml(one.name)}</name>",
+            f"<styleUrl>#{_id(of_one)}</styleUrl><gx:Track>",
+            "<altitudeMode>absolute</altitudeMode>",
+            *(f"<when>{when(t)}</when>" for t in one.time_s.tolist()),
+            *_coordinates(one.place, geoid_m),
+            "</gx:Track></Placemark>",
+        ]
+    return lines
+
+
+def _coordinates(place: FloatArray, geoid_m: float) -> Iterator[str]:
+    for lon, lat, alt in place.tolist():
+        yield f"<gx:coord>{lon} {lat} {alt - geoid_m}</gx:coord>"
+
+
+def _points(seen: Sequence[Seen], geoid_m: float) -> list[str]:
+    lines = []
+    for one in seen:
+        lon, lat, alt = one.place
+        lines += [
+            f"<Placemark><name>{_xml(one.name)}</name>",
+            f"<TimeStamp><when>{when(one.time_s)}</when></TimeStamp>",
+            f"<styleUrl>#{_id(f'sensor-{one.sensor}')}</styleUrl><Point>",
+            f"<altitudeMode>absolute</altitudeMode>"
+            f"<coordinates>{lon},{lat},{alt - geoid_m}</coordinates>",
+            "</Point></Placemark>",
+        ]
+    return lines
+
+
+def _xml(text: str) -> str:
+    return escape(printable(text))

@@ -1,0 +1,61 @@
+"""``dsa-des view``: the page of a run or a recorded encounter, or of several beside each other."""
+
+from pathlib import Path
+
+import numpy as np
+
+from components.view.page import RunPicture, page_text, pages_beside
+from components.view.run_picture import encounter_picture, run_picture
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_names import named
+from dsa_des.terminal.terminal import say
+
+#: More would be too narrow to be read.
+_MOST = 3
+
+
+def make_view(runs: tuple[str, ...], out: str | None) -> None:
+    """Write the page of runs' folders or of ``.daa`` files; ``dsa-des view``."""
+    if len(runs) > _MOST:
+        raise UsageError(f"{len(runs)} runs: at most {_MOST} stand beside each other")
+    pictures = [_picture(Path(run)) for run in runs]
+    if len(pictures) == 1:
+        page = page_text(pictures[0])
+    else:
+        for run, picture in zip(runs, pictures, strict=True):
+            name = Path(run).resolve().name
+            if picture.title != name:
+                picture.title = f"{name}: {picture.title}"
+        page = pages_beside(pictures)
+    target = _beside(runs) if out is None else named(out)
+    check_file(target)
+    try:
+        write_file(target, page.encode("utf-8"))
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
+    say(f"wrote {target}")
+
+
+def _beside(runs: tuple[str, ...]) -> Path:
+    """Return where the page goes by itself: beside the first run, with the names of all."""
+    paths = [Path(run) if Path(run).is_file() else Path(run).resolve() for run in runs]
+    names = [path.stem if path.is_file() else path.name for path in paths]
+    return paths[0].with_name(f"{'-'.join(names)}.html")
+
+
+def _picture(source: Path) -> RunPicture:
+    if source.is_dir():
+        try:
+            with np.errstate(invalid="ignore", over="ignore"):
+                return run_picture(source)
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+            # Any of its files may be another program's: what they lack is met anywhere.
+            raise UsageError(
+                f"{source}: its tables are not those of a run ({str(error)[:200]})"
+            ) from error
+    if source.suffix == ".daa" and source.is_file():
+        return encounter_picture(source)
+    if source.exists():
+        raise UsageError(f"{source}: is neither a run's folder nor a .daa file")
+    raise UsageError(f"{source}: there is no such folder or file")
