@@ -76,7 +76,7 @@ class TurnOut(Component):
                 f"{SLOWEST_TURN_DEG_S:g}, or 0 for 3"
             )
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
-        #: By replica, from when on it may turn again.
+        #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
@@ -86,11 +86,11 @@ class TurnOut(Component):
             return None
         manoeuvres: dict[int, Manoeuvre] = {}
         alerted = np.flatnonzero(alerts.highest() >= self.p.level)
-        left = zip(alerted.tolist(), wake.replica[alerted].tolist(), strict=True)
+        left = zip(alerted.tolist(), wake.run[alerted].tolist(), strict=True)
         waiting = list(left)
         kind = _KINDS[self.p.manoeuvre]
         while waiting:
-            # The first row of every replica at which it is free, and then on to the next ones.
+            # The first row of every run at which it is free, and then on to the next ones.
             now: dict[int, int] = {}
             later = []
             for place, run in waiting:
@@ -106,7 +106,7 @@ class TurnOut(Component):
                     manoeuvres[place] = self._manoeuvre(change)
                     self._free_from[run] = int(wake.ticks[place]) + self._pause_ticks
             waiting = later
-        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
+        return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
         """Return what makes a change."""
@@ -189,7 +189,7 @@ class TurnAway(Component):
     def setup(self) -> None:
         """Start free to turn."""
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
-        #: By replica, from when on it may turn again.
+        #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
@@ -202,10 +202,9 @@ class TurnAway(Component):
             near |= np.isnan(tracks.range_m)
         row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
         manoeuvres: dict[int, Manoeuvre] = {}
-        replica = wake.replica
         for place in np.unique(row[near]).tolist():
             tick = int(wake.ticks[place])
-            run = int(replica[place])
+            run = int(wake.run[place])
             if tick < self._free_from.get(run, 0):
                 continue
             entries = np.flatnonzero(near & (row == place))
@@ -213,7 +212,7 @@ class TurnAway(Component):
             nearest = entries[np.argmin(ranges_m)]
             manoeuvres[place] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
             self._free_from[run] = tick + self._pause_ticks
-        return Manoeuvres.at_rows(wake.ticks, manoeuvres)
+        return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _turn(self, *, on_the_left: bool) -> Manoeuvre:
         """Return the turn for somebody on a side."""

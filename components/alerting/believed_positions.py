@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations
-from components.alerting.own_poses import OwnPoses, run_begins
+from components.alerting.own_poses import OwnPoses
 from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
+from dsa_des.arrays.run_ticks import RunTicks, first_of_run, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
 
@@ -36,18 +37,18 @@ class BelievedPositions:
 
     def __init__(self, keep_s: float, targets: int) -> None:
         self._keep_s = keep_s
-        self._came = np.empty(0, dtype=np.int64)
+        self._came = RunTicks.none()
         self._time_s = np.empty(0)
         #: East, north, up (n, targets, 3); NaN where a target was not seen.
         self._position_m = np.empty((0, targets, 3))
 
-    def add_truth(self, came: IntArray, time_s: FloatArray, position_m: FloatArray) -> None:
+    def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in positions at instants since the start of their run, and when they came."""
-        self._came = np.concatenate([self._came, came])
+        self._came = RunTicks.joined([self._came, came])
         self._time_s = np.concatenate([self._time_s, time_s])
         self._position_m = np.concatenate([self._position_m, position_m])
-        if bool((self._came[1:] < self._came[:-1]).any()):  # replicas that go side by side
-            self._keep(np.argsort(self._came, kind="stable"))
+        if (order := self._came.order()) is not None:  # runs that go side by side
+            self._keep(order)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in what was measured in body axes, by the attitude of when it was measured."""
@@ -57,8 +58,8 @@ class BelievedPositions:
         if isinstance(sights, Tracks):
             new &= sights.updated  # others came with an earlier row
         # The attitude of when it was measured, of those that have arrived.
-        came = arrived.tick[row]
-        pose = own.pose_of(sights.measured_tick, came, run_begins(came, wake), new)
+        came = arrived.instants.take(row)
+        pose = own.pose_of(RunTicks(came.run, sights.measured_tick), came, new)
         new &= pose >= 0
         row = row[new]
         yaw, pitch, roll = own.attitude_rad(pose[new])
@@ -68,42 +69,39 @@ class BelievedPositions:
         body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
         # A row of its own for every instant of measurement.
-        line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
+        line, of, made = _by_instant(sights.tick, row, sights.measured_tick[new])
         position = np.full((len(made), *self._position_m.shape[1:]), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
-        self.add_truth(came, wake.own_ticks(made) / wake.ticks_per_s, position)
+        self.add_truth(arrived.instants.take(of), made / wake.ticks_per_s, position)
 
-    def forget(self, ticks: IntArray, times_s: FloatArray, wake: Wake) -> None:
+    def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what no scan after some asks for."""
         young = self._time_s >= float(times_s.max()) - self._keep_s  # the next scans come later
-        self._keep(np.flatnonzero(young & (wake.replica_of(self._came) >= wake.first_run)))
+        self._keep(np.flatnonzero(young & (self._came.run >= wake.first_run)))
 
     def _keep(self, lines: IntArray) -> None:
-        self._came, self._time_s = self._came[lines], self._time_s[lines]
+        self._came, self._time_s = self._came.take(lines), self._time_s[lines]
         self._position_m = self._position_m[lines]
 
     def flights(
         self,
-        ticks: IntArray,
+        asked: RunTicks,
         times_s: FloatArray,
-        begins: IntArray,
         own: Mapping[str, FloatArray],
         poses: OwnPoses,
     ) -> BelievedFlights:
-        """Return the flights at some scans, of what came between their runs' begins and them."""
-        known, state = self._states(begins, ticks, times_s)
+        """Return the flights at some scans, of what came in their runs before them."""
+        known, state = self._states(asked, times_s)
         # Positions count from the ownship: its own less theirs is the other way round.
         return BelievedFlights(known, tuple(-state))
 
-    def _states(
-        self, since: IntArray, now: IntArray, now_s: FloatArray
-    ) -> tuple[BoolArray, FloatArray]:
+    def _states(self, now: RunTicks, now_s: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Return whose flight is known (n, targets), and its state (6, n, targets), else 0.
 
         It is known from positions at two instants, not older than `keep_s`.
         """
-        first = np.searchsorted(self._came, since)
-        counts = np.searchsorted(self._came, now, side="right") - first
+        first = first_of_run(self._came, now.run)
+        counts = np.maximum(last_of_run(self._came, now) + 1 - first, 0)
         of = np.repeat(np.arange(len(now)), counts)
         start = np.cumsum(counts) - counts
         line = np.arange(len(of)) + (first - start)[of]
@@ -138,19 +136,19 @@ def true_positions_m(states: TrafficStates) -> FloatArray:
 
 
 def _by_instant(
-    tick: IntArray, came: IntArray, row: IntArray, measured: IntArray
+    tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the line of each entry, and when each line came and was measured.
+    """Return the line of each entry, and the row and the instant of measurement of each line.
 
-    `tick` and `came` are of a message's rows, `row` and `measured` of its entries.
+    `tick` is of a message's rows, `row` and `measured` of its entries.
     """
     if np.array_equal(measured, tick[row]):
-        return row, came, tick
+        return row, np.arange(len(tick)), tick
     # A row without entries has its line all the same, whatever other rows the wake brings.
     silent = np.flatnonzero(np.bincount(row, minlength=len(tick)) == 0)
     every = np.stack([np.concatenate([row, silent]), np.concatenate([measured, tick[silent]])])
     pairs, line = np.unique(every, axis=1, return_inverse=True)
-    return line.reshape(-1)[: len(row)], came[pairs[0]], pairs[1]
+    return line.reshape(-1)[: len(row)], pairs[0], pairs[1]
 
 
 def _fitted(

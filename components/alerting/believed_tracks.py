@@ -11,6 +11,7 @@ from components.alerting.own_poses import OwnPoses
 from components.estimation.frame import ned_axes
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
 
@@ -58,29 +59,29 @@ _NONE = _Estimates(
 class EstimatedFlights:
     """What has come of trackers' states: confirmed and coasted tracks that have a range.
 
-    Of one run or of many; what came in each run stands together, in order.
+    What came in each run stands together, in order.
     """
 
     def __init__(self) -> None:
         #: When each row came, where its tracks begin and how many there are.
-        self._came: IntArray = np.empty(0, dtype=np.int64)
+        self._came = RunTicks.none()
         self._begin: IntArray = np.empty(0, dtype=np.int64)
         self._count: IntArray = np.empty(0, dtype=np.int64)
         self._estimate = _NONE
 
-    def add(self, came: IntArray, tracks: StateTracks) -> None:
+    def add(self, came: RunTicks, tracks: StateTracks) -> None:
         """Take in tracks of a tracker, and when each row came."""
         good = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
-        self._came = np.concatenate([self._came, came])
+        self._came = RunTicks.joined([self._came, came])
         self._begin = np.concatenate([self._begin, len(self._estimate.number) + before[:-1]])
         self._count = np.concatenate([self._count, np.diff(before)])
         self._estimate = self._estimate.with_more(_Estimates.of(tracks).take(np.flatnonzero(good)))
-        if bool((self._came[1:] < self._came[:-1]).any()):
-            self._keep_rows(np.argsort(self._came, kind="stable"))
+        if (order := self._came.order()) is not None:
+            self._keep_rows(order)
 
     def _keep_rows(self, which: IntArray | BoolArray) -> None:
-        self._came, self._begin = self._came[which], self._begin[which]
+        self._came, self._begin = self._came.take(which), self._begin[which]
         self._count = self._count[which]
 
     def keep(self, which: BoolArray) -> None:
@@ -92,16 +93,16 @@ class EstimatedFlights:
         self._begin = np.cumsum(self._count) - self._count
 
     @property
-    def came(self) -> IntArray:
+    def came(self) -> RunTicks:
         """When the rows that are remembered came."""
         return self._came
 
     def states(
-        self, now: IntArray, now_s: FloatArray, begins: IntArray, own_place: FloatArray
+        self, now: RunTicks, now_s: FloatArray, own_place: FloatArray
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
         """Return the flights that are known at some instants, by instant and track."""
-        last = np.searchsorted(self._came, now, side="right") - 1
-        some = np.flatnonzero(last >= np.searchsorted(self._came, begins))
+        last = last_of_run(self._came, now)
+        some = np.flatnonzero(last >= 0)
         place, entry = _each(self._begin[last[some]], self._count[last[some]])
         instant = some[place]
         order = np.lexsort((self._estimate.number[entry], instant))
@@ -163,33 +164,32 @@ def _deviations(covariance: FloatArray, ahead_s: FloatArray) -> Deviations:
 
 
 class BelievedTracks:
-    """Tracks of one tracker over time, in one run or in many; what came in each stands together."""
+    """Tracks of one tracker over time; what came in each run stands together."""
 
     def __init__(self) -> None:
         self._estimates = EstimatedFlights()
-        self._true_came: IntArray = np.empty(0, dtype=np.int64)
+        self._true_came = RunTicks.none()
         self._true_m: FloatArray = np.empty((0, 0, 3))
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in the tracks of a tracker."""
-        self._estimates.add(arrived.tick, arrived.message)
+        self._estimates.add(arrived.instants, arrived.message)
 
-    def add_truth(self, came: IntArray, time_s: FloatArray, position_m: FloatArray) -> None:
+    def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in where the targets are (rows, targets, 3): a track is named by the nearest."""
         held = self._true_m if len(self._true_m) else np.empty((0, *position_m.shape[1:]))
-        self._true_came = np.concatenate([self._true_came, came])
+        self._true_came = RunTicks.joined([self._true_came, came])
         self._true_m = np.concatenate([held, position_m])
-        if bool((self._true_came[1:] < self._true_came[:-1]).any()):
-            self._keep_true(np.argsort(self._true_came, kind="stable"))
+        if (order := self._true_came.order()) is not None:
+            self._keep_true(order)
 
     def _keep_true(self, which: IntArray | BoolArray) -> None:
-        self._true_came, self._true_m = self._true_came[which], self._true_m[which]
+        self._true_came, self._true_m = self._true_came.take(which), self._true_m[which]
 
     def flights(
         self,
-        ticks: IntArray,
+        asked: RunTicks,
         times_s: FloatArray,
-        begins: IntArray,
         own: Mapping[str, FloatArray],
         poses: OwnPoses,
     ) -> BelievedFlights:
@@ -198,42 +198,39 @@ class BelievedTracks:
         `own` has the ownship's velocity, NaN where unknown yet.
         """
         # Without two poses the ownship's own velocity is not known, and no relative one.
-        asked = np.flatnonzero(np.isfinite(own["east_mps"]))
-        found = self._estimates.states(
-            ticks[asked], times_s[asked], begins[asked], poses.place(ticks[asked])
-        )
-        scan, number, state, deviations = asked[found[0]], *found[1:]
+        moving = np.flatnonzero(np.isfinite(own["east_mps"]))
+        now = asked.take(moving)
+        found = self._estimates.states(now, times_s[moving], poses.place(now))
+        scan, number, state, deviations = moving[found[0]], *found[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
         relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))
         known = np.ones((len(scan), 1), dtype=bool)
-        target = self._nearest(ticks[scan], state[:3].T)
+        target = self._nearest(asked.take(scan), state[:3].T)
         return BelievedFlights(known, relative, scan, target, number, deviations)
 
-    def _nearest(self, ticks: IntArray, position_m: FloatArray) -> IntArray:
+    def _nearest(self, now: RunTicks, position_m: FloatArray) -> IntArray:
         """Return the target nearest to each of some positions (n, 3), -1 where none is near."""
-        if self._true_m.shape[1] == 0 or len(ticks) == 0:
-            return np.full(len(ticks), -1, dtype=np.int64)
-        last = np.maximum(np.searchsorted(self._true_came, ticks, side="right") - 1, 0)
+        if self._true_m.shape[1] == 0 or len(now) == 0:
+            return np.full(len(now), -1, dtype=np.int64)
+        last = np.maximum(last_of_run(self._true_came, now), 0)
         away = self._true_m[last] - position_m[:, np.newaxis]
         range_m = np.nan_to_num(np.linalg.norm(away, axis=2), nan=np.inf)
         return np.where(range_m.min(axis=1) <= _SAME_TARGET_M, range_m.argmin(axis=1), -1)
 
-    def forget(self, ticks: IntArray, times_s: FloatArray, wake: Wake) -> None:
+    def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_still_asked(self._estimates.came, ticks, wake))
-        kept = _still_asked(self._true_came, ticks, wake)
+        self._estimates.keep(_still_asked(self._estimates.came, asked, wake))
+        kept = _still_asked(self._true_came, asked, wake)
         if not kept.all():
             self._keep_true(kept)
 
 
-def _still_asked(came: IntArray, ticks: IntArray, wake: Wake) -> BoolArray:
+def _still_asked(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     """Return which rows are asked for after some scans: the last before them, and later ones."""
-    run, of_scan = wake.replica_of(came), wake.replica_of(ticks)
-    ends = np.flatnonzero(np.append(of_scan[1:] != of_scan[:-1], True))
-    last = np.searchsorted(came, ticks[ends], side="right") - 1
-    place = np.searchsorted(of_scan[ends], run)
-    there = np.minimum(place, len(ends) - 1)
+    ends = asked.take(asked.last_of_each)
+    last = last_of_run(came, ends)
+    there = np.minimum(np.searchsorted(ends.run, came.run), len(ends) - 1)
     # Of runs without a scan all rows, unless they have ended.
-    kept = (of_scan[ends][there] != run) | (np.arange(len(came)) >= last[there])
-    return kept & (run >= wake.first_run)
+    kept = (ends.run[there] != came.run) | (np.arange(len(came)) >= last[there])
+    return kept & (came.run >= wake.first_run)

@@ -13,7 +13,7 @@ from components.alerting.believed_positions import BelievedPositions, true_posit
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
-from components.alerting.own_poses import OwnPoses, run_begins
+from components.alerting.own_poses import OwnPoses
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
@@ -21,6 +21,7 @@ from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.well_clear.separation import separation
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
 from dsa_des.block.message import offsets_of
@@ -118,10 +119,10 @@ class DaidalusAlerting(Component):
         if self._source:
             for arrived in wake.arrivals(self._source):
                 self._belief.add(arrived, self._own, wake)
-        ticks = wake.ticks[wake.scans >= 0]
+        asked = wake.instants.take(wake.scans >= 0)
         # Before the first state of a run has come, it has no levels.
-        ticks = ticks[self._own.have_come(ticks, run_begins(ticks, wake))]
-        return self._levels(ticks, wake) if len(ticks) else None
+        asked = asked.take(self._own.have_come(asked))
+        return self._levels(asked, wake) if len(asked) else None
 
     def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
         """Remember the ownship's pose, and where the targets are if that is asked for."""
@@ -133,37 +134,36 @@ class DaidalusAlerting(Component):
                 if self._source == "estimates"
                 else BelievedPositions(self.p.fit_s, len(states.roster))
             )
-        self._own.add(arrived.tick, states, wake)
+        self._own.add(arrived.instants, states)
         if self._source not in ("tracks", "fused"):
-            time_s = wake.own_ticks(states.tick) / wake.ticks_per_s
-            self._belief.add_truth(arrived.tick, time_s, true_positions_m(states))
+            time_s = states.tick / wake.ticks_per_s
+            self._belief.add_truth(arrived.instants, time_s, true_positions_m(states))
 
-    def _levels(self, ticks: IntArray, wake: Wake) -> AlertLevels:
+    def _levels(self, asked: RunTicks, wake: Wake) -> AlertLevels:
         """Return the levels at some scans."""
-        times = wake.own_ticks(ticks) / wake.ticks_per_s
-        begins = run_begins(ticks, wake)
-        own = self._own.states(ticks, begins, self._over_s)
-        flights = self._belief.flights(ticks, times, begins, own, self._own)
+        times = asked.tick / wake.ticks_per_s
+        own = self._own.states(asked, self._over_s)
+        flights = self._belief.flights(asked, times, own, self._own)
         known, relative = flights.known, [np.ravel(part) for part in flights.relative]
         bounds = None
         if flights.deviations is not None:
             deviations = Deviations(*(np.ravel(part) for part in flights.deviations))
             bounds = margins(self._configuration, deviations, np.hypot(*relative[:2]))
-        scan = np.arange(len(ticks)) if flights.scan is None else flights.scan
+        scan = np.arange(len(asked)) if flights.scan is None else flights.scan
         pairs = AlertPairs(tuple(relative), self._own_flights(own, scan, known.shape), bounds)
         times_s, due, early = levels_without_memory(self._configuration, self._alerter, pairs)
         columns = known.shape[1]
         each = np.repeat(scan, columns)
         number = np.tile(np.arange(columns), len(known))
         level = self._memory.levels(
-            wake.replica_of(ticks)[each],
+            asked.run[each],
             number if flights.number is None else flights.number,
             times[each],
             due,
             early,
             known.ravel(),
         )
-        self._forget(ticks, times, wake)
+        self._forget(asked, times, wake)
         row, column = np.nonzero(known)
         entry = row * columns + column
         lookahead_s = self._configuration["lookahead_time"]
@@ -172,8 +172,8 @@ class DaidalusAlerting(Component):
         numbered = range(1, len(self._alerter.levels) + 1)
         wrong = {} if flights.deviations is None else flights.deviations._asdict()
         return AlertLevels(
-            ticks,
-            offsets_of(scan[row], len(ticks)),
+            asked.tick,
+            offsets_of(scan[row], len(asked)),
             column if flights.target is None else flights.target,
             level[entry],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
@@ -185,17 +185,17 @@ class DaidalusAlerting(Component):
             {name: part[entry] for name, part in zip(_RELATIVE, relative, strict=True)},
             own,
             self._roster,
+            run=asked.run,
         )
 
-    def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
+    def _forget(self, asked: RunTicks, times: FloatArray, wake: Wake) -> None:
         """Drop what no later scan asks for."""
-        self._belief.forget(ticks, times, wake)
-        runs = wake.replica_of(ticks)
-        ends = np.flatnonzero(np.append(runs[1:] != runs[:-1], True))
-        self._memory.forget(runs[ends], times[ends])
+        self._belief.forget(asked, times, wake)
+        ends = asked.last_of_each
+        self._memory.forget(asked.run[ends], times[ends])
         self._memory.forget_before(wake.first_run)
         # The next scans come after all of these.
-        since = int(wake.own_ticks(ticks).max()) - round(self._over_s * self.context.ticks_per_s)
+        since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
         self._own.set_aside(since, wake, late_sights=self._source != "estimates")
 
     def _own_flights(

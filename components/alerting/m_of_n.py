@@ -56,10 +56,10 @@ class MOfNAlerts(Component):
         if alerts is None:
             return None
         row = np.repeat(np.arange(len(alerts)), np.diff(alerts.offsets))
-        time_s, replica = wake.time_s, wake.replica
+        time_s, run = wake.time_s, wake.run
         due = alerts.level[:, np.newaxis] >= np.arange(1, MOST_LEVELS + 1)
-        level = self._memory.levels(replica[row], alerts.contacts(), time_s[row], due, due)
-        ends = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
-        self._memory.forget(replica[ends], time_s[ends])
+        level = self._memory.levels(run[row], alerts.contacts(), time_s[row], due, due)
+        ends = wake.instants.last_of_each
+        self._memory.forget(run[ends], time_s[ends])
         self._memory.forget_before(wake.first_run)
         return replace(alerts, tick=wake.ticks, level=level)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
@@ -98,23 +99,19 @@ class AlertMemory:
         return np.asarray((is_due * levels).max(axis=1, initial=0))
 
 
-# Numbers of targets and tracks stay below this; a key holds the run above it.
-_MOST_TRACKS = 1 << 40
-
-
 class LevelMemory:
     """Memories of targets or tracks by run and number; who was gone for too long is new."""
 
     def __init__(self, rule: MemoryRule) -> None:
         self._rule = rule
         #: Run and number of each one that is remembered, ascending, and when it was last seen.
-        self._key: IntArray = np.empty(0, dtype=np.int64)
+        self._known = RunTicks.none()
         self._seen_s: FloatArray = np.empty(0)
         self._memory = AlertMemory(rule, 0)
 
     def __len__(self) -> int:
         """Return how many targets are remembered."""
-        return len(self._key)
+        return len(self._known)
 
     def levels(
         self,
@@ -129,13 +126,12 @@ class LevelMemory:
 
         `due` and `early` (n, levels) are as for `AlertMemory.step`; all are present by default.
         """
-        key = run * _MOST_TRACKS + number
-        level = np.zeros(len(key), dtype=np.int64)
-        if len(key) == 0:
+        level = np.zeros(len(number), dtype=np.int64)
+        if len(number) == 0:
             return level
-        present = np.ones(len(key), dtype=bool) if present is None else present
-        place = self._places(key)
-        for rows in turns(key):
+        present = np.ones(len(number), dtype=bool) if present is None else present
+        place = self._places(RunTicks(run, number))
+        for rows in turns(place):
             part = self._memory.take(place[rows])
             level[rows] = part.step(now_s[rows], present[rows], due[rows], early[rows])
             self._memory.put(place[rows], part)
@@ -144,27 +140,32 @@ class LevelMemory:
 
     def forget(self, runs: IntArray, times_s: FloatArray) -> None:
         """Forget who was gone for too long, given the time in some runs (ascending)."""
-        of = self._key // _MOST_TRACKS
+        of = self._known.run
         last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
         away_s = np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)
         self._remember(np.flatnonzero(away_s <= self._rule.hysteresis_s))
 
     def forget_before(self, run: int) -> None:
         """Forget the runs before one."""
-        self._remember(np.flatnonzero(self._key >= run * _MOST_TRACKS))
+        self._remember(np.flatnonzero(self._known.run >= run))
 
     def _remember(self, which: IntArray) -> None:
-        if len(which) < len(self._key):
-            self._key, self._seen_s = self._key[which], self._seen_s[which]
+        if len(which) < len(self._known):
+            self._known, self._seen_s = self._known.take(which), self._seen_s[which]
             self._memory = self._memory.take(which)
 
-    def _places(self, keys: IntArray) -> IntArray:
-        """Return the rows of targets, all of them remembered from now on."""
-        if not np.isin(keys, self._key).all():
-            every = np.union1d(self._key, keys)
-            old = np.searchsorted(every, self._key)
-            memory, seen_s = AlertMemory(self._rule, len(every)), np.full(len(every), -np.inf)
-            memory.put(old, self._memory)
-            seen_s[old] = self._seen_s
-            self._key, self._seen_s, self._memory = every, seen_s, memory
-        return np.searchsorted(self._key, keys)
+    def _places(self, those: RunTicks) -> IntArray:
+        """Return the rows of targets, by run and number, all of them remembered from now on."""
+        place = last_of_run(self._known, those)
+        if len(self._known) and bool(
+            ((place >= 0) & (self._known.tick[place] == those.tick)).all()
+        ):
+            return place
+        order = those.order()
+        every = union([self._known, those if order is None else those.take(order)])
+        old = last_of_run(every, self._known)
+        memory, seen_s = AlertMemory(self._rule, len(every)), np.full(len(every), -np.inf)
+        memory.put(old, self._memory)
+        seen_s[old] = self._seen_s
+        self._known, self._seen_s, self._memory = every, seen_s, memory
+        return last_of_run(every, those)

@@ -204,12 +204,12 @@ def _sensors(simulation: Simulation) -> list[LoopSensor]:
         block: Any = simulation.components[name]
         clock = simulation.nodes[name].clock
         assert clock is not None
-        numbers, ticks = clock.between(0, simulation.end_tick)
+        numbers, instants = clock.between(0, simulation.end_tick)
         reach = block.stated_reach
         sensor = LoopSensor(
             name,
             "radar" if block.measures_range else name,
-            list(zip(ticks.tolist(), numbers.tolist(), strict=True)),
+            list(zip(instants.tick.tolist(), numbers.tolist(), strict=True)),
             reach.azimuth_rad,
             reach.elevation_rad,
             reach.range_max_m,

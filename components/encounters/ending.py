@@ -61,8 +61,8 @@ class ClosestApproachPassed(Component):
     def setup(self) -> None:
         """Start without having seen anybody."""
         self._after_ticks = int(self.p.after_s * self.context.ticks_per_s)
-        #: By replica and target: the last range, infinite while it is away; since when it has
-        #: grown; and whether the target has been there.
+        #: By run and target: the last range, infinite while it is away; since when it has grown;
+        #: and whether the target has been there.
         self._range_m: FloatArray = np.empty((0, 0))
         self._since: IntArray = np.empty((0, 0), dtype=np.int64)
         self._seen: BoolArray = np.empty((0, 0), dtype=bool)
@@ -77,37 +77,37 @@ class ClosestApproachPassed(Component):
         _, _, range_m = line_of_sight(
             lat_deg, lon_deg, alt_m, states.lat_deg, states.lon_deg, states.alt_m, validate=False
         )
-        replica = wake.replica
-        first = np.append(True, replica[1:] != replica[:-1])
-        starts, numbers = np.flatnonzero(first), replica[first]
-        self._make_room(int(replica[-1]) + 1, range_m.shape[1])
-        ticks = wake.ticks[:, np.newaxis]
+        starts = wake.instants.first_of_each
+        numbers = wake.run[starts]
+        self._make_room(int(numbers[-1]) + 1, range_m.shape[1])
+        ticks, row = wake.ticks[:, np.newaxis], np.arange(len(wake))[:, np.newaxis]
+        # The first row of each one's run: a running maximum of rows that is less is of another.
+        first = np.repeat(starts, np.diff(np.append(starts, len(wake))))[:, np.newaxis]
 
-        # Ticks of a later replica are later, so the running maximum never reaches back to another.
-        there = np.where(states.present, ticks, -1)
-        before = np.where(self._seen[numbers], ticks[starts], -1)
+        there = np.where(states.present, row, -1)
+        before = np.where(self._seen[numbers], row[starts], -1)
         there[starts] = np.maximum(there[starts], before)
-        seen = np.maximum.accumulate(there, axis=0) >= ticks[starts][np.cumsum(first) - 1]
+        seen = np.maximum.accumulate(there, axis=0) >= first
 
         last_m = np.empty_like(range_m)
         now_m = np.where(states.present, range_m, np.inf)
         last_m[1:] = now_m[:-1]
         last_m[starts] = self._range_m[numbers]
         growing = (now_m > last_m) | (~states.present & seen)
-        since = np.where(growing, -1, ticks)
-        since[starts] = np.maximum(since[starts], self._since[numbers])
-        since = np.maximum.accumulate(since, axis=0)
+        shrank = np.maximum.accumulate(np.where(growing, -1, row), axis=0)
+        remembered = self._since[wake.run]
+        since = np.where(shrank >= first, ticks[np.maximum(shrank, 0), 0], remembered)
 
         passed = (ticks - since >= self._after_ticks) & growing & (now_m >= self.p.beyond_m)
         over = passed.all(axis=1)
         ends = np.append(starts[1:], len(wake)) - 1
         self._range_m[numbers], self._since[numbers] = now_m[ends], since[ends]
         self._seen[numbers] = seen[ends]
-        return RunEnd(wake.ticks[over]) if over.any() else None
+        return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
-    def _make_room(self, replicas: int, targets: int) -> None:
-        """Have a row for so many replicas."""
-        more = replicas - len(self._range_m)
+    def _make_room(self, runs: int, targets: int) -> None:
+        """Have a row for so many runs."""
+        more = runs - len(self._range_m)
         if more > 0:
             shape = more, targets
             old = (self._range_m, self._since, self._seen) if len(self._range_m) else ()

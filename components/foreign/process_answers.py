@@ -1,7 +1,7 @@
 """Messages out of the tables that a program answers, and all that is wrong with those."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -109,7 +109,8 @@ def _state_tracks(
             raise ValueError(f"column {name!r}: {what} is needed where there is a state")
     own = np.stack([numbers[name] for name in _OWN])
     with np.errstate(invalid="ignore"):
-        seen = dict(zip(_DIRECTION, direction(state[:3] - own, covariance), strict=True))
+        line = direction(state[:3] - own, covariance)
+        seen: dict[str, Any] = dict(zip(_DIRECTION, line, strict=True))
     seen |= {name: np.where(ranged, seen[name], np.nan) for name in _DIRECTION}
     seen |= {name: numbers[name] for name in _DIRECTION if name in numbers}
     for name in _DIRECTION[:2]:
@@ -124,7 +125,7 @@ def _state_tracks(
         state_s=numbers.get("state_s", np.full(count, now_s)),
         updated_s=numbers.get("updated_s", np.full(count, now_s)),
         contributors=one, updated_by=one, sensors=(block,), **seen,
-        **{name: numbers[name] for name in (*_STATE, *_ORIGIN, *_OWN)},
+        **cast("dict[str, Any]", {name: numbers[name] for name in (*_STATE, *_ORIGIN, *_OWN)}),
         covariance={name: numbers[name] for name in COVARIANCE.values()},
         extras={name: numbers[name] for name in EXTRAS if name in numbers},
         nis=np.full(count, np.nan), nis_freedom=np.zeros(count, dtype=np.int64),

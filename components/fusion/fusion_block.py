@@ -15,6 +15,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.navigation.errors import navigation_errs
 from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
+from dsa_des.arrays.run_ticks import RunTicks, ranks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -99,10 +100,6 @@ class Fusion(Component):
             for one in self.context.producers
         }
 
-    def serves_replicas(self) -> bool:
-        """Say no to a gate that would reach from one replica into the one before."""
-        return super().serves_replicas() and self.window_s() <= self.context.duration_s
-
     def window_s(self) -> Any:
         """Return how old a detection may be and still be put together with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
@@ -110,7 +107,7 @@ class Fusion(Component):
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
         for name, seen in self._recent.items():
-            if ended := int(np.searchsorted(seen.tick, wake.first_run * wake.span_ticks)):
+            if ended := int(np.searchsorted(seen.message.run, wake.first_run)):
                 rows = slice(ended, None)
                 self._recent[name] = Arrivals(name, seen.tick[rows], seen.message.take(rows))
         for name, new in arrivals.items():
@@ -118,27 +115,27 @@ class Fusion(Component):
             if old is not None:
                 message = Detections.concatenate([old.message, new.message])
                 ticks = np.concatenate([old.tick, new.tick])
-                if bool((ticks[1:] < ticks[:-1]).any()):  # those of each replica together
-                    order = np.argsort(ticks, kind="stable")
+                order = RunTicks(message.run, ticks).order()
+                if order is not None:  # those of each run together
                     ticks, message = ticks[order], message.take(order)
                 new = Arrivals(name, ticks, message)
             self._recent[name] = new
-        latest = max(int(wake.own_ticks(new.tick).max()) for new in arrivals.values())
+        latest = max(int(new.tick.max()) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            young = np.flatnonzero(wake.own_ticks(seen.tick) >= latest - self.keep_ticks)
+            young = np.flatnonzero(seen.tick >= latest - self.keep_ticks)
             self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
         return dict(sorted(together.items()))
 
     def combine(
         self,
-        ticks: IntArray,
+        instants: RunTicks,
         row: IntArray,
         target: IntArray,
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Build the fused rows from the best of what belongs together."""
+        """Build the fused rows of some instants from the best of what belongs together."""
         count = len(row)
         contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
@@ -177,8 +174,9 @@ class Fusion(Component):
                     moves[:, found[name]] = velocities(arrivals[name].message)[:, chosen]
         message = FusedWithPose if self._navigation_errs else FusedDetections
         return message(
-            tick=ticks,
-            offsets=offsets_of(row, len(ticks)),
+            tick=instants.tick,
+            run=instants.run,
+            offsets=offsets_of(row, len(instants)),
             target=target,
             contributors=contributors,
             angle_source=angle_source,
@@ -248,25 +246,25 @@ def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
 
 
 def latest_in_gate(
-    arrivals: Arrivals, ticks: IntArray, targets: IntArray, gate_ticks: int
+    arrivals: Arrivals, asked: RunTicks, targets: IntArray, gate_ticks: int
 ) -> IntArray:
     """Return the latest entry that arrived at the instant or at most `gate_ticks` before it."""
     counts = np.diff(arrivals.message.offsets)
     if not counts.any():
-        return np.full(len(ticks), -1, dtype=np.int64)
+        return np.full(len(asked), -1, dtype=np.int64)
     # Ranks of instants stay small where ticks times targets would overflow.
-    instants, rank = np.unique(np.concatenate([arrivals.tick, ticks]), return_inverse=True)
-    span = len(instants)
-    entry_tick = np.repeat(arrivals.tick, counts)
-    entry_key = arrivals.message.target * span + np.repeat(rank[: len(arrivals.tick)], counts)
+    (came, now), span = ranks(arrivals.instants, asked)
+    row = np.repeat(np.arange(len(counts)), counts)
+    entry_key = arrivals.message.target * span + came[row]
     order = np.argsort(entry_key, kind="stable")
-    asked = targets * span + rank[len(arrivals.tick) :]
-    place = np.searchsorted(entry_key[order], asked, side="right") - 1
+    place = np.searchsorted(entry_key[order], targets * span + now, side="right") - 1
     entry = order[np.maximum(place, 0)]
+    of = row[entry]
     fits = (
         (place >= 0)
         & (arrivals.message.target[entry] == targets)
-        & (ticks - entry_tick[entry] <= gate_ticks)
+        & (arrivals.message.run[of] == asked.run)
+        & (asked.tick - arrivals.tick[of] <= gate_ticks)
     )
     return np.where(fits, entry, -1)
 

@@ -19,6 +19,7 @@ from components.geometry import (
 )
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run, no_runs
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
@@ -97,9 +98,11 @@ def nearest_in_gate(
     other_came: IntArray | None = None,
     keep_ticks: int | None = None,
     carried: Carried | None = None,
+    runs: tuple[IntArray, IntArray] | None = None,
 ) -> IntArray:
     """Return for each anchor the entry of the other sensor that belongs to it, or -1.
 
+    `runs` are those of the anchors and of the other entries, where there are several.
     Of the entries in the gates those nearest in time count, of these the one nearest in angle,
     then in range. Nothing but measured values decides.
     """
@@ -108,9 +111,14 @@ def nearest_in_gate(
         return best
     here = anchor_ticks if anchor_came is None else anchor_came
     there = other_ticks if other_came is None else other_came
-    in_time = np.argsort(other_ticks, kind="stable")
-    first = np.searchsorted(other_ticks[in_time], anchor_ticks - gate_ticks, side="left")
-    counts = np.searchsorted(other_ticks[in_time], anchor_ticks + gate_ticks, side="right") - first
+    if runs is None:
+        runs = no_runs(len(anchors)), no_runs(len(other_ticks))
+    asked, others = RunTicks(runs[0], anchor_ticks), RunTicks(runs[1], other_ticks)
+    order = others.order()
+    in_time = np.arange(len(others)) if order is None else order
+    others = others.take(in_time)
+    first = next_of_run(others, asked.later(-gate_ticks))
+    counts = next_of_run(others, asked.later(gate_ticks + 1)) - first
     which = np.repeat(np.arange(len(anchors)), counts)
     start = np.repeat(np.cumsum(counts) - counts, counts)
     candidate = in_time[np.arange(len(which)) - start + np.repeat(first, counts)]
@@ -198,16 +206,18 @@ class Gated(Fusion):
         reported = {new.source: new for new in wake.arrivals("detections")}
         if not reported:
             return None
-        since = {name: int(wake.own_ticks(new.tick).min()) for name, new in reported.items()}
+        since = {name: int(new.tick.min()) for name, new in reported.items()}
         arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
-        came = {name: _entry_ticks(arrivals[name]) for name in order}
+        rows_of = {name: _rows_of_entries(arrivals[name]) for name in order}
+        came = {name: arrivals[name].tick[rows_of[name]] for name in order}
+        runs = {name: arrivals[name].message.run[rows_of[name]] for name in order}
         made = {name: arrivals[name].message.measured_ticks() for name in order}
         pose = {name: poses(arrivals[name].message) for name in order}
         # What came before this wake was reported then; it can only be gathered now.
         free = {
-            name: wake.own_ticks(came[name]) >= since[name]
+            name: came[name] >= since[name]
             if name in since
             else np.zeros(len(came[name]), dtype=bool)
             for name in order
@@ -217,7 +227,8 @@ class Gated(Fusion):
         gathered: dict[str, list[IntArray]] = {name: [] for name in order}
         for anchor in order:
             mine = np.flatnonzero(free[anchor])
-            rows.append(np.searchsorted(wake.ticks, came[anchor][mine]))
+            instants = arrivals[anchor].instants.take(rows_of[anchor][mine])
+            rows.append(last_of_run(wake.instants, instants))
             anchors.append((anchor, mine))
             for other in order:
                 if other == anchor:
@@ -236,6 +247,7 @@ class Gated(Fusion):
                     anchor_came=came[anchor][mine],
                     other_came=came[other],
                     keep_ticks=self.keep_ticks,
+                    runs=(runs[anchor][mine], runs[other]),
                     carried=Carrier(
                         one, made[anchor], pose[anchor], two, made[other], pose[other],
                         self.context.ticks_per_s,
@@ -249,7 +261,7 @@ class Gated(Fusion):
         row = np.concatenate(rows)[in_order]
         entries = {name: np.concatenate(parts)[in_order] for name, parts in gathered.items()}
         target = self._targets(entries, arrivals, order)
-        return self.combine(wake.ticks, row, target, arrivals, entries)
+        return self.combine(wake.instants, row, target, arrivals, entries)
 
     def _in_order(
         self,
@@ -279,6 +291,5 @@ class Gated(Fusion):
         return target
 
 
-def _entry_ticks(arrivals: Arrivals) -> IntArray:
-    """Return when each detection arrived."""
-    return np.repeat(arrivals.tick, np.diff(arrivals.message.offsets))
+def _rows_of_entries(arrivals: Arrivals) -> IntArray:
+    return np.repeat(np.arange(len(arrivals.tick)), np.diff(arrivals.message.offsets))

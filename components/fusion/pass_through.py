@@ -8,7 +8,7 @@ from components.fusion.fusion_block import Fusion
 from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from components.messages.looks import Looks
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.block.component import Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Arrivals, Wake
@@ -36,7 +36,8 @@ class PassThrough(Fusion):
             return None
         rows, entries, places = [], [], []
         for new in arrivals.values():
-            row = np.repeat(np.searchsorted(wake.ticks, new.tick), np.diff(new.message.offsets))
+            row = last_of_run(wake.instants, new.instants)
+            row = np.repeat(row, np.diff(new.message.offsets))
             rows.append(row)
             places.append(np.arange(len(row)))
         sizes = [len(place) for place in places]
@@ -47,19 +48,19 @@ class PassThrough(Fusion):
             entries.append(np.concatenate(mine)[order])
         target = np.concatenate([new.message.target for new in arrivals.values()])[order]
         fused = self.combine(
-            wake.ticks, np.concatenate(rows)[order], target, arrivals,
+            wake.instants, np.concatenate(rows)[order], target, arrivals,
             dict(zip(arrivals, entries, strict=True)),
         )  # fmt: skip
-        fused.looks = self._looks(wake.ticks, arrivals)
+        fused.looks = self._looks(wake.instants, arrivals)
         return fused
 
-    def _looks(self, ticks: IntArray, arrivals: dict[str, Arrivals]) -> Looks:
+    def _looks(self, instants: RunTicks, arrivals: dict[str, Arrivals]) -> Looks:
         row, sensor, age, pose = [], [], [], []
         for name, new in arrivals.items():
             message = new.message
             if message.ticks_after is not None:
                 continue
-            row.append(np.searchsorted(ticks, new.tick))
+            row.append(last_of_run(instants, new.instants))
             sensor.append(np.full(len(message), self.sensors.index(name)))
             age.append(new.tick - message.tick)
             own = [getattr(message, column) for column in POSE]
@@ -68,10 +69,10 @@ class PassThrough(Fusion):
             pose.append(np.stack(own))
         if not row:
             none = np.empty(0, dtype=np.int64)
-            return Looks(np.zeros(len(ticks) + 1, dtype=np.int64), none, none, np.empty((6, 0)))
+            return Looks(np.zeros(len(instants) + 1, np.int64), none, none, np.empty((6, 0)))
         order = np.argsort(np.concatenate(row), kind="stable")
         return Looks(
-            offsets_of(np.concatenate(row)[order], len(ticks)),
+            offsets_of(np.concatenate(row)[order], len(instants)),
             np.concatenate(sensor)[order],
             np.concatenate(age)[order],
             np.concatenate(pose, axis=1)[:, order],

@@ -20,7 +20,8 @@ from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
 from components.messages.false_detections import FALSE_TARGET, true_entries
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.run_ticks import last_of_run
+from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
@@ -49,7 +50,7 @@ def pass_false_alarms(
         false = np.flatnonzero(new.message.target == FALSE_TARGET)
         if len(false) == 0:
             continue
-        row = np.searchsorted(fused.tick, new.tick)
+        row = last_of_run(fused.instants, new.instants)
         rows.append(np.repeat(row, np.diff(new.message.offsets))[false])
         for column in ("azimuth_rad", "elevation_rad", "range_m"):
             columns[column].append(getattr(new.message, column)[false])
@@ -131,7 +132,7 @@ class PickBest(Fusion):
             arrivals = {n: Arrivals(n, new.tick, true[n]) for n, new in reported.items()}
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
-        keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
+        keys = [_keys(new, wake, width) for new in arrivals.values()]
         # A sensor reports in an order that tells nothing of the targets.
         in_order = [np.sort(key) for key in keys] if len(wake) > 1 else []
         union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)
@@ -139,14 +140,14 @@ class PickBest(Fusion):
         if self.gate_ticks:
             arrivals = self.with_recent(arrivals, wake)
             entries = {
-                name: latest_in_gate(new, wake.ticks[row], target, self.gate_ticks)
+                name: latest_in_gate(new, wake.instants.take(row), target, self.gate_ticks)
                 for name, new in arrivals.items()
             }
         else:
             entries = {
                 name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
             }
-        fused = self.combine(wake.ticks, row, target, arrivals, entries)
+        fused = self.combine(wake.instants, row, target, arrivals, entries)
         if all_true:
             return fused
         return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
@@ -160,10 +161,10 @@ def _union(keys: list[IntArray], width: int) -> IntArray:
     return there.nonzero()[0]
 
 
-def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
+def _keys(new: Arrivals, wake: Wake, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
-    if len(ticks) == 1:
+    if len(wake) == 1:
         return new.message.target
-    row = last_at_or_before(ticks, new.tick)  # they are among them
+    row = last_of_run(wake.instants, new.instants)  # they are among them
     offsets = new.message.offsets
     return np.repeat(row, np.diff(offsets)) * width + new.message.target

@@ -219,5 +219,6 @@ class DaidalusGuidance(Component):
             for k in (3, 4)
         ]
         region = table[:, 2].astype(np.int64)
-        ticks = wake.ticks[np.array(rows, dtype=np.int64)]
-        return GuidanceBands(ticks, offsets_of(line, len(rows)), code, region, *ends)
+        ran = wake.instants.take(np.array(rows, dtype=np.int64))
+        offsets = offsets_of(line, len(rows))
+        return GuidanceBands(ran.tick, offsets, code, region, *ends, run=ran.run)

@@ -192,8 +192,6 @@ class Transform(Component):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.rung: PickedModels | None = None
-        #: How long the timeline of one replica is, where many run in lock step; else 0.
-        self.span_ticks = 0
 
     def setup(self) -> None:
         """Take what the ownship believes of itself, and the models to compute with."""
@@ -232,7 +230,6 @@ class Transform(Component):
         if states is None:
             return None
         own = _beside_targets(states)
-        self.span_ticks = wake.span_ticks
         return RelativeTargets(
             tick=wake.ticks,
             state_tick=states.tick,

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.messages.columns import TrueLine
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import Column, Columns, Message, Text, columns_of
+from dsa_des.block.message import Column, Columns, Message, Text, columns_of, instants_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def look_columns(detections: Any) -> Columns:
     """Return the rows of the looks of a report: every target at every scan."""
     count = len(detections.roster)
     columns: Columns = {
-        "tick": np.repeat(detections.tick, count),
+        **instants_of(detections, count),
         "scan": np.repeat(detections.scan, count),
         "target": Text(np.tile(np.arange(count), len(detections)), detections.roster.names),
     }

@@ -6,7 +6,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.run_ticks import RunTicks
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import PER_ROW, Message, column
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
@@ -123,6 +124,7 @@ class Manoeuvres(Message):
 
     def __post_init__(self) -> None:
         """Fill in what is not changed."""
+        super().__post_init__()
         for name in Manoeuvre._fields[2:]:
             if getattr(self, name) is None:
                 setattr(self, name, np.zeros(len(self.tick)))
@@ -134,14 +136,13 @@ class Manoeuvres(Message):
         return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
 
     @classmethod
-    def at_rows(cls, ticks: IntArray, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
-        """Return the message of manoeuvres at some of the instants `ticks`, by their places.
-
-        None without any.
-        """
+    def at_rows(cls, instants: RunTicks, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
+        """Return the message of manoeuvres at some instants, by their places; None without any."""
         rows = sorted(manoeuvres)
-        each = [manoeuvres[row] for row in rows]
-        return cls.of(ticks[rows].tolist(), each) if rows else None
+        if not rows:
+            return None
+        some = instants.take(np.array(rows))
+        return cls.of(some.tick.tolist(), [manoeuvres[row] for row in rows]).of_runs(some.run)
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

@@ -16,6 +16,7 @@ from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
+from dsa_des.arrays.run_ticks import says_no_runs
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, per_row, static
 
@@ -82,6 +83,9 @@ def truth_columns(states: Any) -> Columns:
     columns: Columns = {
         name: np.concatenate([part[name] for part in parts]) for name in ("tick", *_NUMBERS)
     }
+    if not says_no_runs(states.run):
+        counts = np.concatenate([part["counts"] for part in parts])
+        columns["replica"] = np.repeat(states.run, counts)
     who = np.concatenate([part["who"] for part in parts])
     columns["target"] = Text(who, states.roster.names)
     return columns
@@ -94,6 +98,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
     velocity = _velocity(flights, columns, time_s, state)
     return {
         "tick": tick[row],
+        "counts": np.bincount(row, minlength=len(tick)),
         "who": column - 1,
         **{name: state[name][row, column] for name in _PLACE},
         **{name: v[row, column] for name, v in zip(_VELOCITY, velocity, strict=True)},
@@ -282,7 +287,7 @@ class RelativeTargets(Message):
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     own_attitude: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: KnownFlights | None = per_row(default=None, kw_only=True)
-    state_tick: IntArray | None = per_row(is_tick=True, default=None, kw_only=True)
+    state_tick: IntArray | None = per_row(default=None, kw_only=True)
     hidden: BoolArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})

@@ -249,17 +249,14 @@ class NavigationErrors(_Navigation):
 
         def believed(states: TrafficStates) -> Belief:
             # An instant may take more bits than a scan number has: the rest goes to the target.
-            replica, own = np.zeros_like(states.tick), states.tick
-            if block.span_ticks:
-                replica, own = np.divmod(states.tick, block.span_ticks)
-            instant = nanosecond_of(own, block.context.ticks_per_s)
+            instant = nanosecond_of(states.tick, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
-            drawn = stream.of_rows(replica)
+            drawn = stream.of_runs(states.run)
             draws = [
                 drawn.normal(high, low, draw)
                 if (process := lasting[draw // 3]) is None
-                else process(_OWNSHIP, instant, draw % 3, replica)
+                else process(_OWNSHIP, instant, draw % 3, states.run)
                 for draw in range(6)
             ]
             lat, lon, alt = position_with_error(

@@ -19,7 +19,6 @@ from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvr
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
-from dsa_des.time.timeline import first_scan
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -193,9 +192,9 @@ class StochasticParameters(ConfParameters):
 
 
 class Mind(NamedTuple):
-    """What an operator has in mind, in one replica."""
+    """What an operator has in mind, in one run."""
 
-    replica: int
+    run: int
     decisions: int = 0  # How many there were
     since: int | None = None  # Tick from which on there was an alert
     chooses_at: float | None = None  # Tick from which on it chooses the manoeuvre
@@ -227,7 +226,7 @@ class Stochastic(Component):
         self._response, self._steering, self._pause = map(
             self.stream, ("response", "steering", "pause")
         )
-        #: By replica.
+        #: By run.
         self._minds: dict[int, Mind] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
@@ -235,24 +234,23 @@ class Stochastic(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        highest, replica = alerts.highest(), wake.replica
-        own_ticks = wake.own_ticks(wake.ticks)
+        highest, runs = alerts.highest(), wake.run
         # Without an alert, now or before, there is nothing to do.
         alerted = highest >= self.p.level
         busy = [run for run, mind in self._minds.items() if mind.since is not None]
-        followed = np.isin(replica, np.union1d(replica[alerted], np.array(busy, dtype=np.int64)))
+        followed = np.isin(runs, np.union1d(runs[alerted], np.array(busy, dtype=np.int64)))
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
         for place in np.flatnonzero(followed).tolist():
-            run = int(replica[place])
+            run = int(runs[place])
             mind = self._minds.get(run, Mind(run))
-            mind, chooses, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
+            mind, chooses, acts = self._followed(mind, int(wake.ticks[place]), int(highest[place]))
             self._minds[run] = mind
             if chooses:
                 choosing.append((place, mind))
             if acts:
                 acting.append((place, run))
-        return Manoeuvres.at_rows(wake.ticks, self._sent(alerts, choosing, acting))
+        return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
 
     def _sent(
         self,
@@ -263,7 +261,7 @@ class Stochastic(Component):
         """Return the manoeuvres that begin, by row; what is chosen and not begun is kept."""
         chosen = self._manoeuvres_at(alerts, choosing)
         latest: dict[int, Manoeuvre | None] = {}
-        begins = sorted([(place, 0, mind.replica) for place, mind in choosing]
+        begins = sorted([(place, 0, mind.run) for place, mind in choosing]
                         + [(place, 1, run) for place, run in acting])  # fmt: skip
         sent = {}
         for place, acts, run in begins:
@@ -306,8 +304,8 @@ class Stochastic(Component):
 
     def _draw(self, mind: Mind, stream: Any, number: int) -> float:
         """Return the draw of a number, of the latest decision."""
-        decision = np.int64(first_scan(mind.replica) + mind.decisions)
-        return float(stream.uniform(np.uint64(0), decision, number))
+        drawn = stream.of_runs(np.int64(mind.run))
+        return float(drawn.uniform(np.uint64(0), np.int64(mind.decisions), number))
 
     def _response_s(self, mind: Mind, highest: int) -> tuple[float, float]:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s

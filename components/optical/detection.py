@@ -188,7 +188,7 @@ class AddedFalseAlarms:
         block, reach = self._block, self._block.reach
         found = block.detector
         count = false_alarm_count(
-            self._draws.uniform(_NO_TARGET, detections.scan, _HOW_MANY),
+            self._draws.of_runs(detections.run).uniform(_NO_TARGET, detections.scan, _HOW_MANY),
             cells=found.places,
             false_alarm_probability=found.false_alarms / found.places,
         )
@@ -197,9 +197,9 @@ class AddedFalseAlarms:
             return detections
         first = np.repeat(np.cumsum(count) - count, count)
         number = (np.arange(len(row)) - first).astype(np.uint64)
-        scan = detections.scan[row]
+        scan, drawn = detections.scan[row], self._draws.of_runs(detections.run[row])
         azimuth_draw, elevation_draw, strength, contrast = (
-            self._draws.uniform(number, scan, draw)
+            drawn.uniform(number, scan, draw)
             for draw in (_AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST)
         )
         across, upward = false_alarm_direction(

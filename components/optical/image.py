@@ -325,7 +325,9 @@ class ImageCamera(ElectroOptical):
             picture = picture + (1.0 - covered) * behind
         number = np.arange(side * side, dtype=np.uint64) * _APART
         scans = np.full(side * side, scene.cells.scan[scene.cell])
-        noise = self._pixels.normal(scene.key ^ number, scans, which).reshape(side, side)
+        run = np.full(side * side, scene.cells.run[scene.cell])
+        drawn = self._pixels.of_runs(run).normal(scene.key ^ number, scans, which)
+        noise = drawn.reshape(side, side)
         return np.asarray(picture + (self.pixel_noise / scene.binned) * noise)
 
     def _background(self, scene: "_Scene", corner: IntArray, attitude: Any) -> FloatArray:
@@ -337,10 +339,10 @@ class ImageCamera(ElectroOptical):
         )
         offset: Any = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
         azimuth, elevation = angles_over(ahead, right, down, offset)
-        replica = int(scene.cells.replica[scene.cell])
+        run = int(scene.cells.run[scene.cell])
 
         def normal(one: IntArray, other: IntArray) -> FloatArray:
-            draws = self._texture.of_rows(np.full(len(one), replica))
+            draws = self._texture.of_runs(np.full(len(one), run))
             return draws.normal(one.astype(np.uint64), other)
 
         grain = self.p.texture_pixels * self.pixel_azimuth_rad

@@ -245,7 +245,7 @@ class MovingTargets:
         self.weight_s = weight_s
         self.model = model
         self._ticks_per_s = ticks_per_s
-        # Of each replica, tick and NED angles of its last scan, one column per target; NaN where
+        # Of each run, tick and NED angles of its last scan, one column per target; NaN where
         # it saw none.
         self._tick: IntArray = np.empty(0, dtype=np.int64)
         self._angles: FloatArray = np.empty((2, 0, 0))
@@ -259,14 +259,14 @@ class MovingTargets:
 
         A target's first look has none, nor has the first after a scan that did not see it.
         """
-        replica, targets = cells.replica_of_scan, len(cells.roster)
-        self._remember(int(replica.max(initial=0)) + 1, targets)
-        begins = np.append(True, replica[1:] != replica[:-1])
-        # Before the scans of each replica stands its last one.
-        place = np.arange(len(replica)) + np.cumsum(begins)
-        of, earlier = replica[begins], place[begins] - 1
-        angles = np.full((2, len(replica) + len(of), targets), np.nan)
-        tick = np.zeros(len(replica) + len(of), dtype=np.int64)
+        run, targets = cells.run_of_scan, len(cells.roster)
+        self._remember(int(run.max(initial=0)) + 1, targets)
+        begins = np.append(True, run[1:] != run[:-1])
+        # Before the scans of each run stands its last one.
+        place = np.arange(len(run)) + np.cumsum(begins)
+        of, earlier = run[begins], place[begins] - 1
+        angles = np.full((2, len(run) + len(of), targets), np.nan)
+        tick = np.zeros(len(run) + len(of), dtype=np.int64)
         angles[:, earlier], tick[earlier] = self._angles[:, of], self._tick[of]
         here = place[cells.row]
         angles[:, here, cells.target] = cells.azimuth_rad, cells.elevation_rad
@@ -287,11 +287,11 @@ class MovingTargets:
             )
         )
 
-    def _remember(self, replicas: int, targets: int) -> None:
-        """Remember so many replicas at least."""
+    def _remember(self, runs: int, targets: int) -> None:
+        """Remember so many runs at least."""
         known = len(self._tick)
-        if known < replicas:
-            angles = np.full((2, replicas, targets), np.nan)
+        if known < runs:
+            angles = np.full((2, runs, targets), np.nan)
             angles[:, :known] = self._angles.reshape(2, known, targets)
             self._angles = angles
-            self._tick = np.append(self._tick, np.zeros(replicas - known, dtype=np.int64))
+            self._tick = np.append(self._tick, np.zeros(runs - known, dtype=np.int64))

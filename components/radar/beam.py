@@ -306,7 +306,7 @@ class Sweep:
         if first and "cued" in detections.extras:
             offset_s = np.where(detections.extras["cued"], 0.0, offset_s)
         assert isinstance(targets, LitTargets)
-        scan_s = np.repeat(self._run_time_s(detections.tick), counts)
+        scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
         own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
         after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
@@ -315,13 +315,7 @@ class Sweep:
     def _start_s(self, targets: RelativeTargets) -> FloatArray:
         """Return when the picture of each row was; one that came late goes on from there."""
         start = targets.tick if targets.state_tick is None else targets.state_tick
-        return self._run_time_s(start)
-
-    def _run_time_s(self, ticks: IntArray) -> FloatArray:
-        """Return the time since the start of the run, of its own replica where many run."""
-        span = self._block.span_ticks
-        time_s: FloatArray = (ticks % span if span else ticks) / self._ticks_per_s
-        return time_s
+        return np.asarray(start / self._ticks_per_s)
 
     def _own_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray

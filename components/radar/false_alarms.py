@@ -122,7 +122,7 @@ class NoiseReports:
         which: int,
     ) -> Detections:
         count = false_alarm_count(
-            self._counts.uniform(_NO_TARGET, detections.scan, which),
+            self._counts.of_runs(detections.run).uniform(_NO_TARGET, detections.scan, which),
             cells=self._cells.count,
             false_alarm_probability=crossing.false_alarm_probability,
         )
@@ -132,10 +132,8 @@ class NoiseReports:
         # Keyed by its number within the scan, where detections are keyed by target.
         number = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         key = (number + which * _OF_CUED).astype(np.uint64)
-        scan = detections.scan[row]
-        across, upwards, outwards, power = (
-            self._places.uniform(key, scan, draw) for draw in range(4)
-        )
+        scan, places = detections.scan[row], self._places.of_runs(detections.run[row])
+        across, upwards, outwards, power = (places.uniform(key, scan, draw) for draw in range(4))
         where = {
             "azimuth": _between(across, self._cells.azimuth_rad),
             "elevation": _between(upwards, self._cells.elevation_rad),
@@ -147,7 +145,7 @@ class NoiseReports:
             pulses=crossing.pulses,
             threshold=crossing.threshold,
         )
-        rate = self._places.uniform(key, scan, 4)
+        rate = places.uniform(key, scan, 4)
         alarms = Alarms(row, key, where, np.maximum(snr, FAINTEST), rate)
         cued = bool(which) if len(self._crossings) > 1 else None
         return self._block.with_noise_reports(detections, targets, rows, alarms, cued=cued)
@@ -254,34 +252,35 @@ class GroundReports:
         self, detections: Detections, targets: RelativeTargets, rows: IntArray
     ) -> Detections:
         """Return the report with the ground's false alarms of its scans."""
-        numbers = zip(rows.tolist(), detections.scan.tolist(), strict=True)
-        found = [self._of_scan(targets, row, scan) for row, scan in numbers]
+        numbers = zip(rows.tolist(), detections.run.tolist(), detections.scan.tolist(), strict=True)
+        found = [self._of_scan(targets, *number) for number in numbers]
         counts = [len(cell) for cell, _ in found]
         row = np.repeat(np.arange(len(found)), counts)
         if len(row) == 0:
             return detections
         cell, cnr = (np.concatenate(parts) for parts in zip(*found, strict=True))
         scan, key = detections.scan[row], cell.astype(np.uint64)
+        draws = self._draws.of_runs(detections.run[row])
         beam, depth = np.divmod(cell, self._cells.range)
         across, upwards = np.divmod(beam, self._cells.elevation)
         where = {
-            name: start + (number + self._draws.uniform(key, scan, draw)) * size
+            name: start + (number + draws.uniform(key, scan, draw)) * size
             for draw, (name, number, start, size) in enumerate(
                 zip(("azimuth", "elevation", "range"), (across, upwards, depth), self._start,
                     self._size, strict=True), start=1,
             )
         }  # fmt: skip
         # What lies beyond the threshold of an exponential power is exponential again.
-        beyond = -np.log1p(-self._draws.uniform(key, scan, 4)) * (1.0 + cnr)
+        beyond = -np.log1p(-draws.uniform(key, scan, 4)) * (1.0 + cnr)
         snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
-        rate = self._draws.uniform(key, scan, 5)
+        rate = draws.uniform(key, scan, 5)
         alarms = Alarms(row, key + _OF_GROUND, where, snr, rate)
         joined = self._block.with_noise_reports(detections, targets, rows, alarms)
         # Without any here, the report is in that order already.
         return in_measured_order(joined)
 
     def _of_scan(
-        self, targets: RelativeTargets, row: int, scan: int
+        self, targets: RelativeTargets, row: int, run: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
         """Return the cells that the ground crosses the threshold in, and their CNR."""
         if targets.own_attitude is None:
@@ -306,7 +305,8 @@ class GroundReports:
                 f"clutter_threshold is 'noise': the ground makes {most:,.0f} false alarms in a "
                 f"scan, and at most {MOST_PER_SCAN:,.0f} are allowed; 'adaptive' keeps their number"
             )
-        draw = self._draws.uniform(cell.astype(np.uint64), np.full(len(cell), scan), 0)
+        draws = self._draws.of_runs(np.full(len(cell), run))
+        draw = draws.uniform(cell.astype(np.uint64), np.full(len(cell), scan), 0)
         crossing = np.flatnonzero(draw < extra)
         return cell[crossing], cnr[crossing]
 

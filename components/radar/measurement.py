@@ -256,7 +256,8 @@ class Strength:
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
             keys = cells.roster.keys_of(cells.target[found])
-            tail = 1.0 - self._draws.uniform(keys, cells.scan[found])
+            draws = self._draws.of_runs(cells.run[found])
+            tail = 1.0 - draws.uniform(keys, cells.scan[found])
         else:
             tail = look.tail[found]
         # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
@@ -334,8 +335,6 @@ class OwnVelocity(Effect):
             # At instants of their own, or once a scan.
             row = rows[some] if after is None else np.repeat(rows, counts)
             state = (targets.tick if targets.state_tick is None else targets.state_tick)[row]
-            if block.span_ticks:
-                state = state % block.span_ticks
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = own_velocity(targets, row, time_s)
             if after is not None:

@@ -166,8 +166,6 @@ class Radar(Sensor):
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
         each, place = np.unique(row, return_inverse=True)
         tick = (targets.tick if targets.state_tick is None else targets.state_tick)[each]
-        if self.span_ticks:
-            tick = tick % self.span_ticks
         velocity = own_velocity(targets, each, tick / self.context.ticks_per_s)
         body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude

@@ -26,7 +26,6 @@ from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
-from dsa_des.time.timeline import first_scan
 
 
 def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> Any:
@@ -228,30 +227,29 @@ class Scatterers:
         aspect: tuple[FloatArray, FloatArray, FloatArray],
         which: int,
         strengths: Callable[[int], tuple[FloatArray, FloatArray]] | None = None,
-        replica: IntArray | None = None,
+        run: IntArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return real and imaginary part of the amplitude of echoes, each of variance 1.
 
         `aspect` is the unit vector to the radar in the target's body axes, `which` the number of a
         target's independent echo, and `strengths` gives standard normal numbers by a scatterer's
-        number; by default they are fixed to the target. `replica` says whose the targets are where
-        replicas run in lock step.
+        number; by default they are fixed to the target. `run` says of which run each is.
         """
-        whose = np.zeros(len(keys), dtype=np.uint64) if replica is None else replica
+        whose = np.zeros(len(keys), dtype=np.uint64) if run is None else run
         pairs = np.stack([keys, whose.astype(np.uint64)])
         (targets, runs), of_target = np.unique(pairs, axis=1, return_inverse=True)
         of_target = of_target.reshape(-1)
-        begin = runs.astype(np.int64) * first_scan(1)
+        stream = self._stream.of_runs(runs.astype(np.int64))
         real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
         for number in range(which * self._count, (which + 1) * self._count):
-            numbers = begin + number
-            place = self._places(targets, numbers)
+            numbers = np.full(len(targets), number, dtype=np.int64)
+            place = self._places(stream, targets, numbers)
             # One after the other, so that an element's sum has one order in any array.
             phase = np.zeros(len(keys))
             for along, component in zip(place, aspect, strict=True):
                 phase += along[of_target] * component
             if strengths is None:
-                normal = (self._stream.normal(targets, numbers, draw) for draw in (2, 3))
+                normal = (stream.normal(targets, numbers, draw) for draw in (2, 3))
                 a, b = (value[of_target] for value in normal)
             else:
                 a, b = strengths(number)
@@ -261,10 +259,10 @@ class Scatterers:
         scale = 1.0 / math.sqrt(self._count)
         return scale * real, scale * imaginary
 
-    def _places(self, targets: Any, numbers: IntArray) -> list[FloatArray]:
+    def _places(self, stream: Stream, targets: Any, numbers: IntArray) -> list[FloatArray]:
         """Return where a scatterer is along each axis, as phase per unit of aspect."""
         # One draw number is two uniforms (`Stream.uniform`), so 0 and 1 are the first of them.
-        out, up, around = (self._stream.uniform(targets, numbers, draw) for draw in (0, 1, 2))
+        out, up, around = (stream.uniform(targets, numbers, draw) for draw in (0, 1, 2))
         radius = self._reach * np.cbrt(out)
         z = 2.0 * up - 1.0
         level = np.sqrt(1.0 - z * z)
@@ -349,12 +347,12 @@ class LastingFluctuation(Effect):
 
         def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
             keys = cells.roster.keys_of(cells.target)[chosen]
-            instant_ns, replica = cells.instant_ns[chosen], cells.replica[chosen]
+            instant_ns, run = cells.instant_ns[chosen], cells.run[chosen]
 
             def pair(number: int) -> tuple[FloatArray, FloatArray]:
                 assert process is not None
                 real, imaginary = (
-                    process(keys, instant_ns, 2 * number + part, replica) for part in (0, 1)
+                    process(keys, instant_ns, 2 * number + part, run) for part in (0, 1)
                 )
                 return real, imaginary
 
@@ -365,7 +363,7 @@ class LastingFluctuation(Effect):
                     continue
                 aspect = _aspect(cells, chosen)
                 strengths = None if process is None else pair
-                amplitudes += scatterers.echo(keys, aspect, which, strengths, replica)
+                amplitudes += scatterers.echo(keys, aspect, which, strengths, run)
             return fading_power(amplitudes)
 
         return fading

@@ -28,6 +28,7 @@ from components.radar.weather import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
+from dsa_des.time.randomness import Stream
 
 
 class SwerlingParameters(LinkBudgetParameters):
@@ -246,9 +247,12 @@ class SwerlingRadar(LinkBudgetRadar):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
             target, scan = keys[chosen], cells.scan[chosen]
+            draws = self._rcs_draws.of_runs(cells.run[chosen])
 
-            def draw(number: int, target: Any = target, scan: Any = scan) -> FloatArray:
-                return self._rcs_draws.uniform(target, scan, number)
+            def draw(
+                number: int, target: Any = target, scan: Any = scan, draws: Stream = draws
+            ) -> FloatArray:
+                return draws.uniform(target, scan, number)
 
             rcs[chosen] = scan_rcs(
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"

@@ -52,7 +52,6 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import nanosecond_of
-from dsa_des.time.timeline import split_scans
 
 
 class ThresholdParameters(LinkBudgetParameters):
@@ -236,13 +235,10 @@ class LinkBudgetRadar(Radar):
         where, row = dict(alarms.where), alarms.row
         if self.p.measures_range_rate:
             where["range_rate"] = self.noise_range_rate(alarms.rate, where, targets, rows[row])
-        scan, tick = detections.scan[row], detections.tick[row]
-        replica = split_scans(scan)[0]
-        if self.span_ticks:
-            tick = tick % self.span_ticks
+        scan, tick, run = detections.scan[row], detections.tick[row], detections.run[row]
         instant_ns = nanosecond_of(tick, self.context.ticks_per_s)
         azimuth, elevation, range_m, measured = self.report_noise(
-            where, {"snr": alarms.snr}, (alarms.key, scan, instant_ns, replica)
+            where, {"snr": alarms.snr}, (alarms.key, scan, instant_ns, run)
         )
         snr_db = 10.0 * np.log10(alarms.snr)
         extras = {"snr_db": snr_db}

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from components.geometry.attitude import body_to_ned, unit_vector
 from components.messages.detections import Detections
+from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.time.timeline import split_scans
 
 if TYPE_CHECKING:
     from components.sensor.look import Cells, Look
@@ -126,7 +126,7 @@ class Declarations:
     def __init__(self, m: int, n: int) -> None:
         self.m, self.n = m, n
         self._names: tuple[str, ...] = ()
-        #: Of all targets of the first replica, of the second, and so on.
+        #: Of all targets of the first run, of the second, and so on.
         self._memory: BoolArray = no_looks_yet(n, 0)
         self._first_tick: IntArray = np.empty(0, dtype=np.int64)
         self._first_range_m: FloatArray = np.empty(0)
@@ -134,10 +134,10 @@ class Declarations:
     def __call__(self, cells: Cells, look: Look) -> Look:
         """Return the look with a column ``declared``."""
         self._names = cells.roster.names
-        who = cells.replica * len(self._names) + cells.target
-        replicas = int(cells.replica.max(initial=0)) + 1
-        if len(self._memory) < replicas * len(self._names):
-            self._remember(replicas * len(self._names))
+        who = cells.run * len(self._names) + cells.target
+        runs = int(cells.run.max(initial=0)) + 1
+        if len(self._memory) < runs * len(self._names):
+            self._remember(runs * len(self._names))
         declared, self._memory = declare_looks(who, look.detected, self.m, self.n, self._memory)
         self._note_first(cells, who, np.flatnonzero(declared))
         if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
@@ -176,12 +176,13 @@ _MOST_PAIRS = 2_000_000
 
 @dataclass(frozen=True)
 class SeenPlaces:
-    """Detections as a rule of declaration by place sees them, ascending in scan.
+    """Detections as a rule of declaration by place sees them, ascending in run and then in scan.
 
     `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
     NaN where none is measured, and a variance of NaN counts as 0.
     """
 
+    run: IntArray
     scan: IntArray
     time_s: FloatArray
     direction: FloatArray
@@ -216,9 +217,9 @@ def scans_with_company(
     if len(places) == 0:
         return count
     for lag in range(1, n):
-        wanted = places.scan[asked] - lag
-        first = np.searchsorted(places.scan, wanted, side="left")
-        number = np.searchsorted(places.scan, wanted, side="right") - first
+        scans, wanted = RunTicks(places.run, places.scan), places.scan[asked] - lag
+        first = next_of_run(scans, RunTicks(places.run[asked], wanted))
+        number = next_of_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
         start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
         while start < len(asked):
             part = slice(start, start + most)
@@ -288,7 +289,6 @@ class DeclaredPlaces:
         self.m, self.n = p.declare_m, p.declare_n
         self._speed_m_s = p.declare_speed_m_s
         self._rate_rad_s = np.radians(p.declare_rate_deg_s)
-        self._block = block
         self._ticks_per_s = block.context.ticks_per_s
         self._memory: SeenPlaces | None = None
         self._first: dict[str, tuple[int, float]] = {}
@@ -300,24 +300,25 @@ class DeclaredPlaces:
         known, asked = new, np.arange(len(new))
         if self._memory is not None:
             known = self._memory.then(new)
-            order = np.argsort(known.scan, kind="stable")  # replicas come back one after the other
-            known, asked = known.take(order), np.flatnonzero(order >= len(self._memory))
+            asked = asked + len(self._memory)
+            order = RunTicks(known.run, known.scan).order()
+            if order is not None:  # runs come back one after the other
+                known, asked = known.take(order), np.flatnonzero(order >= len(self._memory))
         company = scans_with_company(
             known, asked, self.n, speed_m_s=self._speed_m_s, rate_rad_s=self._rate_rad_s
         )
         declared = company >= self.m
         if len(detections):
             self._memory = known.take(known.scan > self._last_scans(detections, known) - self.n + 1)
-        if not self._block.span_ticks:
-            self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
+        self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
         return replace(detections, extras={**detections.extras, "declared": declared})
 
     def _last_scans(self, detections: Detections, known: SeenPlaces) -> IntArray:
-        """Return the last scan of each one's replica, its own where this report has none of it."""
-        replica, _ = split_scans(detections.scan)
-        place = np.searchsorted(replica, split_scans(known.scan)[0], side="right") - 1
-        last = detections.scan[np.maximum(place, 0)]
-        return np.where(split_scans(last)[0] == split_scans(known.scan)[0], last, known.scan)
+        """Return the last scan of each one's run, its own where this report has none of it."""
+        ends = detections.instants.last_of_each
+        runs, last = detections.run[ends], detections.scan[ends]
+        place = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)
+        return np.where(runs[place] == known.run, last[place], known.scan)
 
     def _places(self, detections: Detections) -> SeenPlaces:
         counts = np.diff(detections.offsets)
@@ -327,10 +328,10 @@ class DeclaredPlaces:
             turned = (own[f"own_{name}_rad"] for name in ("heading", "pitch", "roll"))
             direction = body_to_ned(*direction, *turned)
         level = np.cos(detections.elevation_rad)
-        measured, span = detections.measured_ticks(), self._block.span_ticks
         return SeenPlaces(
+            run=np.repeat(detections.run, counts),
             scan=np.repeat(detections.scan, counts),
-            time_s=(measured % span if span else measured) / self._ticks_per_s,
+            time_s=detections.measured_ticks() / self._ticks_per_s,
             direction=np.stack(direction, axis=-1),
             range_m=detections.range_m,
             angle_variance_rad2=detections.azimuth_variance_rad2 * level**2

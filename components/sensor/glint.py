@@ -83,10 +83,10 @@ class Wander:
     ) -> Place:
         """Return where some cells' targets seem to be, in body axes, from where they are."""
         keys = cells.roster.keys_of(cells.target[found])
-        when, replica = cells.instant_ns[found], cells.replica[found]
+        when, run = cells.instant_ns[found], cells.run[found]
         extent_m = cells.roster.extents_m[cells.craft[found]]
         length_m, span_m, height_m = (
-            self._share * extent_m[:, axis] * self._process(keys, when, axis, replica)
+            self._share * extent_m[:, axis] * self._process(keys, when, axis, run)
             for axis in range(3)
         )
         heading = cells.azimuth_rad[found] + cells.relative_heading_rad[found]

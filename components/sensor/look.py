@@ -11,7 +11,6 @@ from components.aircraft.aircraft import Roster
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
-from dsa_des.time.timeline import split_scans
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +78,9 @@ class Cells:
         Scan numbers.
     scan_ticks : (scans,), optional
         When each scan is; needed by what compares one scan with the next.
-    ticks_per_s, span_ticks : int
-        As `dsa_des.block.wake.Wake` has them.
+    ticks_per_s : int
+    runs : (scans,), optional
+        Run of each scan (`Wake.run`); by default that of its row.
     """
 
     def __init__(
@@ -91,10 +91,12 @@ class Cells:
         scans: IntArray,
         scan_ticks: IntArray | None = None,
         ticks_per_s: int = NANOSECONDS,
-        span_ticks: int = 0,
+        runs: IntArray | None = None,
     ) -> None:
         self._targets = targets
-        self._ticks_per_s, self._span_ticks = ticks_per_s, span_ticks
+        self._ticks_per_s = ticks_per_s
+        #: Run of each scan.
+        self.run_of_scan = targets.run[rows] if runs is None else runs
         self.message_rows = rows
         self.roster = targets.roster
         place = wanted.ravel().nonzero()[0]
@@ -136,16 +138,9 @@ class Cells:
         return gathered
 
     @cached_property
-    def replica(self) -> IntArray:
-        """Replica of each cell, where many run in lock step; else 0."""
-        return split_scans(self.scan)[0]
-
-    @cached_property
-    def replica_of_scan(self) -> IntArray:
-        """Replica of each scan, where many run in lock step; else 0."""
-        if not self._span_ticks:
-            return np.zeros_like(self.scan_ticks)
-        return self.scan_ticks // self._span_ticks
+    def run(self) -> IntArray:
+        """Run of each cell."""
+        return self.run_of_scan[self.row]
 
     @cached_property
     def instant_ns(self) -> IntArray:
@@ -153,7 +148,7 @@ class Cells:
 
         A cell that a sweeping beam lights is looked at when it is lit.
         """
-        instant = nanosecond_of(self._own(self.scan_ticks[self.row]), self._ticks_per_s)
+        instant = nanosecond_of(self.scan_ticks[self.row], self._ticks_per_s)
         if hasattr(self._targets, "offset_s"):
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
@@ -163,7 +158,7 @@ class Cells:
         """When the aircraft were where each cell has them, in ns of its run; see `instant_ns`."""
         if self._targets.state_tick is None:
             return self.instant_ns
-        return nanosecond_of(self._own(self.of_row("state_tick")), self._ticks_per_s)
+        return nanosecond_of(self.of_row("state_tick"), self._ticks_per_s)
 
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
         """Return what is seen of some cells a little before or after they are looked at.
@@ -195,14 +190,10 @@ class Cells:
             )
         row, column = np.divmod(self._flat[cells], self._width)
         state = targets.tick if targets.state_tick is None else targets.state_tick
-        time_s = self._own(state[row]) / self._ticks_per_s
+        time_s = state[row] / self._ticks_per_s
         if hasattr(targets, "offset_s"):
             time_s = time_s + self.offset_s[cells]
         return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
-
-    def _own(self, ticks: IntArray) -> IntArray:
-        """Return ticks within their replicas."""
-        return ticks % self._span_ticks if self._span_ticks else ticks
 
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""
@@ -235,8 +226,9 @@ class Cells:
         """Which of the roster's aircraft each cell's target is."""
         if type(self.roster) is Roster:
             return self.target
-        return self.roster.craft(self.target, self.replica)
+        return self.roster.craft(self.target, self.run)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
-        return stream.uniform(self.roster.keys_of(self.target), self.scan, draw)
+        keys = self.roster.keys_of(self.target)
+        return stream.of_runs(self.run).uniform(keys, self.scan, draw)

@@ -19,7 +19,6 @@ from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.recorded_columns import nothing_in
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
-from dsa_des.time.timeline import first_scan
 
 _NOBODY = np.uint64(0)
 _OWN, _OF_SIGNAL = 0, 1
@@ -51,25 +50,26 @@ class QuantityError:
         keys: npt.ArrayLike,
         scan: IntArray,
         instant_ns: IntArray,
-        replica: IntArray,
+        run: IntArray,
         variance: FloatArray | None = None,
     ) -> FloatArray:
         """Return the errors of looks; `variance` is of what the signal adds at each."""
-        error = self._bias_of(replica) if self._bias else np.zeros(len(scan))
+        error = self._bias_of(run) if self._bias else np.zeros(len(scan))
+        looks = self._looks.of_runs(run)
         if self._lasting is not None:
-            error = error + self._deviation * self._lasting(keys, instant_ns, replica=replica)
+            error = error + self._deviation * self._lasting(keys, instant_ns, run=run)
         elif self._deviation:
-            error = error + self._deviation * self._looks.normal(keys, scan, _OWN)
+            error = error + self._deviation * looks.normal(keys, scan, _OWN)
         if variance is not None:
-            error = error + np.sqrt(variance) * self._looks.normal(keys, scan, _OF_SIGNAL)
+            error = error + np.sqrt(variance) * looks.normal(keys, scan, _OF_SIGNAL)
         return error
 
-    def _bias_of(self, replica: IntArray) -> FloatArray:
+    def _bias_of(self, run: IntArray) -> FloatArray:
         if not self._drawn:
-            return np.full(len(replica), self._bias)
-        runs, place = np.unique(replica, return_inverse=True)
-        begin = runs * first_scan(1)
-        drawn = self._biases.uniform(np.full(len(runs), _NOBODY), begin)
+            return np.full(len(run), self._bias)
+        runs, place = np.unique(run, return_inverse=True)
+        who, scan = np.full(len(runs), _NOBODY), np.zeros(len(runs), dtype=np.int64)
+        drawn = self._biases.of_runs(runs).uniform(who, scan)
         return (self._bias * (2.0 * drawn - 1.0))[place]
 
 
@@ -129,9 +129,9 @@ class Erring:
         signal = {name: all_[found] for name, all_ in look.signal.items()}
         of_signal = self._of_signal(signal)
         keys = cells.roster.keys_of(cells.target[found])
-        when = cells.scan[found], cells.instant_ns[found], cells.replica[found]
+        when = cells.scan[found], cells.instant_ns[found], cells.run[found]
         if look.noise is not None and self._signal:
-            true = self._in_cells(true, look.noise[found], keys, when[0])
+            true = self._in_cells(true, look.noise[found], keys, when[0], when[2])
         values = {
             name: true[name] + error(keys, *when, of_signal.get(name))
             for name, error in self._errors.items()
@@ -139,7 +139,12 @@ class Erring:
         return self._stated(self._valid(values), of_signal, signal)
 
     def _in_cells(
-        self, true: Mapping[str, FloatArray], noise: BoolArray, keys: AnyArray, scan: IntArray
+        self,
+        true: Mapping[str, FloatArray],
+        noise: BoolArray,
+        keys: AnyArray,
+        scan: IntArray,
+        run: IntArray,
     ) -> Mapping[str, FloatArray]:
         """Put what noise made anywhere in the target's cell, which says no more of the target.
 
@@ -152,7 +157,7 @@ class Erring:
         places = dict(true)
         for number, (name, most) in enumerate(self._of_signal(silent).items()):
             width = math.sqrt(12.0 * float(most[0]))
-            part = self._places.uniform(keys[noise], scan[noise], number)
+            part = self._places.of_runs(run[noise]).uniform(keys[noise], scan[noise], number)
             middle = np.rint(true[name][noise] / width) * width
             low, high = self._fields.get(name, (-math.inf, math.inf))
             first = np.maximum(middle - 0.5 * width, low)
@@ -178,13 +183,13 @@ class Erring:
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Return how something that is not there is reported: as what is there would be.
 
-        `drawn` holds keys, scan, instant and replica by which errors are drawn, or is None.
+        `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
         """
         of_signal = self._of_signal(signal)
         if drawn is not None:
-            keys, scan, instant_ns, replica = drawn
+            keys, scan, instant_ns, run = drawn
             where = {
-                name: where[name] + error(keys, scan, instant_ns, replica, of_signal.get(name))
+                name: where[name] + error(keys, scan, instant_ns, run, of_signal.get(name))
                 for name, error in self._errors.items()
             }
         return self._stated(self._valid(where), of_signal, signal)

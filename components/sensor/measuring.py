@@ -109,7 +109,7 @@ class Measuring(Component):
         """Return how something that is not there is reported, in body axes, as if it were.
 
         `where` is its place by quantity in the sensor's axes, `signal` as in `Look.signal`. `drawn`
-        holds keys, scan, instant and replica by which errors are drawn, as a target's are: without
+        holds keys, scan, instant and run by which errors are drawn, as a target's are: without
         them a place by the edge of the field of view would never be reported beyond it. The last
         value holds the other measured columns of `Detections`.
         """

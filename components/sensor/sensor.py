@@ -141,8 +141,7 @@ class Sensor(Measuring):
         super().__init__(name, parameters, context)
         #: What a look at nothing gave; while there is still nothing, it is not repeated.
         self._idle: Look | None = None
-        #: How long the timeline of one replica is, where many run in lock step; else 0.
-        self.span_ticks = 0
+        self._idle_run = -1
 
     def request(self, port: str) -> Any:
         """Ask the block that feeds us for the targets in our reach."""
@@ -252,14 +251,15 @@ class Sensor(Measuring):
         held = wake.held("targets")
         if held is None:
             return None
-        self.span_ticks = wake.span_ticks
         cued = self._cueing[0](*held, wake) if self._cueing else None
         targets, rows = self.seen(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
             cells.cued = cued[reason == EVALUATE]
         rows = cells.message_rows
-        look = self._idle
+        # Where rows are of several runs, what is remembered of each may change without cells.
+        run = int(wake.run[0]) if wake.instants.one_run else -1
+        look = self._idle if run == self._idle_run else None
         if look is None or len(cells):
             look = self.look(cells)
             if not isinstance(look, Look):
@@ -267,8 +267,7 @@ class Sensor(Measuring):
             look.check(len(cells))
             for judge in self._judgements:
                 look = judge(cells, look)
-            # Where many run, the next scans without cells may be those of other replicas.
-            self._idle = None if len(cells) or wake.span_ticks else look
+            self._idle, self._idle_run = None if len(cells) or run < 0 else look, run
         found = look.detected.nonzero()[0]
         decided = look
         for measures in self._strengths:
@@ -289,6 +288,7 @@ class Sensor(Measuring):
             azimuth, elevation, range_m, measured = self._measured(cells, found, look, p, q, r)
         detections = self._message(
             tick=wake.ticks,
+            run=wake.run,
             scan=wake.scans,
             evaluated=evaluated,
             skipped=skipped,
@@ -333,8 +333,8 @@ class Sensor(Measuring):
         """
         rows, reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
-        clock = wake.ticks_per_s, wake.span_ticks
-        return Cells(targets, rows, wanted, wake.scans, wake.ticks, *clock), reason
+        cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
+        return cells, reason
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""

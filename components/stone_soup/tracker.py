@@ -294,8 +294,7 @@ class StoneSoupTracker(Component):
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
-        begin = int(wake.replica[scans.row[look]]) * wake.span_ticks
-        time_s = (int(scans.tick[look]) - begin) / wake.ticks_per_s
+        time_s = int(scans.tick[look]) / wake.ticks_per_s
         when = instant(time_s)
         which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
         masks = [int(mask) for mask in scans.contributors[which]]

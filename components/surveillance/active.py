@@ -43,7 +43,6 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.gauss_markov import GaussMarkov
-from dsa_des.time.timeline import first_scan, own_scans
 
 #: A rate of climb is that of the reported altitude over so long.
 CLIMB_OVER_S = 5.0
@@ -228,11 +227,11 @@ class Active(CooperativeSensor):
             return np.ones(len(which), dtype=bool)
         every = self.p.far_every
         turn = (cells.roster.keys_of(cells.target[which]) % np.uint64(every)).astype(np.int64)
-        due = (own_scans(cells.scan[which]) + turn) % every == 0
+        due = (cells.scan[which] + turn) % every == 0
         rest = which[~due]
         if len(rest):
             period_s = 1.0 / float(self.p.scan_rate_hz)
-            since_s = (own_scans(cells.scan[rest]) + turn[~due]) % every * period_s
+            since_s = (cells.scan[rest] + turn[~due]) % every * period_s
             ranges, known = [], np.ones(len(rest), dtype=bool)
             for ago_s in (since_s, since_s + every * period_s):
                 then = cells.seen_at(rest, -ago_s)
@@ -247,15 +246,15 @@ class Active(CooperativeSensor):
         """Return who answered in any of the last ten rounds; a run begins with one that is full."""
         last = cells.state_ns[which] // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
-        begin = first_scan(1) * cells.replica[which]
+        run = np.repeat(cells.run[which], ROUNDS)
         keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
-        drawn = self._answers.uniform(keys, (begin[:, np.newaxis] + rounds).reshape(-1))
+        drawn = self._answers.of_runs(run).uniform(keys, rounds.reshape(-1))
         p = answered_in_round(in_1_s)[:, np.newaxis]
         return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
 
     def _who(self, cells: Cells, which: AnyArray) -> Who:
         keys = cells.roster.keys_of(cells.target[which])
-        return Who(keys, cells.replica[which], cells.craft[which])
+        return Who(keys, cells.run[which], cells.craft[which])
 
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
@@ -283,7 +282,7 @@ class Active(CooperativeSensor):
         if not self._errs:
             return range_m
         who = self._who(cells, which)
-        drawn = self._ranges(who.keys, instant_ns, replica=who.replica)
+        drawn = self._ranges(who.keys, instant_ns, run=who.run)
         bias = np.where(cells.roster.equipage.mode_s[who.craft], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
@@ -300,7 +299,8 @@ class Active(CooperativeSensor):
         own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
         distance = self.measured_range_m(cells, found)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
-        drawn = self._bearings.normal(cells.roster.keys_of(cells.target[found]), cells.scan[found])
+        keys, bearings = cells.roster.keys_of(cells.target[found]), self._bearings
+        drawn = bearings.of_runs(cells.run[found]).normal(keys, cells.scan[found])
         # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
         turned = own.yaw_rad - cells.own_attitude[0][found]
         bearing = cells.azimuth_rad[found] + turned + deviation * np.clip(drawn, -CUT, CUT)

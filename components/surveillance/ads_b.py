@@ -47,7 +47,6 @@ from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
-from dsa_des.time.timeline import first_scan
 
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
@@ -220,7 +219,7 @@ class AdsB(CooperativeSensor):
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
         equipage = cells.roster.equipage
-        who = Who(cells.roster.keys_of(cells.target), cells.replica, cells.craft)
+        who = Who(cells.roster.keys_of(cells.target), cells.run, cells.craft)
         here_ns = cells.state_ns
         extras = unreported(len(cells))
         own_velocity = np.full((3, len(cells)), np.nan)
@@ -254,7 +253,7 @@ class AdsB(CooperativeSensor):
         count = math.ceil(int((here_ns[asked] - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         those = who.take(asked)
         number, sent_ns, counts = self._clocks[kind].latest(
-            those.keys, those.replica, here_ns[asked], count
+            those.keys, those.run, here_ns[asked], count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
         counts &= sent_ns < (equipage.silent_after_s[those.craft] * NANOSECONDS)[:, np.newaxis]
@@ -264,9 +263,8 @@ class AdsB(CooperativeSensor):
         each = asked[row]
         ahead_s = (sent_ns[row, place] - here_ns[each]) / NANOSECONDS
         then = cells.seen_at(each, ahead_s)
-        drawn = self._received[kind].uniform(
-            those.keys[row], first_scan(1) * those.replica[row] + number[row, place]
-        )
+        stream = self._received[kind].of_runs(those.run[row])
+        drawn = stream.uniform(those.keys[row], number[row, place])
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:
             came &= ~then["hidden"]

@@ -28,7 +28,6 @@ from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Streams
-from dsa_des.time.timeline import first_scan
 
 #: Correlation time of horizontal position and velocity errors, s (RTCA DO-365, appendix Q).
 CORRELATION_TIME_S = 300.0
@@ -42,15 +41,15 @@ Keys = npt.NDArray[np.uint64]
 
 @dataclass(frozen=True)
 class Who:
-    """Aircraft, (n,): their draw keys, replicas and places among the roster's aircraft."""
+    """Aircraft, (n,): their draw keys, runs and places among the roster's aircraft."""
 
     keys: Keys
-    replica: IntArray
+    run: IntArray
     craft: IntArray
 
     def take(self, which: IntArray) -> Who:
         """Return some of them."""
-        return Who(self.keys[which], self.replica[which], self.craft[which])
+        return Who(self.keys[which], self.run[which], self.craft[which])
 
 
 class Altimeters:
@@ -65,8 +64,8 @@ class Altimeters:
         """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing."""
         altitude = altitude_m / FOOT_M
         if errs:
-            begin = first_scan(1) * who.replica
-            laplace, kind = (self._stream.uniform(who.keys, begin, draw) for draw in (0, 1))
+            stream, first = self._stream.of_runs(who.run), np.zeros(len(who.run), dtype=np.int64)
+            laplace, kind = (stream.uniform(who.keys, first, draw) for draw in (0, 1))
             altitude = altitude + altimetry_error_ft(altitude, standard_laplace(laplace), kind)
         step = np.broadcast_to(np.asarray(step_ft, np.float64), altitude.shape)
         rounded = quantised_altitude_ft(altitude, np.where(step > 0.0, step, 1.0))
@@ -98,20 +97,18 @@ class OwnErrors:
         if self._errors == "none":
             return np.zeros(len(deviation)), np.zeros(len(deviation))
         if self._errors == "white":
-            number = first_scan(1) * who.replica + message
-            draws = [self._streams[name].normal(who.keys, number, axis + 60_000) for axis in (0, 1)]
+            stream = self._streams[name].of_runs(who.run)
+            draws = [stream.normal(who.keys, message, axis + 60_000) for axis in (0, 1)]
         else:
             # What is sent before the run begins is of instants before 0.
-            draws = [
-                self._lasting[name](who.keys, instant_ns, axis, who.replica) for axis in (0, 1)
-            ]
+            draws = [self._lasting[name](who.keys, instant_ns, axis, who.run) for axis in (0, 1)]
         return deviation * draws[0], deviation * draws[1]
 
     def of_climb(self, who: Who, message: IntArray) -> FloatArray:
         """Return the errors of vertical rates, m/s, of messages (n,)."""
         if self._errors == "none":
             return np.zeros(len(message))
-        uniform = self._climbs.uniform(who.keys, first_scan(1) * who.replica + message)
+        uniform = self._climbs.of_runs(who.run).uniform(who.keys, message)
         return CLIMB_SCALE_M_S * standard_laplace(uniform)
 
 

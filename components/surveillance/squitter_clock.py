@@ -18,7 +18,6 @@ import numpy.typing as npt
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.randomness import Stream
-from dsa_des.time.timeline import first_scan
 
 SHORTEST_S, LONGEST_S = 0.4, 0.6
 _CHUNK = 16
@@ -54,18 +53,18 @@ class SquitterClocks:
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
-        #: When the first message of each chunk is sent, by draw key and replica, ns.
+        #: When the first message of each chunk is sent, by draw key and run, ns.
         self._starts: dict[tuple[int, int], array[int]] = {}
 
     def latest(
-        self, keys: npt.NDArray[np.uint64], replica: IntArray, until_ns: IntArray, count: int
+        self, keys: npt.NDArray[np.uint64], run: IntArray, until_ns: IntArray, count: int
     ) -> tuple[IntArray, IntArray, BoolArray]:
         """Return the last messages that each aircraft sent up to an instant.
 
         Parameters
         ----------
-        keys, replica, until_ns : (n,)
-            Draw keys of the aircraft, their replicas, and instants of the run in ns, which count.
+        keys, run, until_ns : (n,)
+            Draw keys of the aircraft, their runs, and instants of the run in ns, which count.
         count : int
             How many, at most 16.
 
@@ -78,14 +77,14 @@ class SquitterClocks:
         """
         n = len(keys)
         first, start_ns = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        cells = zip(keys.tolist(), replica.tolist(), until_ns.tolist(), strict=True)
-        for cell, (key, run, until) in enumerate(cells):
-            starts = self._known(key, run, until)
+        cells = zip(keys.tolist(), run.tolist(), until_ns.tolist(), strict=True)
+        for cell, (key, of, until) in enumerate(cells):
+            starts = self._known(key, of, until)
             # The chunk before the one that the instant lies in.
             chunk = max(bisect_right(starts, until) - 2, 0)
             first[cell], start_ns[cell] = chunk * _CHUNK, starts[chunk]
         numbers = first[:, np.newaxis] + np.arange(2 * _CHUNK)
-        instants = self._instants(keys, replica, start_ns, numbers)
+        instants = self._instants(keys, run, start_ns, numbers)
         newest = (instants <= until_ns[:, np.newaxis]).sum(axis=1) - 1
         place = newest[:, np.newaxis] - np.arange(count)
         sent: BoolArray = place >= 0
@@ -99,28 +98,27 @@ class SquitterClocks:
     def _instants(
         self,
         keys: npt.NDArray[np.uint64],
-        replica: IntArray,
+        run: IntArray,
         start_ns: IntArray,
         numbers: IntArray,
     ) -> IntArray:
         """Return when messages (n, m) in a row are sent, of which the first is at `start_ns`."""
         later = numbers[:, 1:]
-        drawn = self._stream.uniform(
-            np.repeat(keys, later.shape[1]),
-            (first_scan(1) * replica[:, np.newaxis] + later).reshape(-1),
-        )
+        each = later.shape[1]
+        stream = self._stream.of_runs(np.repeat(run, each))
+        drawn = stream.uniform(np.repeat(keys, each), later.reshape(-1))
         steps = interval_ns(drawn).reshape(later.shape)
         return np.cumsum(np.concatenate([start_ns[:, np.newaxis], steps], axis=1), axis=1)
 
-    def _known(self, key: int, replica: int, until_ns: int) -> array[int]:
+    def _known(self, key: int, run: int, until_ns: int) -> array[int]:
         """Return the starts of an aircraft's chunks, the last one after an instant."""
-        who, runs = np.array([key], dtype=np.uint64), np.array([replica])
-        starts = self._starts.get((key, replica))
+        who, runs = np.array([key], dtype=np.uint64), np.array([run])
+        starts = self._starts.get((key, run))
         if starts is None:
-            begin = first_scan(1) * runs
-            length, share = (self._stream.uniform(who, begin, draw) for draw in (1, 2))
+            stream, first = self._stream.of_runs(runs), np.zeros(1, dtype=np.int64)
+            length, share = (stream.uniform(who, first, draw) for draw in (1, 2))
             starts = array("q", first_message_ns(length, share).tolist())
-            self._starts[key, replica] = starts
+            self._starts[key, run] = starts
         while starts[-1] <= until_ns:
             chunks = int((until_ns - starts[-1]) / (_LONGEST_NS * _CHUNK)) + 1
             count = min(chunks, _MOST_CHUNKS) * _CHUNK

@@ -26,6 +26,7 @@ from components.track_fusion.local_tracks import (
 )
 from components.track_fusion.track_association import MatchRules, matched, without_strays
 from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.run_ticks import last_of_run
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -165,11 +166,11 @@ class CovarianceIntersection(Component):
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what the trackers report, instant by instant, and report the fused tracks."""
         came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
-        row_of = {name: np.searchsorted(wake.ticks, new.tick) for name, new in came.items()}
+        row_of = {name: last_of_run(wake.instants, new.instants) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
             return None
-        replica = wake.replica[rows]
+        replica = wake.run[rows]
         records = self._records_of(np.unique(replica), came, row_of, wake)
         reports = self._reports(wake, came, row_of, records)
         local, reported = self._local.of(records.replica), self._reported.of(records.replica)
@@ -184,19 +185,19 @@ class CovarianceIntersection(Component):
         self._records = self._records.after(runs, records, first)
         self._local = self._local.after(runs, local, first)
         self._reported = self._reported.after(runs, reported, first)
-        return state_tracks(KeyedTable.joined(parts), rows, wake.ticks[rows], self.sensors)
+        return state_tracks(KeyedTable.joined(parts), rows, wake.instants.take(rows), self.sensors)
 
     def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
-        made, replica = new.message.tick, wake.replica_of(new.tick)
+        made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
         more = max(int(replica[-1]) + 1 - len(newest), 0)
         newest = np.append(newest, np.full(more, np.iinfo(np.int64).min))
-        # Along the common line, nothing of one replica is newer than what is of the next.
-        so_far = np.maximum(np.maximum.accumulate(made), newest[replica])
+        so_far = np.maximum(new.message.instants.newest().tick, newest[replica])
         kept = made >= so_far
-        kept[:-1] &= ~((new.tick[1:] == new.tick[:-1]) & kept[1:])
-        ends = np.append(replica[1:] != replica[:-1], True)
+        next_ = (new.tick[1:] == new.tick[:-1]) & (replica[1:] == replica[:-1])
+        kept[:-1] &= ~(next_ & kept[1:])
+        ends = new.instants.last_of_each
         newest[replica[ends]] = so_far[ends]
         self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
@@ -211,7 +212,7 @@ class CovarianceIntersection(Component):
         for name in sorted(came):
             message = came[name].message
             row = np.repeat(row_of[name], np.diff(message.offsets))
-            of, entries = np.unique(np.searchsorted(replicas, wake.replica[row]), return_index=True)
+            of, entries = np.unique(np.searchsorted(replicas, wake.run[row]), return_index=True)
             sooner = row[entries] < first[of]
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
@@ -231,7 +232,7 @@ class CovarianceIntersection(Component):
         parts, rows = [], []
         reported_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
         for name, row in row_of.items():
-            message, replica = came[name].message, wake.replica[row]
+            message, replica = came[name].message, wake.run[row]
             index = self.trackers.index(name)
             origin = records.origin[:, np.searchsorted(records.replica, replica)]
             masks = self._masks(message.sensors)

@@ -20,6 +20,7 @@ from components.messages.state_tracks import (
 from components.track_fusion.local_tracks import LocalTracks
 from components.track_fusion.track_association import bearing, leaders
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import offsets_of
 
@@ -198,14 +199,15 @@ def reported_after(
 
 
 def state_tracks(
-    reported: KeyedTable, rows: IntArray, ticks: IntArray, sensors: tuple[str, ...]
+    reported: KeyedTable, rows: IntArray, instants: RunTicks, sensors: tuple[str, ...]
 ) -> StateTracks:
     """Return the message of what is reported at some rows."""
     order = np.lexsort((reported.track, reported.row))
     reported = reported.take(order)
     names = [name for name in (*_WHOLE, *_NUMBERS) if name not in ("replica", "row", "born_s")]
     return StateTracks(
-        tick=ticks,
+        tick=instants.tick,
+        run=instants.run,
         offsets=offsets_of(np.searchsorted(rows, reported.row), len(rows)),
         has_range=reported.has_range,
         covariance={name: reported.covariance[place] for place, name in COVARIANCE.items()},

@@ -12,6 +12,7 @@ from components.estimation.measurement import half_angle_rad
 from components.messages.cues import CueCones
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
@@ -83,7 +84,7 @@ class Cues(Component):
     def setup(self) -> None:
         """Start with no cones sent."""
         self._every_ticks = math.ceil(self.p.every_s * self.context.ticks_per_s)
-        #: Of each replica, when cues were sent last, and whether there were none.
+        #: Of each run, when cues were sent last, and whether there were none.
         self._last_tick: IntArray = np.empty(0, dtype=np.int64)
         self._silent: BoolArray = np.empty(0, dtype=bool)
 
@@ -97,20 +98,18 @@ class Cues(Component):
         if not len(rows):
             return None
         due = np.isin(row, rows)
-        return self._message(wake.ticks, tracks, rows, row[due], entry[due], half_rad[due])
+        return self._message(wake, tracks, rows, row[due], entry[due], half_rad[due])
 
     def _due(self, wake: Wake, some: BoolArray) -> IntArray:
         """Return the rows at which cues are sent, given at which of them there are some."""
-        replica, tick = wake.replica, wake.own_ticks(wake.ticks)
-        more = max(int(replica[-1]) + 1 - len(self._silent), 0)
+        run, tick = wake.run, wake.ticks
+        more = max(int(run[-1]) + 1 - len(self._silent), 0)
         if more:
             self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
             self._silent = np.append(self._silent, np.ones(more, dtype=bool))
         due = np.zeros(len(tick), dtype=bool)
-        turn = np.arange(len(tick)) - np.searchsorted(replica, replica)
-        order = np.argsort(turn, kind="stable")
-        for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
-            of = replica[rows]
+        for rows in turns(run):
+            of = run[rows]
             now = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
                 some[rows] | ~self._silent[of]
             )
@@ -150,7 +149,7 @@ class Cues(Component):
 
     def _message(
         self,
-        ticks: IntArray,
+        wake: Wake,
         tracks: StateTracks,
         rows: IntArray,
         row: IntArray,
@@ -159,7 +158,8 @@ class Cues(Component):
     ) -> CueCones:
         names = ("track", "azimuth_rad", "elevation_rad", "has_range", "state_s", *_STATE, *_ORIGIN)
         return CueCones(
-            tick=ticks[rows],
+            tick=wake.ticks[rows],
+            run=wake.run[rows],
             offsets=offsets_of(np.searchsorted(rows, row), len(rows)),
             half_angle_rad=half_rad,
             until_s=tracks.state_s[entry] + self.p.lasts_s,

@@ -75,8 +75,7 @@ def _apart(
     fused: FusedDetections, entry: IntArray, tracks: StateTracks, mine: IntArray, wake: Wake
 ) -> tuple[FloatArray, FloatArray]:
     """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
-    span = wake.span_ticks or 1 << 62
-    measured_s = (fused.measured_tick[entry] % span) / wake.ticks_per_s
+    measured_s = fused.measured_tick[entry] / wake.ticks_per_s
     lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
     origin: Any = tuple(getattr(tracks, name)[mine] for name in _ORIGIN)
     turned: Any = tuple(attitude)

@@ -23,6 +23,7 @@ import numpy as np
 from components.messages.detections import SensorOffer
 from components.tracking.scans import Scans
 from components.tracking.track_store import TrackStore
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
 from dsa_des.time.clock import ClockSpec
@@ -201,8 +202,8 @@ def _planned(
 
 def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
     """Return the order of work where late looks are left out."""
-    # Replicas lie end to end: what is before a replica's first look is older anyway.
-    keep = (scans.tick >= np.maximum.accumulate(scans.tick)) & (scans.tick >= newest[of])
+    so_far = RunTicks(of, scans.tick).newest().tick
+    keep = (scans.tick >= so_far) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
     row = scans.row[look]
     reports = np.append(row[1:] != row[:-1], True)[: len(look)]

@@ -57,7 +57,7 @@ def state_tracks(
     """Return the message of what is reported."""
     ticks = wake.ticks[rows]
     if not reported:
-        empty = StateTracks.initial({})
+        empty = StateTracks.initial({}).of_runs(wake.run[rows])
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty
@@ -79,11 +79,11 @@ def state_tracks(
         return np.where(unknown, np.nan, values) if hidden else values
 
     tick, score = store.plain("tick"), store.plain("score")
-    begin = (wake.replica * wake.span_ticks)[row]
     per_s = wake.ticks_per_s
     freedom = store.plain("freedom")
     return StateTracks(
         tick=ticks,
+        run=wake.run[rows],
         offsets=offsets_of(np.searchsorted(rows, row), len(ticks)),
         track=store.plain("number"),
         track_status=store.plain("status"),
@@ -94,8 +94,8 @@ def state_tracks(
         elevation_variance_rad2=seen[3],
         has_range=~unknown,
         age_s=(tick - store.plain("born_tick")) / per_s,
-        state_s=(tick - begin) / per_s,
-        updated_s=(store.plain("updated_tick") - begin) / per_s,
+        state_s=tick / per_s,
+        updated_s=store.plain("updated_tick") / per_s,
         contributors=store.plain("contributors"),
         updated_by=store.plain("updated_by"),
         own_north_m=own[0],

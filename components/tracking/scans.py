@@ -11,6 +11,7 @@ from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
 from components.messages.columns import POSE, TARGET_VELOCITY
 from components.messages.fused import FusedDetections
+from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -26,6 +27,7 @@ class Scans:
     """Looks in the order of their arrival, and their detections."""
 
     row: IntArray  # (looks,), at which row of the wake each arrived, ascending
+    run: IntArray  # (looks,), of the scene
     tick: IntArray  # (looks,), when it was made
     sensors: IntArray  # (looks,), mask of the sensors that looked
     tells_misses: BoolArray  # (looks,) of bool, whether what is not among its detections was missed
@@ -80,7 +82,8 @@ class Scans:
         offsets = np.concatenate(([0], np.cumsum(counts)))
         which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
         return type(self)(
-            self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
+            self.row[looks], self.run[looks], self.tick[looks], self.sensors[looks],
+            self.tells_misses[looks],
             selected(self.pose, looks), selected(self.velocity, looks), offsets,
             selected(self.measured, which), selected(self.variance, which),
             self.contributors[which], self.source.take(which, axis=-1),
@@ -90,7 +93,7 @@ class Scans:
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the looks of all parts, one after the other."""
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
-        names = ("row", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
+        names = ("row", "run", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
                  "variance", "contributors", "source")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
         return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
@@ -196,6 +199,7 @@ def scans_of(fused: FusedDetections) -> Scans:
     _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
+        run=fused.run[key[0][begins]],
         tick=key[1][begins],
         sensors=union,
         tells_misses=whole,
@@ -231,12 +235,11 @@ def when_made(
         return scans, None
     if ahead is not None:
         scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
-    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick + wait_ticks))
-    span = wake.span_ticks or np.iinfo(np.int64).max
-    of_look = scans.tick // span
+    due = RunTicks(scans.run, scans.tick + wait_ticks)
+    row = np.maximum(scans.row, next_of_run(wake.instants, due))
     there = np.minimum(row, len(wake) - 1)
-    ready = (row < len(wake)) & (wake.replica[there] == of_look)
-    waiting = ~ready & (of_look >= wake.first_run)
+    ready = (row < len(wake)) & (wake.run[there] == scans.run)
+    waiting = ~ready & (scans.run >= wake.first_run)
     order = np.lexsort((scans.sensors, scans.tick, row))
     done = replace(scans, row=row).take(order[ready[order]])
     return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None

@@ -12,6 +12,7 @@ from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
@@ -72,7 +73,7 @@ class TrackerStub(Component):
         updated = counts.nonzero()[0]
         if len(updated) == 0:
             return None
-        replica = wake.replica[updated]
+        replica = wake.run[updated]
         before = self._held.of(replica)
         targets = _present(before.target, fused.target, len(fused.roster))
         pool, held, new = _pool(before, fused, np.repeat(replica, counts[updated]))
@@ -99,18 +100,19 @@ class TrackerStub(Component):
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[column], **now)
         self._held = self._held.after(replica, table, wake.first_run)
-        return self._tracks(fused, wake.ticks[updated], targets, last, pool, first)
+        return self._tracks(fused, wake.instants.take(updated), targets, last, pool, first)
 
     def _tracks(
         self,
         fused: FusedDetections,
-        ticks: IntArray,
+        instants: RunTicks,
         targets: IntArray,
         last: IntArray,
         pool: dict[str, Any],
         first: IntArray,
     ) -> Tracks:
         """Return the tracks of each row; `first` is the first of its own entries in the pool."""
+        ticks = instants.tick
         # A sweeping beam measures after its scan has begun, which is when its report is sent.
         age_s: FloatArray = (
             np.maximum(ticks[:, np.newaxis] - pool["measured_tick"][np.maximum(last, 0)], 0)
@@ -126,6 +128,7 @@ class TrackerStub(Component):
             message, pose = TracksWithPose, {n: pool[n][entry] for n in POSE}
         return message(
             tick=ticks,
+            run=instants.run,
             offsets=offsets_of(row, len(ticks)),
             target=targets[column],
             azimuth_rad=pool["azimuth_rad"][entry],

@@ -167,8 +167,7 @@ class Tracker(Component):
         scans, self._ahead = when_made(came, self._ahead, wake)
         if len(scans) == 0:
             return None
-        replica = wake.replica[scans.row]
-        records = self._records.continued(records_of(replica, scans.pose[:3]))
+        records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         past = self._past
         begin = 0
@@ -177,8 +176,7 @@ class Tracker(Component):
         if past is not None and past.replica == records.replica[0]:
             begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
             scans = Scans.joined([past.scans, scans])
-            replica = np.concatenate([np.full(begin, past.replica), replica])
-        of = np.searchsorted(records.replica, replica)
+        of = np.searchsorted(records.replica, scans.run)
         if not self._remembers:
             plan, left_out = straight_plan(scans, of, records.tick)
         else:

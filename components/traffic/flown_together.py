@@ -29,10 +29,10 @@ from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import flat
 from components.messages.reach import farthest_look
-from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
-from components.traffic.steered_ownship import arrived_manoeuvres
+from components.traffic.steered_ownship import Coming, arrived_manoeuvres
 from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import ReplicaRuns, Wake
 
@@ -177,8 +177,8 @@ class FlownTogether:
         self._rates_hz = rates_hz
         self._intervals: NearIntervals | None = None
         self._epochs: _Epochs | None = None
-        #: Manoeuvres that have come and are not flown by any row yet, with their ticks.
-        self._pending: list[tuple[int, Manoeuvre]] = []
+        #: Manoeuvres that have come and are not flown by any row yet, with their runs and ticks.
+        self._pending: list[Coming] = []
         look = farthest_look(consumer.request for consumer in face.context.consumers)
         culls = not face.context.simulate_everything and face.clock_of(face.p) is None
         self._lasts_s = look.lasts_s
@@ -217,7 +217,7 @@ class FlownTogether:
 
     def run(self, wake: Wake) -> TrafficStates:
         """Return the state of all aircraft of each row's replica."""
-        replica, time_s = wake.replica, wake.time_s
+        replica, time_s = wake.run, wake.time_s
         known = self._steer(wake, replica)
         shape = len(wake), self._width
         target = replica[:, np.newaxis] * self._width + self._columns
@@ -268,27 +268,29 @@ class FlownTogether:
         known: IntArray = self._own.count[replica]
         if self._pending:
             now, self._pending = self._due(wake)
-            came = np.array([tick for tick, _ in now], dtype=np.int64)
-            for one in turns(came // wake.span_ticks):  # the first of every ownship, then the next
-                ticks, manoeuvres = came[one], [now[number][1] for number in one.tolist()]
-                ownship = ticks // wake.span_ticks
-                at_s = (ticks % wake.span_ticks) / self._ticks_per_s
-                self._own.steer(ownship, at_s, manoeuvres)
+            came = _instants(now)
+            for one in turns(came.run):  # the first of every ownship, then the next
+                ownship, ticks = came.run[one], came.tick[one]
+                manoeuvres = [now[number].manoeuvre for number in one.tolist()]
+                self._own.steer(ownship, ticks / self._ticks_per_s, manoeuvres)
                 if self._epochs is not None:
                     self._epochs.forget(ownship)
                 known = known + _later(replica, wake.ticks, ownship, ticks)
         return known
 
-    def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
+    def _due(self, wake: Wake) -> tuple[list[Coming], list[Coming]]:
         """Part what has come into what rows of this wake fly, and what is for later ones."""
-        ticks = np.array([tick for tick, _ in self._pending], dtype=np.int64)
-        end = (ticks // wake.span_ticks + 1) * wake.span_ticks
-        last = wake.ticks[np.maximum(np.searchsorted(wake.ticks, end) - 1, 0)]
-        # The last row of the same ownship; that of another one is earlier than anything of it.
-        due = (last >= ticks) & (last < end)
-        now = [one for one, is_due in zip(self._pending, due.tolist(), strict=True) if is_due]
-        later = [one for one, is_due in zip(self._pending, due.tolist(), strict=True) if not is_due]
-        return sorted(now, key=lambda one: one[0]), later
+        pending = sorted(self._pending, key=lambda one: (one.run, one.tick))
+        came = _instants(pending)
+        row = next_of_run(wake.instants, came)  # the first that flies it, if it is of its ownship
+        due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
+        now = [one for one, is_due in zip(pending, due.tolist(), strict=True) if is_due]
+        return now, [one for one, is_due in zip(pending, due.tolist(), strict=True) if not is_due]
+
+
+def _instants(coming: list[Coming]) -> RunTicks:
+    runs, ticks = ([getattr(one, name) for one in coming] for name in ("run", "tick"))
+    return RunTicks(np.array(runs, dtype=np.int64), np.array(ticks, dtype=np.int64))
 
 
 def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:

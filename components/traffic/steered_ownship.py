@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -61,12 +61,21 @@ class TrueFlights:
         return own, others
 
 
-def arrived_manoeuvres(wake: Wake) -> list[tuple[int, Manoeuvre]]:
-    """Return the manoeuvres that have come since the last wake, with their ticks."""
+class Coming(NamedTuple):
+    """A manoeuvre that has come, in which run and when."""
+
+    run: int
+    tick: int
+    manoeuvre: Manoeuvre
+
+
+def arrived_manoeuvres(wake: Wake) -> list[Coming]:
+    """Return the manoeuvres that have come since the last wake."""
     return [
-        one
+        Coming(*one)
         for new in wake.arrivals("manoeuvres")
         for one in zip(
+            new.message.run.tolist(),
             new.tick.tolist(),
             map(Manoeuvre, *(getattr(new.message, name).tolist() for name in Manoeuvre._fields)),
             strict=True,
@@ -107,8 +116,8 @@ class SteeredOwnship(Component):
             self.own = SteeredFlight(self.own)
         self._flights_now: Flights = partial(self.flights, self.own)
         self._truth_now = self._true_flights()
-        #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
-        self._pending: list[tuple[int, Manoeuvre]] = []
+        #: Manoeuvres that have come, and are not flown by any row yet.
+        self._pending: list[Coming] = []
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
@@ -156,19 +165,19 @@ class SteeredOwnship(Component):
         last = int(wake.ticks[-1])
         # What comes after the last row is for the next wake: what is flown at the end of a run
         # must not depend on how far a window reached beyond it.
-        due = [one for one in pending if one[0] <= last]
+        due = [one for one in pending if one.tick <= last]
         self._pending = pending[len(due) :]
         known, true = [self._flights_now], [self._truth_now]
-        for tick, manoeuvre in due:
+        for one in due:
             assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
+            self.own = self.own.steered(one.tick / self.context.ticks_per_s, one.manoeuvre)
             known.append(partial(self.flights, self.own))
             true.append(self._true_flights())
         self._flights_now, self._truth_now = known[-1], true[-1]
         if not self.flights_asked_for and self._truth_now is None:
             return None, None
         # A manoeuvre has come before anything runs at its instant.
-        came = np.array([tick for tick, _ in due], dtype=np.int64)
+        came = np.array([one.tick for one in due], dtype=np.int64)
         of_row = np.searchsorted(came, wake.ticks, side="right")
         return (
             KnownFlights(known, of_row) if self.flights_asked_for else None,

@@ -41,7 +41,7 @@ from dsa_des.block.effect import Effect
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
-from dsa_des.time.timeline import first_scan
+from dsa_des.time.randomness import Stream
 
 _PROBABILITY = Quantity("acquisition_probability", "P")
 _NEVER = np.iinfo(np.int64).max
@@ -226,7 +226,7 @@ class Lookout(Sensor):
         self._period_s = 1.0 / float(parameters.scan_rate_hz)
         self._finds = self.stream("acquisition")
         self._phases, self._attends = self.stream("phase"), self.stream("attention")
-        #: The first scan at which each target is seen: of the first replica, the second, and so on.
+        #: The first scan at which each target is seen: of the first run, the second, and so on.
         self._first_seen: IntArray = np.empty(0, dtype=np.int64)
 
     def setup(self) -> None:
@@ -262,7 +262,7 @@ class Lookout(Sensor):
 
     def look(self, cells: Cells) -> Look:
         """See whoever is found since the last scan, or was before."""
-        who = cells.replica * len(cells.roster.names) + cells.target
+        who = cells.run * len(cells.roster.names) + cells.target
         missing = int(who.max(initial=-1)) + 1 - len(self._first_seen)
         if missing > 0:
             never = np.full(missing, _NEVER)
@@ -302,9 +302,8 @@ class Lookout(Sensor):
             total = np.zeros(len(which))
             for seat in self._seats:
                 total += self._share(seat, cells, which) * self._searched(seat, cells, which)
-            drawn = self._finds.uniform(
-                cells.roster.keys_of(cells.target[which]), cells.scan[which]
-            )
+            keys = cells.roster.keys_of(cells.target[which])
+            drawn = self._finds.of_runs(cells.run[which]).uniform(keys, cells.scan[which])
             return np.asarray(drawn < -np.expm1(-total))
         found = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
@@ -337,9 +336,9 @@ class Lookout(Sensor):
         share = self._share(seat, cells, which)
         looks = np.flatnonzero(share > 0.0)
         mine, share = which[looks], share[looks]
-        keys, begin = self._of_run(cells, mine)
+        keys = cells.roster.keys_of(cells.target[mine])
         round_s = self.p.round_s / share
-        phase_s = round_s * self._phases.uniform(keys, begin, seat.number)
+        phase_s = round_s * _once_a_run(self._phases, cells.run[mine], keys, seat.number)
         now_s = cells.state_ns[mine] / NANOSECONDS
         # The last instant up to now at which the search was at its place, in (last scan, now].
         ahead_s = -np.remainder(now_s - phase_s, round_s)
@@ -364,13 +363,9 @@ class Lookout(Sensor):
         """Return the share of time that somebody looks out; in spells, all or nothing of a run."""
         if self.p.looking == "glances":
             return np.full(len(which), seat.share)
-        keys, begin = self._of_run(cells, which)
-        drawn = self._attends.uniform(np.zeros_like(keys), begin, seat.number)
+        nobody = np.zeros(len(which), dtype=np.uint64)
+        drawn = _once_a_run(self._attends, cells.run[which], nobody, seat.number)
         return np.where(drawn < seat.share, 1.0, 0.0)
-
-    def _of_run(self, cells: Cells, which: IntArray) -> tuple[AnyArray, IntArray]:
-        """Return keys of some cells' targets, and the number that stands for their run."""
-        return cells.roster.keys_of(cells.target[which]), first_scan(1) * cells.replica[which]
 
     def _area(self, view: Any) -> FloatArray:
         return area_of_cells(view, "eo", "convex_hull")
@@ -397,3 +392,8 @@ class Lookout(Sensor):
             if "hidden" in view.seen:
                 shows &= ~view.hidden
         return np.asarray(shows)
+
+
+def _once_a_run(stream: Stream, run: IntArray, keys: AnyArray, number: int) -> FloatArray:
+    """Return uniform draws that stay the same throughout a run."""
+    return stream.of_runs(run).uniform(keys, np.zeros(len(run), dtype=np.int64), number)

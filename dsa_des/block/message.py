@@ -6,11 +6,12 @@ when they run in a look-ahead window. Physics written over rows serves both.
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import RunTicks, joined_runs, no_runs, says_no_runs
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.recorded_columns import (
     PER_ENTRY,
@@ -23,6 +24,7 @@ from dsa_des.block.recorded_columns import (
     column,
     columns,
     columns_of,
+    instants_of,
     nothing_in,
     per_entry,
     per_row,
@@ -42,6 +44,7 @@ __all__ = [
     "columns",
     "columns_of",
     "derived",
+    "instants_of",
     "offsets_of",
     "per_entry",
     "per_row",
@@ -54,8 +57,6 @@ _NUMBERS = frozenset("biuf")
 
 #: Row and entry fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
-#: Fields that hold instants beside `Message.tick`.
-_TICK_FIELDS: dict[type, tuple[str, ...]] = {}
 #: What each class records by its fields.
 _DERIVED: dict[type, DerivedColumns] = {}
 
@@ -66,7 +67,7 @@ def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
     rows, entries = [], []
     for item in fields(message_type):
         kind = item.metadata.get("per", PER_ROW)
-        if item.name == "offsets":
+        if item.name in ("offsets", "run"):
             continue
         if kind == PER_ROW:
             rows.append(item.name)
@@ -74,13 +75,6 @@ def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
             entries.append(item.name)
     _LAYOUTS[message_type] = tuple(rows), tuple(entries)
     return _LAYOUTS[message_type]
-
-
-def _tick_fields(message_type: type) -> tuple[str, ...]:
-    if message_type not in _TICK_FIELDS:
-        names = (item.name for item in fields(message_type) if item.metadata.get("is_tick"))
-        _TICK_FIELDS[message_type] = tuple(names)
-    return _TICK_FIELDS[message_type]
 
 
 def rows_of(columns: Columns, rows: slice) -> Columns:
@@ -113,11 +107,15 @@ class Message:
     Parameters
     ----------
     tick : ndarray of int64, shape (rows,)
-        The instant at which its block made each row, in order: one of those at which the block
-        ran. It may arrive later, and speak of what was there earlier.
+        The instant at which its block made each row, in order within each run: one of those at
+        which the block ran. It may arrive later, and speak of what was there earlier.
+    run : ndarray of int64, shape (rows,)
+        Of which run of the scene each row is, ascending. A block need not say it where all rows
+        are of one run, or where they are those of its wake.
     """
 
     tick: IntArray
+    run: IntArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
     #: Tables of the columns that fields declare (`column`, `columns`).
     row_table: ClassVar[str] = ""
@@ -136,6 +134,7 @@ class Message:
 
     def __post_init__(self) -> None:
         """Let columns of entries that were not given be null, and whole numbers 0."""
+        self.run = self._runs()
         for name, kind in derived(type(self)).optional.items():
             if getattr(self, name) is None:
                 count = int(self.offsets[-1])  # type: ignore[attr-defined]
@@ -144,6 +143,15 @@ class Message:
 
     def __len__(self) -> int:
         return len(self.tick)
+
+    def _runs(self) -> IntArray:
+        """Return of which run each row is, also where a class has a `__post_init__` of its own."""
+        return no_runs(len(self.tick)) if self.run is None else self.run
+
+    @property
+    def instants(self) -> RunTicks:
+        """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
+        return RunTicks(self._runs(), self.tick)
 
     @classmethod
     def empty(cls, **others: Any) -> Self:
@@ -163,6 +171,9 @@ class Message:
             With the class, the field, its length and that which it must have.
         """
         rows, (row_names, entry_names) = len(self.tick), _layout(type(self))
+        self.run = self._runs()
+        if len(self.run) != rows:
+            raise ValueError(f"{_of(self, 'run')} has {len(self.run)} of {rows} rows")
         _check_each(self, row_names, rows, "rows")
         offsets = getattr(self, "offsets", None)
         if offsets is None:
@@ -188,6 +199,8 @@ class Message:
         result = copy(self)
         for name in row_names:
             setattr(result, name, _pick(getattr(self, name), rows))
+        run = self._runs()
+        result.run = no_runs(len(result.tick)) if says_no_runs(run) else run[rows]
         if entry_names or hasattr(self, "offsets"):
             offsets, index = _entries(self.offsets, rows)  # type: ignore[attr-defined]
             result.offsets = offsets  # type: ignore[attr-defined]
@@ -208,15 +221,10 @@ class Message:
             setattr(result, name, _pick(getattr(self, name), order))
         return result
 
-    def shifted(self, ticks: int, scans: int) -> Self:
-        """Return the message with its ticks, and its scan numbers if it has any, moved."""
+    def of_runs(self, run: IntArray) -> Self:
+        """Return the message as one of other runs."""
         result = copy(self)
-        result.tick = self.tick + ticks
-        for name in _tick_fields(type(self)):
-            if (values := getattr(self, name)) is not None:
-                setattr(result, name, values + ticks)
-        if hasattr(self, "scan"):
-            result.scan = self.scan + scans  # type: ignore[attr-defined]
+        result.run = run
         return result
 
     def tables(self) -> dict[str, Columns]:
@@ -238,6 +246,7 @@ class Message:
         rows = [len(part) for part in parts]
         for name in row_names:
             setattr(result, name, _join([getattr(part, name) for part in parts], rows))
+        result.run = joined_runs([part._runs() for part in parts])
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
             starts = np.cumsum([0] + [int(o[-1] - o[0]) for o in offsets])

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import says_no_runs
 from dsa_des.arrays.types import AnyArray, IntArray
 
 
@@ -135,17 +136,9 @@ class Filled:
     instant: bool = False
 
 
-def per_row(*, is_tick: bool = False, **kwargs: Any) -> Any:
-    """Declare a field whose first axis is the rows, and which is not recorded.
-
-    Parameters
-    ----------
-    is_tick : bool
-        Whether it holds instants in ticks, beside `Message.tick`.
-    **kwargs
-        Passed on to `dataclasses.field`.
-    """
-    return field(metadata={"per": PER_ROW, "is_tick": is_tick}, **kwargs)
+def per_row(**kwargs: Any) -> Any:
+    """Declare a field whose first axis is the rows, and which is not recorded."""
+    return field(metadata={"per": PER_ROW}, **kwargs)
 
 
 def per_entry(**kwargs: Any) -> Any:
@@ -203,7 +196,7 @@ def column(
     """
     filled = {name: Column(unit, frame, meaning, _known(kind))}
     how = Filled(filled, False, value, in_entries, for_entries, instant)
-    return field(metadata={"per": of, "is_tick": instant, _RECORDED: how}, **kwargs)
+    return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
 
 def columns(
@@ -246,6 +239,16 @@ def _known(kind: str) -> str:
 
 #: Key of the metadata of a field that says how it is recorded.
 _RECORDED = "recorded"
+
+
+def instants_of(message: Any, counts: int | IntArray = 1) -> Columns:
+    """Return the columns that say when each row of a message is, `counts` times each."""
+    columns: Columns = {"tick": message.tick}
+    if not says_no_runs(message.run):
+        columns["replica"] = message.run
+    if isinstance(counts, int) and counts == 1:
+        return columns
+    return {name: _repeated(values, counts) for name, values in columns.items()}
 
 
 class DerivedColumns:
@@ -327,10 +330,10 @@ class DerivedColumns:
         """
         tables: dict[str, Columns] = {}
         if self._rows:
-            tables[self._row_table] = self._filled(message, self._rows, {"tick": message.tick})
+            tables[self._row_table] = self._filled(message, self._rows, instants_of(message))
         if self._entries:
             counts = np.diff(message.offsets)
-            made: Columns = {"tick": np.repeat(message.tick, counts)}
+            made = instants_of(message, counts)
             tables[self._entry_table] = self._filled(message, self._entries, made, counts)
         return tables
 
@@ -386,7 +389,7 @@ def _in_order(message_type: type, base: type) -> Iterator[str]:
     yield from dict.fromkeys(name for names in of_kinds for name in names)
 
 
-def _repeated(values: Any, counts: IntArray) -> Any:
+def _repeated(values: Any, counts: int | IntArray) -> Any:
     if isinstance(values, Text):
         return Text(np.repeat(values.codes, counts), values.names)
     return np.repeat(values, counts)

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -28,13 +29,19 @@ class Arrivals:
     tick: IntArray
     message: Any
 
+    @property
+    def instants(self) -> RunTicks:
+        """When each row arrived, and in which run."""
+        return RunTicks(self.message.run, self.tick)
+
 
 class Wake:
-    """One run of a block: an instant, or a window of instants in order.
+    """One run of a block: an instant, or a window of instants, in order within each run.
 
     Parameters
     ----------
     ticks : ndarray of int64, shape (rows,)
+        Since the start of the run of the scene that the row is of.
     scans : ndarray of int64, shape (rows,)
         Scan numbers of the block's own clock; -1 at instants that are not its own scans.
     ticks_per_s : int
@@ -45,13 +52,13 @@ class Wake:
     demand : callable, or None
         Gives the attribute of this name when it is first asked for: a mapping from each clocked
         block downstream to the rows of this wake at which it scans.
-    span_ticks : int
-        When replicas run in lock step: ticks from the start of one to the start of the next
-        (`dsa_des.time.timeline`); 0 otherwise.
+    run : ndarray of int64, shape (rows,)
+        Of which run of the scene each row is, ascending; all 0 by default.
     first_run : int
-        The first replica that runs now: rows of those before it never come again.
+        The first run that goes on: rows of those before it never come again.
     clock : callable, optional
-        Given scan numbers, returns when the scan before each was (`ScanClock.before`).
+        Given scan numbers and their runs, returns when the scan before each was
+        (`RunClock.before`).
     """
 
     def __init__(
@@ -62,9 +69,9 @@ class Wake:
         held: Mapping[str, tuple[Any, IntArray]],
         arrived: Mapping[str, list[Arrivals]],
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
-        span_ticks: int = 0,
+        run: IntArray | None = None,
         first_run: int = 0,
-        clock: Callable[[IntArray], IntArray] | None = None,
+        clock: Callable[[IntArray, IntArray], IntArray] | None = None,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -72,7 +79,7 @@ class Wake:
         self._held = held
         self._arrived = arrived
         self._demand = demand
-        self.span_ticks = span_ticks
+        self.run = no_runs(len(ticks)) if run is None else run
         self.first_run = first_run
         self._clock = clock
 
@@ -89,25 +96,17 @@ class Wake:
         """When the block's scan before each row was, in ticks of its own run; -1 for none."""
         if self._clock is None:
             return np.full(len(self), -1)
-        return self._clock(self.scans)
+        return self._clock(self.scans, self.run)
 
     @property
     def time_s(self) -> FloatArray:
-        """Time of each row since the start of the run, s."""
-        return self.own_ticks(self.ticks) / self.ticks_per_s
+        """Time of each row since the start of its run, s."""
+        return self.ticks / self.ticks_per_s
 
     @property
-    def replica(self) -> IntArray:
-        """Replica of each row, in order; 0 when only one runs."""
-        return self.replica_of(self.ticks)
-
-    def replica_of(self, ticks: IntArray) -> IntArray:
-        """Return the replicas that instants belong to."""
-        return ticks // self.span_ticks if self.span_ticks else np.zeros_like(ticks)
-
-    def own_ticks(self, ticks: IntArray) -> IntArray:
-        """Return instants as counted from the start of their own replica."""
-        return ticks % self.span_ticks if self.span_ticks else ticks
+    def instants(self) -> RunTicks:
+        """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
+        return RunTicks(self.run, self.ticks)
 
     def held(self, port: str) -> tuple[Any, IntArray] | None:
         """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from networkx import ancestors
 
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, ends_its_run
 from dsa_des.block.entry_points import registered
@@ -91,18 +92,19 @@ class _Wire:
         else:
             self._waiting.append((tick, message))
 
-    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
         """Return the last message, and its last row."""
         return None if self._last is None else (self._last, _last_row(self._last))
 
-    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+    def collect(self, end: int) -> tuple[RunTicks, Message] | None:
         """Take what waits."""
         if not self._waiting:
             return None
         messages = [message for _, message in self._waiting]
         ticks = [np.array([tick] * len(message)) for tick, message in self._waiting]
         self._waiting.clear()
-        return np.concatenate(ticks), type(messages[0]).concatenate(messages)
+        message = type(messages[0]).concatenate(messages)
+        return RunTicks(message.run, np.concatenate(ticks)), message
 
 
 class _Runner:
@@ -166,7 +168,7 @@ class HostDriven:
             node = nodes[name]
             if name == self.source or name not in needed:
                 continue
-            cursor = None if node.clock is None else ScanCursor(node.clock)
+            cursor = None if node.clock is None else ScanCursor(node.clock.first)
             runners.append(_Runner(node, cursor, self.scene.wires))
         return runners
 
@@ -270,7 +272,7 @@ class HostDriven:
         """
         sent, scans, tick = step.sent, step.scans, step.tick
         sent[self._source_key] = message
-        ticks = np.array([tick], dtype=np.int64)
+        now = RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
         for runner in self._runners:
             triggered = False
             for wire in runner.wires:
@@ -283,7 +285,7 @@ class HostDriven:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.seen(ticks, own, tick + 1, demand, clock=runner.before)
+            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before)
             if wake is None:
                 continue
             try:
@@ -315,7 +317,7 @@ def _last_row(message: Message) -> IntArray:
 
 
 def _rows_of(
-    blocks: Iterable[str], scanning: Container[str], ticks: IntArray
+    blocks: Iterable[str], scanning: Container[str], asked: RunTicks
 ) -> dict[str, IntArray]:
     """Return for each block the one row of a step where it scans, and none where it does not."""
     return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}

@@ -1,10 +1,11 @@
 """Columns that messages declare: what was not declared is an error, not a column less."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
 from dsa_des.block.recorded_columns import (
@@ -20,7 +21,6 @@ from dsa_des.block.recorded_columns import (
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
 from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import own_scans
 
 # Declared names that an error lists.
 _MOST_NAMES = 30
@@ -61,7 +61,7 @@ class DeclaredColumns:
             If no message of the run declares the table or the column, or the table has no
             instants.
         """
-        names = tuple(columns)
+        names = tuple(name for name in columns if name != "replica")
         if self._sound.get((block, table)) == names:
             return
         where = f"block {block!r}: its {message} records"
@@ -141,18 +141,19 @@ class Recorder:
         self,
         messages: Iterable[type[Message]],
         ticks_per_s: int,
-        span_ticks: int = 0,
         ends: RunEnds | None = None,
+        *,
+        replicas: bool = False,
     ) -> None:
         """Learn what the run's messages record; called once, before the run.
 
-        With replicas in lock step, `span_ticks` apart, every table begins with their number. Rows
-        of when a run has ended, as `ends` knows when they are handed on, are left out.
+        With `replicas` every table begins with the number of the run. Rows of when a run has ended,
+        as `ends` knows when they are handed on, are left out.
         """
         self._ends = ends
         self._ticks_per_s = ticks_per_s
-        self._span_ticks = span_ticks
-        leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
+        self._replicas = replicas
+        leading = {"replica": "int64", **_LEADING} if replicas else _LEADING
         for message in messages:
             for table, columns in message.recorded.items():
                 kinds = {name: column.kind for name, column in columns.items()}
@@ -187,12 +188,25 @@ class Recorder:
         wanted = self._pending.keys()
         if self._wanted is not None and wanted.isdisjoint({*message.recorded, *message.may_hold}):
             return
-        for table, columns in message.tables().items():
+        for table, columns in self._tables(message):
             self._declared.check(block, table, columns, type(message).__name__)
             if table in self._pending and len(columns["tick"]):
                 self._pending[table].append((block, columns))
                 self._noted[0] += len(columns["tick"])
                 self._noted[1] += 1
+
+    def _tables(self, message: Message) -> Iterator[tuple[str, Columns]]:
+        """Give the tables of a message; of one that does not say it there, run by run."""
+        tables = message.tables()
+        if not self._replicas or all("replica" in columns for columns in tables.values()):
+            yield from tables.items()
+            return
+        firsts = message.instants.first_of_each.tolist()
+        for first, end in zip(firsts, [*firsts[1:], len(message)], strict=True):
+            part = message.take(slice(first, end))
+            for table, columns in part.tables().items():
+                run = np.full(len(columns["tick"]), part.run[0], dtype=np.int64)
+                yield table, {**columns, "replica": run}
 
     def mark(self) -> dict[str, int]:
         """Return how much was noted since the last `advance`, for `rewind`."""
@@ -203,50 +217,48 @@ class Recorder:
         for table, count in mark.items():
             del self._pending[table][count:]
 
-    def advance(self, tick: int) -> None:
-        """Hand on the rows before `tick`, of which no more will come, once there are enough."""
-        if tick > 0 and (self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE):
-            self._hand_on_before(tick)
+    def advance(self, run: int, tick: int) -> None:
+        """Hand on the rows before a tick of a run, of which no more come, once there are enough."""
+        if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
+            self._hand_on_before(run, tick)
 
-    def _hand_on_before(self, tick: int) -> None:
+    def _hand_on_before(self, run: int, tick: int) -> None:
         self._noted = [0, 0]
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
             for block, columns in pieces:
-                ticks: Any = columns["tick"]
-                count = int(np.searchsorted(ticks, tick))
-                if count == len(ticks):
+                instants = _instants(columns)
+                count = instants.before(run, tick)
+                if count == len(instants):
                     ready.append((block, columns))
                     continue
                 if count:
                     ready.append((block, rows_of(columns, slice(0, count))))
-                later.append((block, rows_of(columns, slice(count, len(ticks)))))
+                later.append((block, rows_of(columns, slice(count, len(instants)))))
             self._pending[table] = later
             if ready:
                 self._hand_on(table, ready)
 
     def close(self) -> None:
         """Hand on everything that is left and close the sinks."""
-        self._hand_on_before(np.iinfo(np.int64).max)
+        self._hand_on_before(np.iinfo(np.int64).max - 1, 0)
         for sink in self.sinks:
             sink.close()
 
     def _hand_on(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
         pieces.sort(key=lambda piece: piece[0])
-        ticks: IntArray = np.concatenate([columns["tick"] for _, columns in pieces])
-        order = None
-        if bool(np.any(ticks[1:] < ticks[:-1])):
-            order = np.argsort(ticks, kind="stable")
+        instants = RunTicks.joined([_instants(columns) for _, columns in pieces])
+        order = instants.order()
         if self._ends is not None and self._ends.early:
-            kept = self._ends.before(ticks)
+            kept = self._ends.before(instants)
             order = np.flatnonzero(kept) if order is None else order[kept[order]]
-        count = len(ticks) if order is None else len(order)
+        count = len(instants) if order is None else len(order)
         if count == 0:
             return
         ordered: Columns = {}
         for name, kind in self._schemas[table].items():
-            ordered[name] = self._column(table, name, kind, pieces, order, ticks)
+            ordered[name] = self._column(table, name, kind, pieces, order, instants)
         self.rows[table] += count
         for sink in self.sinks:
             sink.write(table, ordered)
@@ -258,11 +270,11 @@ class Recorder:
         kind: str,
         pieces: list[tuple[str, Columns]],
         order: IntArray | None,
-        ticks: IntArray,
+        instants: RunTicks,
     ) -> AnyArray | Text:
-        count = len(ticks) if order is None else len(order)
+        count = len(instants) if order is None else len(order)
         if name in ("time_s", "tick", "replica"):
-            values = self._time_column(name, ticks)
+            values = self._time_column(name, instants)
             return values if order is None else values[order]
         if kind == "text":
             text = self._texts.setdefault((table, name), _TextCodes(name))
@@ -271,32 +283,28 @@ class Recorder:
         if kind == "float64" and all(_is_missing(columns.get(name)) for _, columns in pieces):
             return nothing_in(count)
         parts = [
-            _values(self._in_seconds(columns.get(name), columns), kind, len(columns["tick"]))
+            _values(self._in_seconds(columns.get(name)), kind, len(columns["tick"]))
             for _, columns in pieces
         ]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
         if same_bits(values, np.broadcast_to(values[:1], len(values))):
             values, order = np.broadcast_to(values[:1].copy(), count), None
-        if name == "scan" and self._span_ticks:
-            values = own_scans(values)
         return values if order is None else values[order]
 
-    def _in_seconds(self, values: Any, columns: Columns) -> Any:
-        """Return instants as seconds since the start of the run that their row belongs to."""
-        if not isinstance(values, Instants):
-            return values
-        ticks = values.ticks
-        if self._span_ticks:
-            row: Any = columns["tick"]
-            ticks = ticks - row // self._span_ticks * self._span_ticks
-        return ticks / self._ticks_per_s
+    def _in_seconds(self, values: Any) -> Any:
+        """Return instants as seconds since the start of their run."""
+        return values.ticks / self._ticks_per_s if isinstance(values, Instants) else values
 
-    def _time_column(self, name: str, ticks: IntArray) -> AnyArray:
+    def _time_column(self, name: str, instants: RunTicks) -> AnyArray:
         if name == "replica":
-            return ticks // self._span_ticks
-        if self._span_ticks:
-            ticks = ticks % self._span_ticks
-        return ticks if name == "tick" else ticks / self._ticks_per_s
+            return instants.run
+        return instants.tick if name == "tick" else instants.tick / self._ticks_per_s
+
+
+def _instants(columns: Columns) -> RunTicks:
+    tick: Any = columns["tick"]
+    run: Any = columns.get("replica")
+    return RunTicks(no_runs(len(tick)) if run is None else run, tick)
 
 
 class _TextCodes:

@@ -11,26 +11,22 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.wake import ReplicaRuns, Runner
 from dsa_des.record.recording import Recorder
-from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
-from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
-from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.running.channel import Channel
-from dsa_des.running.effects import may_be_late, plan, unspent
+from dsa_des.running.effects import plan, unspent
 from dsa_des.running.grain import Grain, opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import EqualWindows, Rewinder, Window, Windows
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.wiring import Wire
-from dsa_des.time.clock import ScanClock
+from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
+from dsa_des.time.run_clock import RunClock
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
@@ -78,13 +74,15 @@ def lock_step(
 
 
 class Replicas(Timeline):
-    """Runs of a scene that share blocks, on one timeline.
+    """Runs of a scene that share blocks.
 
     Parameters
     ----------
     scenes, report
         As for `lock_step`.
     """
+
+    says_replica = True
 
     def __init__(self, scenes: Sequence[Scene], report: TakeReport | None = None) -> None:
         super().__init__(scenes[0])
@@ -95,21 +93,16 @@ class Replicas(Timeline):
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
         self.together: dict[str, Runner] = {}
-        self._clocks: list[ReplicaClock] = []
+        self._clocks: list[RunClock] = []
         _check_alike(self._scenes)
-        self._seeds = _seeds_of(self._scenes)
+        self.seeds = _seeds_of(self._scenes)
         #: Wires at which feedback loops are opened: a window is no longer than their delay.
         self._opened = opened_loops(self.scene)
-        self.streams = ReplicaStreams(self._seeds)
+        self.streams = Streams(self.seeds)
 
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
-        """Lay runs end to end, and split the blocks that cannot serve all of them."""
-        self.time = ReplicaTime.of_replicas(len(self._scenes), self._run_ticks(duration_s))
-        if not self.time.fits:
-            raise NotInLockStep(
-                f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
-                f"of 64-bit ticks at {self.scene.ticks_per_s} per second"
-            )
+        """Split the blocks that cannot serve all runs."""
+        self.time = ReplicaTime(len(self._scenes), self._run_ticks(duration_s))
         self.ends = RunEnds(self.time)
         self._faces = components
         for name, component in components.items():
@@ -225,8 +218,14 @@ class Replicas(Timeline):
                 component.context.duration_s = ended
             self._report(number, component.report())
 
-    def clock(self, name: str, component: Component) -> ScanClock | None:
+    def clock(self, name: str, component: Component) -> RunClock | None:
         """Return the clocks of all replicas as one."""
+        if (clock := super().clock(name, component)) is not None:
+            self._clocks.append(clock)
+        return clock
+
+    def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
+        """Return what each replica says of a block's clock."""
         found: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
         for parameters in self._parameters_of(name):
@@ -234,21 +233,14 @@ class Replicas(Timeline):
                 known[id(parameters)] = component.clock_of(parameters)
             found.append(known[id(parameters)])
         specs = [spec for spec in found if spec is not None]
-        if not specs:
-            return None
-        if len(specs) < len(found):
+        if 0 < len(specs) < len(found):
             raise NotInLockStep(f"block {name} has a clock of its own in some replicas only")
         if len({(spec.rate_hz, spec.rate_error_ppm) for spec in specs}) > 1:
             for wire in self.scene.wires:
                 if wire.delay_scans and name in (wire.source, wire.target):
                     raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
 
-        def jitter(number: int) -> Callable[[IntArray], FloatArray]:
-            return Streams(self._seeds[number]).scan_normals(name, "clock jitter")
-
-        clock = ReplicaClock(specs, self.scene.ticks_per_s, self.time, jitter)
-        self._clocks.append(clock)
-        return clock
+        return specs
 
     def runner(self, component: Component) -> Any:
         """Return the block, or its instances."""
@@ -271,14 +263,6 @@ class Replicas(Timeline):
     def grain(self, window: int | None) -> Grain:
         """Return the grain: all run in windows, in loops in those that nothing comes back in."""
         return Grain(set(self.scene.blocks), False, self._opened, {})
-
-    def channel(self, wire: Wire, delay_ticks: int) -> Channel:
-        """Return the receiving end of a wire in all replicas."""
-        faults = None
-        if may_be_late(wire, everything=False):
-            arguments = self._fault_arguments(wire)
-            faults = ReplicaWireFaults(*arguments, span_ticks=self.time.span_ticks)
-        return ReplicaChannel(wire.source, delay_ticks, faults, self.time, self.ends)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
         """Return the window: clocks are asked for one stretch only, and know it the second time."""

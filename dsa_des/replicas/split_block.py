@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message, by_output
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.errors import RunRefused
-from dsa_des.time.timeline import first_scan
 
 
 class NotInLockStep(RunRefused):
@@ -26,8 +26,8 @@ class NotInLockStep(RunRefused):
 class SplitBlock:
     """One instance per replica, made when its rows come and let go when the next replicas run.
 
-    Each instance sees only its own replica's rows, with its own ticks and scan numbers, as in a
-    run of its own. It is no block and has no face of its own: only `run` is called on it.
+    Each instance sees only its own replica's rows, as in a run of its own. It is no block and has
+    no face of its own: only `run` is called on it.
 
     Parameters
     ----------
@@ -54,13 +54,12 @@ class SplitBlock:
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Let every replica's instance handle its rows."""
-        replica = wake.replica
-        cuts = np.flatnonzero(replica[1:] != replica[:-1]) + 1
+        firsts = wake.instants.first_of_each.tolist()
         sent: dict[str, list[Message]] = {}
         self._let_go(wake.first_run)
-        self._keep_waiting(wake, replica)
-        for first, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(wake)], strict=True):
-            number = int(replica[first])
+        self._keep_waiting(wake)
+        for first, end in zip(firsts, [*firsts[1:], len(wake)], strict=True):
+            number = int(wake.run[first])
             if number not in self._instances:
                 self._instances[number] = self.make(number)
                 self._made.add(number)
@@ -69,18 +68,17 @@ class SplitBlock:
                 part._arrived = {**part._arrived, port: _after(waiting, part.arrivals(port))}
             result = self._instances[number].run(part)
             for port, message in by_output(result, self._outputs).items():
-                shift = number * wake.span_ticks
-                sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
+                run = np.full(len(message), number, dtype=np.int64)
+                sent.setdefault(port, []).append(message.of_runs(run))
         return {port: _joined(parts) for port, parts in sent.items()} or None
 
-    def _keep_waiting(self, wake: Wake, replica: IntArray) -> None:
+    def _keep_waiting(self, wake: Wake) -> None:
         """Keep what comes for instances that do not run in this wake, as a wire would."""
         for port, arrivals in wake._arrived.items():
             for new in arrivals:
-                of = wake.replica_of(new.tick)
-                for number in np.unique(of[~np.isin(of, replica)]).tolist():
-                    begin = number * wake.span_ticks
-                    part = _arrivals(new, begin, first_scan(number), wake.span_ticks)
+                of = new.message.run
+                for number in np.unique(of[~np.isin(of, wake.run)]).tolist():
+                    part = _arrivals(new, number)
                     held = self._waiting.setdefault(number, {}).setdefault(port, [])
                     held[:] = _after(held, [part] if part else [])
 
@@ -109,8 +107,6 @@ class SplitBlock:
 
 def _part(wake: Wake, rows: slice, number: int) -> Wake:
     """Return the rows of one replica as its own run would see them."""
-    begin, scan = number * wake.span_ticks, first_scan(number)
-    ticks, scans = wake.ticks[rows] - begin, wake.scans[rows]
     held = {}
     for port, (message, place) in wake._held.items():
         mine = place[rows]
@@ -118,29 +114,34 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         if len(there) == 0:
             continue  # nothing has arrived in this replica yet
         low = int(there.min())
-        part = message.take(slice(low, int(there.max()) + 1)).shifted(-begin, -scan)
+        part = _alone(message.take(slice(low, int(there.max()) + 1)))
         held[port] = part, np.where(mine < 0, -1, mine - low)
     arrived = {
-        port: [part for new in arrivals if (part := _arrivals(new, begin, scan, wake.span_ticks))]
+        port: [came for new in arrivals if (came := _arrivals(new, number))]
         for port, arrivals in wake._arrived.items()
     }
 
     def demand() -> dict[str, IntArray]:
         return {block: _within(asked, rows) for block, asked in wake.demand.items()}
 
-    own = np.where(scans >= 0, scans - scan, -1)
-    return Wake(
-        ticks, own, wake.ticks_per_s, held, arrived, demand,
-        clock=lambda scans: wake.scans_before[rows],
-    )  # fmt: skip
+    ticks, scans = wake.ticks[rows], wake.scans[rows]
+
+    def before(scans: IntArray, run: IntArray) -> IntArray:
+        return wake.scans_before[rows]
+
+    return Wake(ticks, scans, wake.ticks_per_s, held, arrived, demand, clock=before)
 
 
-def _arrivals(new: Arrivals, begin: int, scan: int, span: int) -> Arrivals | None:
-    first, end = np.searchsorted(new.tick, [begin, begin + span]).tolist()
+def _arrivals(new: Arrivals, number: int) -> Arrivals | None:
+    first, end = np.searchsorted(new.message.run, [number, number + 1]).tolist()
     if first == end:
         return None
-    message = new.message.take(slice(first, end)).shifted(-begin, -scan)
-    return Arrivals(new.source, new.tick[first:end] - begin, message)
+    return Arrivals(new.source, new.tick[first:end], _alone(new.message.take(slice(first, end))))
+
+
+def _alone(message: Message) -> Message:
+    """Return a message of one run as that of a run by itself."""
+    return message.of_runs(no_runs(len(message)))
 
 
 def _after(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:

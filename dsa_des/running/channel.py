@@ -13,19 +13,20 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Input
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import MAX_TICK, nanosecond_of
 from dsa_des.time.randomness import Stream
+from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
 
 @dataclass(frozen=True)
 class WireFaults:
-    """Keyed faults of one wire; a row's fate depends on the wire and on its instant only.
+    """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
 
     Parameters
     ----------
@@ -43,21 +44,30 @@ class WireFaults:
     drops: Stream
     ticks_per_s: int
 
-    def kept(self, ticks: IntArray) -> BoolArray:
-        """Return which rows sent at `ticks` are not lost."""
-        return self._drawn(self.drops, ticks) >= self.drop_probability
+    def kept(self, sent: RunTicks) -> BoolArray:
+        """Return which rows sent at some instants are not lost."""
+        return self._drawn(self.drops, sent) >= self.drop_probability
 
-    def lateness(self, ticks: IntArray) -> IntArray:
-        """Return the extra delay of the rows sent at `ticks`, in ticks."""
-        return np.rint(self._drawn(self.jitter, ticks) * self.jitter_ticks).astype(np.int64)
+    def lateness(self, sent: RunTicks) -> IntArray:
+        """Return the extra delay of rows sent at some instants, in ticks."""
+        return np.rint(self._drawn(self.jitter, sent) * self.jitter_ticks).astype(np.int64)
 
-    def _drawn(self, stream: Stream, ticks: IntArray) -> FloatArray:
-        instant = nanosecond_of(ticks, self.ticks_per_s).astype(np.uint64)
-        return stream.uniform(instant, 0)
+    def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
+        instant = nanosecond_of(sent.tick, self.ticks_per_s).astype(np.uint64)
+        return stream.of_runs(sent.run).uniform(instant, 0)
+
+
+#: Rows and when they arrive.
+Rows = tuple[RunTicks, Message]
+# So many messages are kept before the last row of each run is sought in them.
+_MOST_PASSED = 16
 
 
 class Channel:
-    """Rows on their way to one input.
+    """Rows on their way to one input, in order of run and then of arrival.
+
+    Every window takes what arrives in its stretch of time; what each run holds is remembered until
+    it has ended.
 
     Parameters
     ----------
@@ -67,6 +77,10 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
+    time : ReplicaTime, optional
+        Which runs go now; by default there is one, without an end.
+    ends : RunEnds, optional
+        What arrives when its run has ended does not.
     """
 
     def __init__(
@@ -74,37 +88,45 @@ class Channel:
         source: str,
         delay_ticks: int = 0,
         faults: WireFaults | None = None,
+        time: ReplicaTime | None = None,
+        ends: RunEnds | None = None,
     ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
+        self._time = ReplicaTime(1, MAX_TICK) if time is None else time
+        self._ends = RunEnds(self._time) if ends is None else ends
         #: Arrivals of rows, which are the last ones of the message beside them.
-        self._waiting: deque[tuple[IntArray, Message]] = deque()
-        #: The last row of it is held.
-        self._last: tuple[IntArray, Message] | None = None
+        self._waiting: deque[Rows] = deque()
+        #: What was collected; the last row of each run is held.
+        self._passed: list[Rows] = []
         #: First arrival of every message pushed since `state` or `set_state`.
         self._pushed: list[int] | None = None
 
     def hold(self, message: Message, tick: int) -> None:
-        """Make `message` the last arrived one, as if it had come at `tick`."""
-        self._last = (np.array([tick], dtype=np.int64), message)
+        """Make `message` the last arrived one in every run, as if it had come at `tick`."""
+        if (runs := self._time.replicas) == 1:
+            self._passed = [(RunTicks.of_run(0, np.array([tick], dtype=np.int64)), message)]
+            return
+        held = type(message).concatenate([message] * runs).of_runs(np.arange(runs))
+        self._passed = [(RunTicks(held.run, np.full(runs, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
         """Return what waits and what is held, for `set_state`; note pushes from now on."""
         self._pushed = []
-        return tuple(self._waiting), self._last
+        return tuple(self._waiting), tuple(self._passed)
 
     def set_state(self, state: tuple[Any, Any]) -> None:
         """Go back to a state that `state` gave."""
-        self._waiting, self._last = deque(state[0]), state[1]
+        self._waiting, self._passed = deque(state[0]), list(state[1])
         self._pushed = []
 
     def earliest_pushed(self) -> int | None:
         """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
         return min(self._pushed) if self._pushed else None
 
-    def push(self, message: Message, sent: int | IntArray | None = None) -> IntArray:
-        """Deposit a message and return the ticks at which its rows arrive, in order.
+    def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
+        """Deposit a message and return when its rows arrive, in order.
 
         Parameters
         ----------
@@ -112,94 +134,183 @@ class Channel:
         sent : int or array of int, optional
             The tick at which it was sent, or each of its rows, when that is later than their own.
         """
-        ticks = message.tick
+        arrivals = message.instants
         if sent is not None:
-            ticks = np.full(len(message), sent, dtype=np.int64)
-        arrivals = ticks + self.delay_ticks if self.delay_ticks else ticks
+            arrivals = RunTicks(message.run, np.full(len(message), sent, dtype=np.int64))
+        if self.delay_ticks:
+            arrivals = arrivals.later(self.delay_ticks)
         if self._faults is not None:
-            kept = np.flatnonzero(self._faults.kept(message.tick))
-            arrivals = arrivals[kept] + self._faults.lateness(message.tick[kept])
-            order = np.argsort(arrivals, kind="stable")
-            arrivals, message = arrivals[order], message.take(kept[order])
-            if len(kept) == 0:
-                return arrivals
+            made = message.instants
+            kept = np.flatnonzero(self._faults.kept(made))
+            arrivals, message = arrivals.take(kept), message.take(kept)
+            arrivals = arrivals.later(self._faults.lateness(made.take(kept)))
+            if (order := arrivals.order()) is not None:
+                arrivals, message = arrivals.take(order), message.take(order)
+        if self._time.replicas > 1 and (self.delay_ticks or self._faults is not None):
+            # What would arrive after its run does not: nothing would wait for it there.
+            arrivals, message = _rows(arrivals, message, arrivals.tick < self._time.run_ticks)
+        if len(arrivals) == 0:
+            return arrivals
         self._waiting.append((arrivals, message))
         if self._pushed is not None:
-            self._pushed.append(int(arrivals[0]))
+            self._pushed.append(int(arrivals.tick[0]))
         return arrivals
 
     def forget(self, tick: int) -> None:
         """Drop what a reader who only asks what is held, at `tick` or later, can never see.
 
         A slow sensor behind a fast one would otherwise let a message wait for each window between
-        two of its scans.
+        two of its scans. Where several runs go, a row is superseded in its own only.
         """
-        if self._faults is None:
-            while len(self._waiting) > 1 and self._waiting[1][0][0] <= tick:
+        if self._faults is None and len(self._time.runs) == 1:
+            while len(self._waiting) > 1 and self._waiting[1][0].tick[0] <= tick:
                 self._waiting.popleft()
 
-    def next_arrivals(self, end: int) -> IntArray:
-        """Return the ticks at which rows arrive before `end` that were not collected yet."""
-        ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
-        if self._faults is not None and ticks:
-            return sorted_union(ticks)  # late rows overtake and may coincide
-        return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
+    def next_arrivals(self, end: int) -> RunTicks:
+        """Return when rows arrive before `end` that were not collected yet."""
+        found = [arrivals.take(self._due(arrivals, end)) for arrivals, _ in self._waiting]
+        found = [part for part in found if len(part)]
+        if not found:
+            return RunTicks.none()
+        if self._faults is not None:
+            return union(found)  # late rows overtake and may coincide
+        if len(self._time.runs) == 1:
+            return RunTicks.joined(found)
+        return found[0] if len(found) == 1 else union(found)
 
-    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+    def _due(self, arrivals: RunTicks, end: int) -> slice | BoolArray:
+        """Return which rows arrive before `end`."""
+        if len(self._time.runs) == 1:
+            return slice(arrivals.at_most(end))
+        if end >= self._time.run_ticks:
+            return slice(None)
+        due = arrivals.tick < end
+        return slice(None) if due.all() else due
+
+    def collect(self, end: int) -> Rows | None:
         """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
-        taken: list[tuple[IntArray, Message]] = []
-        left: deque[tuple[IntArray, Message]] = deque()
+        taken: list[Rows] = []
+        left: deque[Rows] = deque()
+        one, first = self._time.replicas == 1, self._time.runs.start
         while self._waiting:
             arrivals, message = self._waiting.popleft()
-            count = len(arrivals) if arrivals[-1] < end else int(np.searchsorted(arrivals, end))
-            start = len(message) - len(arrivals)
-            if count:
-                taken.append((arrivals[:count], message.take(slice(start, start + count))))
-            if count == len(arrivals):
+            if not one and arrivals.run[-1] < first:
+                continue  # of a run that has ended before they came
+            due = self._due(arrivals, end)
+            if not isinstance(due, slice):
+                rows, others = np.flatnonzero(due), np.flatnonzero(~due)
+                if len(rows):
+                    taken.append((arrivals.take(rows), message.take(rows)))
+                left.append((arrivals.take(others), message.take(others)))
                 continue
-            left.append((arrivals[count:], message))
-            if self._faults is None:
+            count = len(arrivals) if due.stop is None else due.stop
+            start = len(message) - len(arrivals)
+            if count == len(arrivals):
+                taken.append((arrivals, message.take(slice(start, None))))
+                continue
+            if count:
+                part = message.take(slice(start, start + count))
+                taken.append((arrivals.take(slice(count)), part))
+            left.append((arrivals.take(slice(count, None)), message))
+            if self._faults is None and one:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
         self._waiting = left
         found = joined(taken)
-        if self._faults is not None and found is not None and len(taken) > 1:
-            order = np.argsort(found[0], kind="stable")
-            found = found[0][order], found[1].take(order)
-        return found
+        if found is not None and len(taken) > 1:
+            found = _in_order(found)
+        if found is None or not self._ends.early:
+            return found
+        found = _rows(*found, self._ends.before(found[0]))
+        return found if len(found[0]) else None
 
-    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
-        """Return what the input holds at each of `ticks` (in order, all before `end`).
+    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
+        """Return what the input holds at each instant (in order, all before `end`).
 
         Returns
         -------
         (message, rows) or None
-            ``rows[i]`` is the row of `message` held at ``ticks[i]``; -1 when none has arrived.
+            ``rows[i]`` is the row of `message` held at instant i; -1 when none has arrived.
         """
         new = self.collect(end)
-        last = self._last
         if new is not None:
-            self._last = new
-            if new[0][0] <= ticks[0]:
-                last = None  # superseded before the first instant asked about: spare the copy
-        if last is not None:
-            last = last[0][-1:], last[1].take(slice(len(last[1]) - 1, len(last[1])))
-        held = joined([part for part in (last, new) if part is not None])
+            rows = last_of_run(new[0], asked)
+            if rows[0] >= 0 and (len(rows) == 1 or bool((rows >= 0).all())):
+                # What was before need not be looked up.
+                self._pass(new, end)
+                return new[1], rows
+        before = joined(self._passed)
+        parts = [] if before is None else [_lasts(*_in_order(before))]
+        held = joined(parts if new is None else [*parts, new])
         if held is None:
             return None
-        arrivals, message = held
-        if new is None:
-            self._last = held
-        return message, last_at_or_before(arrivals, ticks)
+        held = _in_order(held)
+        self._passed = [held]
+        if self._time.replicas > 1:
+            self._remember(end)
+        return held[1], last_of_run(held[0], asked)
+
+    def _pass(self, new: Rows, end: int) -> None:
+        """Take note of rows of which every run that asked holds one."""
+        if self._of_all(new[0]):  # nothing older is held by any run that goes
+            stop = self._time.runs.stop
+            self._passed = [part for part in self._passed if part[0].run[-1] >= stop]
+        self._passed.append(new)
+        if len(self._passed) > _MOST_PASSED or (
+            self._time.replicas > 1 and end >= self._time.run_ticks
+        ):
+            self._remember(end)
+
+    def _of_all(self, arrivals: RunTicks) -> bool:
+        """Whether there is a row of every run that goes on."""
+        runs = self._time.runs
+        if len(runs) == 1:
+            return True
+        if len(arrivals) < len(runs) and not self._ends.early:
+            return False
+        found = arrivals.run[arrivals.last_of_each]
+        if self._ends.early:
+            return self._ends.running(found) == self._ends.running(np.array(runs))
+        return len(found) == len(runs)
+
+    def _remember(self, end: int) -> None:
+        """Keep of what has passed the last row of each run that goes on."""
+        runs = self._time.runs
+        first = runs.stop if end >= self._time.run_ticks else runs.start
+        going = [part for part in self._passed if part[0].run[-1] >= first]
+        held = joined(going)
+        self._passed = [] if held is None else [_lasts(*_in_order(held))]
 
 
-def joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
+    if kept.all():
+        return arrivals, message
+    rows = np.flatnonzero(kept)
+    return arrivals.take(rows), message.take(rows)
+
+
+def _lasts(arrivals: RunTicks, message: Message) -> Rows:
+    """Return the last row of each run."""
+    if arrivals.one_run:
+        rows = slice(len(message) - 1, len(message))
+        return arrivals.take(slice(len(arrivals) - 1, len(arrivals))), message.take(rows)
+    lasts = arrivals.last_of_each
+    return arrivals.take(lasts), message.take(lasts)
+
+
+def _in_order(rows: Rows) -> Rows:
+    """Put rows in order; what arrives at one instant stays in the order given."""
+    order = rows[0].order()
+    return rows if order is None else (rows[0].take(order), rows[1].take(order))
+
+
+def joined(parts: Sequence[Rows]) -> Rows | None:
     """Return the rows of all parts as one, in the order given, or None without any."""
     if not parts:
         return None
     if len(parts) == 1:
         return parts[0]
-    arrivals = np.concatenate([part[0] for part in parts])
+    arrivals = RunTicks.joined([part[0] for part in parts])
     message = type(parts[0][1]).concatenate([part[1] for part in parts])
     return arrivals, message
 
@@ -209,10 +320,10 @@ class WireEnd(Protocol):
 
     source: str
 
-    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
-        """Return what is held at each of `ticks`, all before `end`."""
+    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
+        """Return what is held at each instant, all before `end`."""
 
-    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+    def collect(self, end: int) -> Rows | None:
         """Remove and return the rows that arrive before `end`."""
 
 
@@ -245,19 +356,21 @@ class Inputs:
 
     def seen(
         self,
-        ticks: IntArray,
+        asked: RunTicks,
         scans: IntArray,
         end: int,
-        demand: Callable[[IntArray], Mapping[str, IntArray]] | None = None,
+        demand: Callable[[RunTicks], Mapping[str, IntArray]] | None = None,
         *,
-        clock: Callable[[IntArray], IntArray] | None = None,
+        clock: Callable[[IntArray, IntArray], IntArray] | None = None,
         complete: bool = True,
     ) -> Wake | None:
         """Return what the block sees at some instants, or None if it cannot run at any.
 
         Parameters
         ----------
-        ticks, scans : ndarray of int64, shape (rows,)
+        asked : RunTicks
+            The instants.
+        scans : ndarray of int64, shape (rows,)
             As for `Wake`.
         end : int
             First tick that is no longer seen.
@@ -271,26 +384,27 @@ class Inputs:
         held: dict[str, tuple[Message, IntArray]] = {}
         missing: np.ndarray | None = None
         for port, wire, required in self._held:
-            sample = wire.sample(ticks, end)
+            sample = wire.sample(asked, end)
             if sample is not None:
                 held[port] = sample
             if required and complete and _some_missing(sample):
-                absent = np.ones(len(ticks), bool) if sample is None else sample[1] < 0
+                absent = np.ones(len(asked), bool) if sample is None else sample[1] < 0
                 missing = absent if missing is None else missing | absent
         if missing is not None:  # before the first messages
             there = np.flatnonzero(~missing)
             if len(there) == 0:
                 return None
-            ticks, scans = ticks[there], scans[there]
+            asked, scans = asked.take(there), scans[there]
             held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
         arrived: dict[str, list[Arrivals]] = {}
         for port, wire in self._queued:
             new = wire.collect(end)
             if new is not None:
-                arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
-        asked = None if demand is None else partial(demand, ticks)
-        span, run = self._time.span_ticks, self._time.runs.start
-        return Wake(ticks, scans, self._ticks_per_s, held, arrived, asked, span, run, clock)
+                came = Arrivals(wire.source, new[0].tick, new[1])
+                arrived.setdefault(port, []).append(came)
+        rows = None if demand is None else partial(demand, asked)
+        first, per_s = self._time.runs.start, self._ticks_per_s
+        return Wake(asked.tick, scans, per_s, held, arrived, rows, asked.run, first, clock)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import simpy
 
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
@@ -79,7 +80,7 @@ class OwnProcess(Protocol):
 
     @property
     def send(self) -> Callable[..., None]:
-        """Send a message, or messages by output name, of some ticks."""
+        """Send a message, or messages by output name, of some instants."""
 
 
 class BlockEnvironment:
@@ -130,7 +131,7 @@ class BlockEnvironment:
 
         It sets out later, where `leaves` is a later tick: before any block runs then.
         """
-        self._node.send(result, self.tick_array(), leaves)
+        self._node.send(result, RunTicks(no_runs(1), self.tick_array()), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

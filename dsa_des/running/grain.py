@@ -12,7 +12,7 @@ from dsa_des.errors.budgets import MOST_SCANS
 from dsa_des.running.node import Node
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
-from dsa_des.time.clock import ScanClock
+from dsa_des.time.run_clock import RunClock
 from dsa_des.time.timeline import ReplicaTime
 
 #: From which block to which.
@@ -267,5 +267,5 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     return max(1, int(scans / per_tick)) if per_tick else time.run_ticks
 
 
-def _clocks(nodes: Iterable[Node]) -> list[ScanClock]:
+def _clocks(nodes: Iterable[Node]) -> list[RunClock]:
     return [node.clock for node in nodes if node.clock is not None]

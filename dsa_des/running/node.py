@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, no_runs, says_no_runs, union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
@@ -24,7 +24,7 @@ from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
-from dsa_des.time.clock import ScanClock
+from dsa_des.time.run_clock import RunClock
 from dsa_des.time.timeline import ReplicaTime
 
 
@@ -33,18 +33,18 @@ class Demand:
     """A clocked block downstream, and how long before its scan it needs our row."""
 
     block: str
-    clock: ScanClock
+    clock: RunClock
     lead_ticks: int
     time: ReplicaTime
 
-    def between(self, start: int, end: int) -> IntArray:
-        """Return the ticks in [start, end) at which this block needs a row."""
+    def between(self, start: int, end: int) -> RunTicks:
+        """Return the instants in [start, end) at which this block needs a row."""
         if not self.lead_ticks:
             return self.clock.between(start, end)[1]
         # A row that would arrive after the end of the run is not needed.
         last = min(end + self.lead_ticks, self.time.run_ticks)
-        _, ticks = self.clock.between(start + self.lead_ticks, last)
-        return ticks - self.lead_ticks
+        _, instants = self.clock.between(start + self.lead_ticks, last)
+        return instants.later(-self.lead_ticks)
 
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
@@ -74,7 +74,7 @@ class Node:
     component: Component
     windowed: bool
     priority: Callable[[], float]
-    clock: ScanClock | None = None
+    clock: RunClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
     processor: Processor | WindowedQueue | None = None
@@ -167,23 +167,23 @@ class Node:
                 self.wake_at(start)
             return
         if self.clock is not None:
-            scans, ticks = self.clock.between(start, end)
-            self._scan_at = dict(zip(ticks.tolist(), scans.tolist(), strict=True))
+            scans, instants = self.clock.between(start, end)
+            self._scan_at = dict(zip(instants.tick.tolist(), scans.tolist(), strict=True))
             for tick in self._scan_at:
                 self.wake_at(tick)
         elif self.on_demand:
-            for tick in self._demanded(start, end).tolist():
+            for tick in self._demanded(start, end).tick.tolist():
                 self.wake_at(tick)
 
     def _end_in(self, window: Window) -> int:
         """Return up to when it runs in a window."""
         return window.end if window.ahead is None or not self.ahead else window.ahead
 
-    def _demanded(self, start: int, end: int) -> IntArray:
-        ticks = [demand.between(start, end) for demand in self.demands]
-        if len(ticks) == 1:
-            return ticks[0]
-        return sorted_union(ticks) if ticks else np.empty(0, dtype=np.int64)
+    def _demanded(self, start: int, end: int) -> RunTicks:
+        instants = [demand.between(start, end) for demand in self.demands]
+        if len(instants) == 1:
+            return instants[0]
+        return union(instants) if instants else RunTicks.none()
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -194,15 +194,14 @@ class Node:
         if self.processor is not None and self.processor.refuses(self.name):
             return
         scan = self._scan_at.get(tick, -1)
-        ticks = np.array([tick], dtype=np.int64)
-        self._run(ticks, np.array([scan], dtype=np.int64), tick + 1)
+        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
-            scans, ticks = self.clock.between(start, end)
+            scans, instants = self.clock.between(start, end)
         else:
-            ticks = self._demanded(start, end) if self.on_demand else np.empty(0, np.int64)
-            scans = np.full(len(ticks), -1, dtype=np.int64)
+            instants = self._demanded(start, end) if self.on_demand else RunTicks.none()
+            scans = np.full(len(instants), -1, dtype=np.int64)
         arrivals = [
             channel.next_arrivals(end)
             for port in self._trigger_ports
@@ -210,40 +209,37 @@ class Node:
         ]
         arrivals = [new for new in arrivals if len(new)]
         if arrivals:
-            own = ticks
+            own = instants
             if len(own) == 0 and len(arrivals) == 1:
-                ticks = arrivals[0]
+                instants = arrivals[0]
             else:
-                ticks = sorted_union([own, *arrivals])
+                instants = union([own, *arrivals])
+            numbered = np.full(len(instants), -1, dtype=np.int64)
             if len(own):
-                place = np.searchsorted(ticks, own)
-                numbered = np.full(len(ticks), -1, dtype=np.int64)
-                numbered[place] = scans
-                scans = numbered
-            else:
-                scans = np.full(len(ticks), -1, dtype=np.int64)
+                numbered[last_of_run(instants, own)] = scans
+            scans = numbered
         ends = self.simulation.ends
         if ends.early:
-            kept = ends.before(ticks)
-            ticks, scans, end = ticks[kept], scans[kept], ends.cut(end)
-        if len(ticks):
-            self._run(ticks, scans, end)
+            kept = ends.before(instants)
+            instants, scans, end = instants.take(kept), scans[kept], ends.cut(end)
+        if len(instants):
+            self._run(instants, scans, end)
 
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
         return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
 
-    def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
+    def _run(self, instants: RunTicks, scans: IntArray, end: int) -> None:
         before = None if self.clock is None else self.clock.before
-        wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for, clock=before)
+        wake = self._inputs.seen(instants, scans, end, self._rows_asked_for, clock=before)
         if wake is None:
             return
         ticks = wake.ticks
         if self.simulation.trace is not None:
             self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
-            self.send(self.runner.run(wake), ticks)
+            self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):
             raise
         except BaseException as error:
@@ -251,15 +247,15 @@ class Node:
                 raise
             self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 
-    def _rows_asked_for(self, ticks: IntArray) -> Mapping[str, IntArray]:
+    def _rows_asked_for(self, instants: RunTicks) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
-        start, end = self.simulation.stretch(ticks)
+        start, end = self.simulation.stretch(instants.tick)
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)
-            place = last_at_or_before(ticks, asked)
-            here = ticks[np.maximum(place, 0)] == asked
+            place = last_of_run(instants, asked)
+            here = (place >= 0) & (instants.tick[place] == asked.tick)
             rows[demand.block] = place if bool(here.all()) else place[here]
         return rows
 
@@ -267,20 +263,21 @@ class Node:
         """Return the inputs as they are now, for a block with its own process."""
         self._missed = False
         tick = int(self.simulation.env.now)
-        ticks, scans = np.array([tick], dtype=np.int64), np.array([-1], dtype=np.int64)
-        wake = self._inputs.seen(ticks, scans, tick + 1, complete=False)
+        scans = np.array([-1], dtype=np.int64)
+        wake = self._inputs.seen(_now(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
     # -- sending -------------------------------------------------------------------------------
 
-    def send(self, result: Any, ticks: IntArray, leaves: int | None = None) -> None:
-        """Send what a block returned when it ran at `ticks`: a message, or messages by output.
+    def send(self, result: Any, ran: RunTicks, leaves: int | None = None) -> None:
+        """Send what a block returned when it ran: a message, or messages by output.
 
         Parameters
         ----------
         result : Message, mapping or None
-        ticks : ndarray of int64
+        ran : RunTicks
+            The instants that it ran at.
         leaves : int, optional
             When it sets out, where that is later.
         """
@@ -297,13 +294,13 @@ class Node:
             if len(message) == 0:
                 continue
             message.check()
-            _check_ticks(port, message.tick, ticks)
+            message = _of_their_runs(port, message, ran)
             if isinstance(message, RunEnd):
-                self.simulation.ends.note(message.tick, self.name)
+                self.simulation.ends.note(message.instants, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
-            if leaves is not None and leaves > ticks[0]:
-                event = WakeUp(self.simulation.env, leaves - int(ticks[0]), LEAVE_PRIORITY)
+            if leaves is not None and leaves > ran.tick[0]:
+                event = WakeUp(self.simulation.env, leaves - int(ran.tick[0]), LEAVE_PRIORITY)
                 event.callbacks.append(partial(self._hand_in, port, message, leaves))
             else:
                 self._hand_in(port, message)
@@ -322,24 +319,40 @@ class Node:
             if node.component.inputs[target_port].mode == "sampled":
                 channel.forget(self.simulation.window.start)
             if not node.windowed and target_port in node._trigger_ports:
-                for arrival in arrivals.tolist():
+                for arrival in arrivals.tick.tolist():
                     node.wake_at(arrival)
 
 
-def _check_ticks(port: str, sent: IntArray, ran: IntArray) -> None:
-    """Refuse rows that are not of instants at which the block ran, in order.
+def _now(tick: int) -> RunTicks:
+    return RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
 
-    What a row is dated with is when it was made: that decides when it arrives, and where it stands
-    in the recording.
+
+def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
+    """Return a message that says of which runs its rows are, if its block does not say it.
+
+    Rows that are not of instants at which the block ran, in order, are refused: what a row is dated
+    with is when it was made, which decides when it arrives and where it stands in the recording.
     """
-    if sent is ran:
-        return
+    sent = message.tick
+    if sent is ran.tick:
+        return message if says_no_runs(ran.run) else message.of_runs(ran.run)
     if sent.dtype == np.int64:
-        place = last_at_or_before(ran, sent)
-        if place[0] >= 0 and bool((ran[place] == sent).all() and (place[1:] >= place[:-1]).all()):
-            return
+        if not says_no_runs(ran.run) and says_no_runs(message.run):
+            if ran.one_run:
+                message = message.of_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
+            elif np.array_equal(sent, ran.tick):
+                message = message.of_runs(ran.run)
+            else:
+                raise ValueError(
+                    f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
+                    "runs: the message must say of which run each is (`run = wake.run[rows]`)"
+                )
+        place = last_of_run(ran, message.instants)
+        there = bool(((place >= 0) & (ran.tick[place] == sent)).all())
+        if there and bool((place[1:] >= place[:-1]).all()):
+            return message
     raise ValueError(
         f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "
         f"they must be int64 and lie in the instants it ran at, in order: those of the wake "
-        f"[{ran[0]} ... {ran[-1]}], also where an input speaks of an earlier one"
+        f"[{ran.tick[0]} ... {ran.tick[-1]}], also where an input speaks of an earlier one"
     )

@@ -210,7 +210,7 @@ class Simulation:
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self.recorder.advance(self.time.final_before(runs, final))
+                self.recorder.advance(*self.time.final_before(runs, final))
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
@@ -272,8 +272,9 @@ class Simulation:
     def _open_recorder(self) -> None:
         if self.recorder is not None:
             self.recorder.open(
-                self.recorded_messages(), self.ticks_per_s, self.time.span_ticks, self.ends
-            )
+                self.recorded_messages(), self.ticks_per_s, self.ends,
+                replicas=self.timeline.says_replica,
+            )  # fmt: skip
 
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:

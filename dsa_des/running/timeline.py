@@ -4,11 +4,11 @@ A simulation asks its timeline for all in which several runs of a scene differ f
 builds blocks, wires them and runs them knows no replicas.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.running.channel import Channel, WireFaults
 from dsa_des.running.effects import may_be_late
@@ -23,8 +23,9 @@ from dsa_des.running.windows import (
 )
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
-from dsa_des.time.clock import ScanClock
-from dsa_des.time.randomness import Stream, Streams
+from dsa_des.time.clock import ClockSpec
+from dsa_des.time.randomness import Streams
+from dsa_des.time.run_clock import RunClock
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
@@ -48,9 +49,12 @@ class Timeline:
         When each of them ends; from then on.
     runs : int
         How many there are.
+    says_replica : bool
+        Whether what is recorded says of which run it is.
     """
 
     runs = 1
+    says_replica = False
 
     time: ReplicaTime
     ends: RunEnds
@@ -58,7 +62,8 @@ class Timeline:
     def __init__(self, scene: Scene, *, everything: bool = False) -> None:
         self.scene = scene
         self._everything = everything
-        self.streams = Streams(scene.seed)
+        self.seeds: Sequence[int] = (scene.seed,)
+        self.streams = Streams(self.seeds)
 
     def parameters(self, name: str) -> Any:
         """Return what a block is made with."""
@@ -73,36 +78,42 @@ class Timeline:
         ticks = duration_s * self.scene.ticks_per_s
         return -(-ticks.numerator // ticks.denominator)
 
-    def clock(self, name: str, component: Component) -> ScanClock | None:
+    def clock(self, name: str, component: Component) -> RunClock | None:
         """Return a block's scan clock, or None where it has none of its own."""
-        spec = component.clock_of(component.p)
-        if spec is None:
+        specs = self.clock_specs(name, component)
+        if not specs:
             return None
-        draw = self.streams.scan_normals(name, "clock jitter")
-        return ScanClock(spec, self.scene.ticks_per_s, draw, always_draws=self._everything)
+
+        def jitter(number: int) -> Callable[[IntArray], FloatArray]:
+            return Streams(self.seeds[number]).scan_normals(name, "clock jitter")
+
+        everything = self._everything
+        return RunClock(specs, self.scene.ticks_per_s, self.time, jitter, always_draws=everything)
+
+    def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
+        """Return what each run says of a block's clock; none where it has none of its own."""
+        spec = component.clock_of(component.p)
+        return [] if spec is None else [spec]
 
     def channel(self, wire: Wire, delay_ticks: int) -> Channel:
         """Return the receiving end of a wire, with its faults."""
         faults = None
         if may_be_late(wire, self._everything):
             faults = self.wire_faults(wire)
-        return Channel(wire.source, delay_ticks, faults)
+        return Channel(wire.source, delay_ticks, faults, self.time, self.ends)
 
     def wire_faults(self, wire: Wire) -> WireFaults:
         """Return what happens to the rows on a wire that loses or delays some."""
-        return WireFaults(*self._fault_arguments(wire))
-
-    def _fault_arguments(self, wire: Wire) -> tuple[float, float, Stream, Stream, int]:
-        ticks_per_s = self.scene.ticks_per_s
+        per_s = self.scene.ticks_per_s
         late, lost = (self.streams.stream(str(wire), f"wire {kind}") for kind in ("jitter", "loss"))
-        return float(wire.jitter_s * ticks_per_s), wire.drop_probability, late, lost, ticks_per_s
+        return WireFaults(float(wire.jitter_s * per_s), wire.drop_probability, late, lost, per_s)
 
     def grain(self, window: int | None) -> Grain:
         """Return at which grain the blocks run; see `Simulation` for the parameters."""
         return grain_of(self.scene, window)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
-        """Return a start and an end between which the rows of a wake lie, as clocks count."""
+        """Return a start and an end between which the instants of a wake lie."""
         return int(ticks[0]), int(ticks[-1]) + 1
 
     def runner(self, component: Component) -> Any:

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.randomness import Stream
-from dsa_des.time.timeline import first_scan
 
 # Knots so many correlation times apart are drawn as if independent; exp(-40) is 4e-18.
 _APART = 40.0
@@ -73,7 +72,7 @@ class GaussMarkov:
         targets: npt.ArrayLike,
         instants_ns: IntArray,
         process: int = 0,
-        replica: npt.ArrayLike = 0,
+        run: npt.ArrayLike = 0,
     ) -> FloatArray:
         """Return the process's values.
 
@@ -85,8 +84,8 @@ class GaussMarkov:
             Since the start of the run (`dsa_des.time.clock.nanosecond_of`).
         process : int
             Which of a target's independent processes, 0 to 2047.
-        replica : (n,) array of int64, or one number
-            Where replicas run in lock step, whose seed it is.
+        run : (n,) array of int64, or one number
+            Whose seed it is, where there are many.
 
         Returns
         -------
@@ -96,12 +95,12 @@ class GaussMarkov:
             raise ValueError(f"process is {process}: it must lie in [0, {MOST_PROCESSES})")
         instants = np.ascontiguousarray(instants_ns, dtype=np.int64)
         who = np.broadcast_to(np.asarray(targets, dtype=np.uint64), instants.shape)
-        begin = first_scan(1) * np.broadcast_to(np.asarray(replica, dtype=np.int64), instants.shape)
+        stream = self._stream.of_runs(np.broadcast_to(run, instants.shape))
         first = process * _LEVELS
 
         def drawn(number: IntArray, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
             key = who + (number >> 32).astype(np.uint64) * _SPREAD
-            return self._stream.normals(key, begin + (number & _LOW), first + level)
+            return stream.normals(key, number & _LOW, first + level)
 
         step = self._steps
         number = instants >> (2 * step)

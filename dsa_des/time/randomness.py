@@ -6,7 +6,7 @@ Leaving out a scan, adding a target, swapping another block or changing the wind
 no other block's draws.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from hashlib import blake2b
 from typing import Any
 
@@ -92,28 +92,25 @@ class Stream:
 
     Parameters
     ----------
-    seed : int
+    seed : int or sequence of int
+        That of the run, or of each of several runs (`of_runs`); without a word of runs, draws are
+        those of the first.
     block, purpose : str
     """
 
-    def __init__(self, seed: int, block: str, purpose: str) -> None:
-        key = key_of(seed, block, purpose)
-        self._key = (key & 0xFFFFFFFF, key >> 32)
+    def __init__(self, seed: int | Sequence[int], block: str, purpose: str) -> None:
+        seeds = [seed] if isinstance(seed, int) else seed
+        keys = [key_of(one, block, purpose) for one in seeds]
+        self._keys = np.array(keys, dtype=np.uint64)
+        self._key: tuple[Any, Any] = (keys[0] & 0xFFFFFFFF, keys[0] >> 32)
         self._round_keys = [
             ((self._key[0] + first) & _LOW, (self._key[1] + second) & _LOW)
             for first, second in _BUMPS
         ]
 
-    def of_rows(self, replica: IntArray) -> "Stream":
-        """Return the draws of rows of these replicas, whose scan numbers do not say which.
-
-        Where many run in lock step; in a run by itself they are those of this stream.
-        """
-        return self
-
-    def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
-        """Return the generator's key, and the scan numbers that count."""
-        return self._key, scans
+    def of_runs(self, run: IntArray) -> "Stream":
+        """Return the draws of rows of these runs (`Wake.run`), each with its own run's seed."""
+        return self if len(self._keys) == 1 else _RunStream(self._keys[run])
 
     def _words(
         self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int
@@ -121,7 +118,7 @@ class Stream:
         if not 0 <= draw < 2**16:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
         target = np.asarray(targets, dtype=np.uint64)
-        key, numbers = self._key_and_scan(np.asarray(scans, dtype=np.int64))
+        key, numbers = self._key, np.asarray(scans, dtype=np.int64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
         few = target.shape == numbers.shape and 0 < target.size <= _FEW and target.ndim == 1
         if few and isinstance(key[0], int):
@@ -184,6 +181,13 @@ class Stream:
         return radius * np.cos(angle), radius * np.sin(angle), third
 
 
+class _RunStream(Stream):
+    """The draws of rows whose keys are known; their shape is that of targets or scans."""
+
+    def __init__(self, keys: UInt64Array) -> None:
+        self._key = (keys & _U_LOW, keys >> _U32)
+
+
 def _radius(word: UInt64Array) -> FloatArray:
     """Return Box and Muller's radius from 32 bits; 1 is added, so that the logarithm is finite."""
     radius: FloatArray = np.sqrt(-2.0 * np.log((word + 1.0) * 2.0**-32))
@@ -191,14 +195,24 @@ def _radius(word: UInt64Array) -> FloatArray:
 
 
 class Streams:
-    """All draws of one run, by block and purpose."""
+    """All draws of a run, or of several runs, by block and purpose.
 
-    def __init__(self, seed: int) -> None:
-        self.seed = seed
+    Parameters
+    ----------
+    seed : int or sequence of int
+        As for `Stream`.
+    """
+
+    def __init__(self, seed: int | Sequence[int]) -> None:
+        self.seed = seed if isinstance(seed, int) else seed[0]
+        self._seeds = (seed,) if isinstance(seed, int) else tuple(seed)
+        self._made: dict[tuple[str, str], Stream] = {}
 
     def stream(self, block: str, purpose: str) -> Stream:
         """Return the stream of a block's purpose."""
-        return Stream(self.seed, block, purpose)
+        if (block, purpose) not in self._made:
+            self._made[block, purpose] = Stream(self._seeds, block, purpose)
+        return self._made[block, purpose]
 
     def scan_normals(self, block: str, purpose: str) -> Callable[[IntArray], FloatArray]:
         """Return a function from scan numbers to standard normal draws (for clock jitter)."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.time.timeline import ReplicaTime
 
@@ -29,19 +30,17 @@ class RunEnds:
         self.early = False
         self.by: dict[int, str] = {}
 
-    def note(self, ticks: IntArray, block: str) -> None:
-        """Take note that a block ends runs at some instants of the timeline; the first counts."""
-        replicas, own = self._split(ticks)
-        for replica, tick in zip(replicas.tolist(), own.tolist(), strict=True):
+    def note(self, ends: RunTicks, block: str) -> None:
+        """Take note that a block ends runs at some instants; the first counts."""
+        for replica, tick in zip(ends.run.tolist(), ends.tick.tolist(), strict=True):
             if tick < self.ticks[replica]:
                 self.ticks[replica] = tick
                 self.by[replica] = block
                 self.early = True
 
-    def before(self, ticks: IntArray) -> BoolArray:
-        """Return which instants of the timeline lie before the ends of their runs."""
-        replicas, own = self._split(ticks)
-        return np.less(own, self.ticks[replicas])
+    def before(self, instants: RunTicks) -> BoolArray:
+        """Return which instants lie before the ends of their runs."""
+        return np.less(instants.tick, self.ticks[instants.run])
 
     def running(self, replicas: IntArray) -> int:
         """Return how many of some replicas are not known to end early."""
@@ -53,13 +52,6 @@ class RunEnds:
         return self.early and bool((self.ticks[runs.start : runs.stop] <= tick).all())
 
     def cut(self, end: int) -> int:
-        """Return the end of a window, or that of a run by itself if it comes first."""
-        return min(end, int(self.ticks[0])) if self.early and not self._time.span_ticks else end
-
-    def _split(self, ticks: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the replica of each instant, and the tick within it."""
-        span = self._time.span_ticks
-        if not span:
-            return np.zeros(len(ticks), dtype=np.int64), ticks
-        replicas = ticks // span
-        return replicas, ticks - replicas * span
+        """Return the end of a window, or that of the run that goes alone if it comes first."""
+        runs = self._time.runs
+        return min(end, int(self.ticks[runs.start])) if self.early and len(runs) == 1 else end

@@ -12,6 +12,7 @@ from components.alerting.believed_tracks import EstimatedFlights
 from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.memory import LevelMemory, MemoryRule
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, TENTATIVE, StateTracks
+from dsa_des.arrays.run_ticks import RunTicks
 
 SIGMA_M = 25.0
 #: A short lookahead, over which an error of a vertical speed does not grow far.
@@ -116,17 +117,21 @@ def tracks(number, status=CONFIRMED, **values):
     return made
 
 
+def at(*ticks, run=0):
+    return RunTicks.of_run(run, np.array(ticks))
+
+
 def test_an_estimate_is_carried_on_with_its_covariance():
     flights = EstimatedFlights()
-    flights.add(np.array([40]), tracks(7))
-    flights.add(np.array([41, 42]), two(tracks(8, TENTATIVE), tracks(9, COASTED)))
+    flights.add(at(40), tracks(7))
+    flights.add(at(41, 42), two(tracks(8, TENTATIVE), tracks(9, COASTED)))
     own = crooked.OWNSHIP
     place = np.array([*np.radians([own["lat_deg"], own["lon_deg"]]), own["alt_m"]])
     # Before it came, when it did, and when a tentative one has come, which counts for nothing; one
     # that is carried on without looks counts.
-    now = np.array([39, 40, 41, 42])
+    now = at(39, 40, 41, 42)
     instant, number, state, wrong = flights.states(
-        now, np.full(4, 5.0), np.zeros(4, dtype=int), np.stack([place] * 4, axis=1)
+        now, np.full(4, 5.0), np.stack([place] * 4, axis=1)
     )
     assert (instant.tolist(), number.tolist()) == ([1, 3], [7, 9])
     # 2 s later; the sphere's plane is up to half a percent off, and the frame's down 0.1 m.
@@ -140,16 +145,15 @@ def test_an_estimate_is_carried_on_with_its_covariance():
 
 def test_what_came_in_another_run_is_not_known():
     flights = EstimatedFlights()
-    flights.add(np.array([2000, 2005]), two(tracks(3), tracks(4)))
+    flights.add(at(0, 5, run=2), two(tracks(3), tracks(4)))
     both = two(tracks(9), tracks(2))
     both.tick, both.offsets = both.tick[:1], np.array([0, 2])
-    flights.add(np.array([1001, 2003]), two(tracks(1), both))
-    begins = np.array([1000, 1000, 2000, 2000, 3000])
-    now = np.add(begins, [0, 7, 1, 4, 9])
-    instant, number, _, _ = flights.states(now, np.full(5, 4.0), begins, np.zeros((3, 5)))
+    flights.add(RunTicks(np.array([1, 2]), np.array([1, 3])), two(tracks(1), both))
+    now = RunTicks(np.array([1, 1, 2, 2, 3]), np.array([0, 7, 1, 4, 9]))
+    instant, number, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 2, 3, 3], [1, 3, 2, 9])
     flights.keep(np.array([True, False, True, True]))
-    instant, number, _, _ = flights.states(now, np.full(5, 4.0), begins, np.zeros((3, 5)))
+    instant, number, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 3, 3], [1, 2, 9])
 
 

@@ -16,6 +16,7 @@ from components.alerting.daidalus import DaidalusAlerting
 from components.messages.state_tracks import COVARIANCE
 from components.well_clear.detection import Bounds, uncertain_violation_span
 from components.well_clear.volume import Volume
+from dsa_des.arrays.run_ticks import RunTicks
 
 #: No two scores are alike, and a part of the velocity's counts at the distance of the targets.
 SCORES = """\
@@ -288,10 +289,10 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     velocity = pymap3d.enu2uvw(0.0, 80.0, 0.0, there[0], there[1])
     east, north, up = pymap3d.uvw2enu(*velocity, own["lat_deg"], own["lon_deg"])
     flights = EstimatedFlights()
-    flights.add(np.array([1]), tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
-                                      east_m_s=east, down_m_s=-up))  # fmt: skip
-    now, begin = np.array([1]), np.array([0])
-    _, _, state, _ = flights.states(now, np.array([3.0]), begin, place[:, np.newaxis])
+    now = RunTicks.of_run(0, np.array([1]))
+    flights.add(now, tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
+                            east_m_s=east, down_m_s=-up))  # fmt: skip
+    _, _, state, _ = flights.states(now, np.array([3.0]), place[:, np.newaxis])
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)

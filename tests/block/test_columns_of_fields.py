@@ -39,7 +39,8 @@ COLUMNS = {
     "range_rate_variance_m2_s2",
     "tracks": "target age_s updated_by measured_s azimuth_rad elevation_rad range_m",
     "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps speed_mps acceleration_mps2 "
-    "vertical_speed_mps vertical_acceleration_mps2 bank_rad roll_rate_rad_s",
+    "vertical_speed_mps vertical_acceleration_mps2 bank_rad roll_rate_rad_s "
+    "heading_rad eases_rad",
 }
 KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared", "cued"]}
 TEXTS = ["target", "sensors", "angle_source", "range_source", "updated_by"]

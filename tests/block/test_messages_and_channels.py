@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message, Text
 from dsa_des.running.channel import Channel
 
@@ -100,17 +101,21 @@ def beats(ticks, start=0):
     return blocks.beat(ticks, start + np.arange(len(ticks)))
 
 
+def at(ticks):
+    return RunTicks.of_run(0, np.array(ticks))
+
+
 def test_a_channel_hands_each_row_over_once_and_not_before_it_arrives():
     channel = Channel("radar")
     channel.push(beats([0, 10, 20, 30]))
     channel.push(beats([40], start=4))
-    ticks, message = channel.collect(20)
-    assert ticks.tolist() == [0, 10] and message.value.tolist() == [0, 1]
+    came, message = channel.collect(20)
+    assert came.tick.tolist() == [0, 10] and message.value.tolist() == [0, 1]
     assert channel.collect(20) is None
-    assert channel.next_arrivals(41).tolist() == [20, 30, 40]
-    ticks, message = channel.collect(41)
-    assert ticks.tolist() == [20, 30, 40] and message.value.tolist() == [2, 3, 4]
-    assert channel.next_arrivals(10**6).tolist() == []
+    assert channel.next_arrivals(41).tick.tolist() == [20, 30, 40]
+    came, message = channel.collect(41)
+    assert came.tick.tolist() == [20, 30, 40] and message.value.tolist() == [2, 3, 4]
+    assert channel.next_arrivals(10**6).tick.tolist() == []
 
 
 def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
@@ -121,28 +126,28 @@ def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
         whole.push(part)
         channel.forget(25)
     assert len(channel.state()[0]) == 2  # that of 0 and 10 is gone
-    asked = np.array([25, 35, 40])
+    asked = at([25, 35, 40])
     (got, rows), (expected, places) = channel.sample(asked, 50), whole.sample(asked, 50)
     assert got.tick[rows].tolist() == expected.tick[places].tolist() == [21, 30, 40]
 
 
 def test_a_delay_moves_the_arrival_and_not_what_the_row_speaks_of():
     channel = Channel("radar", delay_ticks=7)
-    assert channel.push(beats([0, 10])).tolist() == [7, 17]
+    assert channel.push(beats([0, 10])).tick.tolist() == [7, 17]
     assert channel.collect(7) is None
-    ticks, message = channel.collect(8)
-    assert ticks.tolist() == [7] and message.tick.tolist() == [0]
+    came, message = channel.collect(8)
+    assert came.tick.tolist() == [7] and message.tick.tolist() == [0]
 
 
 def test_sampling_holds_the_last_arrived_row():
     channel = Channel("radar", delay_ticks=5)
-    asked = np.array([0, 4, 5, 6, 14, 15, 100])
+    asked = at([0, 4, 5, 6, 14, 15, 100])
     assert channel.sample(asked, 101) is None
     channel.push(beats([0, 10]))
     message, rows = channel.sample(asked, 101)
     held = [None if row < 0 else message.value[row] for row in rows]
     assert held == [None, None, 0, 0, 0, 1, 1]
-    message, rows = channel.sample(np.array([200, 201]), 202)
+    message, rows = channel.sample(at([200, 201]), 202)
     assert message.value[rows].tolist() == [1, 1]
 
 
@@ -150,7 +155,7 @@ def test_what_a_channel_holds_before_the_first_row():
     channel = Channel("radar")
     channel.hold(beats([0], start=9), 0)
     channel.push(beats([10]))
-    message, rows = channel.sample(np.array([0, 9, 10]), 11)
+    message, rows = channel.sample(at([0, 9, 10]), 11)
     assert message.value[rows].tolist() == [9, 9, 0]
 
 
@@ -172,7 +177,7 @@ def test_sampling_in_windows_equals_looking_back_over_a_list(sent, batches, dela
     for a, b in itertools.pairwise(bounds):
         ticks = np.array([t for t in asked if a <= t < b], dtype=np.int64)
         if len(ticks):
-            sample = channel.sample(ticks, b)
+            sample = channel.sample(at(ticks), b)
             rows = np.full(len(ticks), -1) if sample is None else sample[1]
             found += [None if r < 0 else sample[0].value[r] for r in rows]
     expected = []

@@ -8,8 +8,12 @@ import pytest
 from components.radar.swerling import SwerlingRadar
 from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
+from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.block.component import Component, Input
+from dsa_des.errors import BlockFailure
 from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"
@@ -109,6 +113,56 @@ def test_state_of_an_ordinary_block_stays_with_its_replica(
     scenes = [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
     simulation = lock.same_as_alone(scenes, window=window)
     assert list(simulation.timeline.split) == [block]
+
+
+class CountingByRun(TrackerStub):
+    """Forgets every track but each third of its run."""
+
+    lockstep = True
+
+    def setup(self):
+        super().setup()
+        self.seen = {}
+
+    def run(self, wake):
+        tracks, kept = super().run(wake), []
+        for row, run in enumerate([] if tracks is None else tracks.run.tolist()):
+            self.seen[run] = self.seen.get(run, 0) + 1
+            kept += [row] if self.seen[run] % 3 == 0 else []
+        return tracks.take(np.array(kept)) if kept else None
+
+
+class Unsaid(CountingByRun):
+    """Takes rows of its own, and does not say of which runs they are."""
+
+    lockstep = True
+
+    def run(self, wake):
+        tracks = super().run(wake)
+        return None if tracks is None else tracks.of_runs(no_runs(len(tracks)))
+
+
+def with_tracker(tmp_path, kind):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        f'extends = "{Path(FIRST_LIGHT).resolve()}"\n'
+        f'blocks.tracker.type = "{__name__}:{kind.__name__}"\n'
+    )
+    scene = load_scene(path, sets=SOUTH, duration_s="12")
+    return [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
+
+
+@pytest.mark.parametrize("window", [None, 90])
+def test_one_that_serves_all_keeps_what_it_remembers_by_run(lock, tmp_path, window):
+    simulation = lock.same_as_alone(with_tracker(tmp_path, CountingByRun), window=window)
+    assert not simulation.timeline.split
+
+
+def test_one_that_serves_all_says_of_which_run_its_rows_are(tmp_path):
+    scenes = with_tracker(tmp_path, Unsaid)
+    Simulation(scenes[0]).run()
+    with pytest.raises(BlockFailure, match=r"tracker.*must say of which run each is"):
+        lock_step(scenes).run()
 
 
 def test_a_subclass_says_for_itself_that_it_serves_all_replicas():

@@ -13,11 +13,9 @@ from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
-from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
-from dsa_des.time.timeline import first_scan
 
 FIRST_LIGHT = "configs/first_light.toml"
 OFFSETS = (
@@ -232,10 +230,11 @@ def test_a_bad_replica_leaves_the_others_alone():
 
 def test_each_replica_draws_with_its_own_seed():
     seeds = [5, 6, 7]
-    stream = ReplicaStreams(seeds).stream("radar", "detection")
+    stream = Streams(seeds).stream("radar", "detection")
     scans = np.arange(10)
     for number, seed in enumerate(seeds):
         own = Streams(seed).stream("radar", "detection")
-        for draw in (stream.uniform, stream.normal):
-            got = draw(np.uint64(9), scans + first_scan(number), 3)
+        mine = stream.of_runs(np.full(10, number))
+        for draw in (mine.uniform, mine.normal):
+            got = draw(np.uint64(9), scans, 3)
             assert np.array_equal(got, getattr(own, draw.__name__)(np.uint64(9), scans, 3))

@@ -9,6 +9,7 @@ import pytest
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.memory import LevelMemory, MemoryRule
 from components.tracking.stub import TrackerStub
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
@@ -46,11 +47,12 @@ def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
     tracks = BelievedTracks()
     here, there = [0.0, 0.0, 0.0], [500.0, 0.0, 0.0]
     tracks.add_truth(
-        np.array([10, 20, 30]),
+        RunTicks.of_run(0, np.array([10, 20, 30])),
         np.array([1.0, 2.0, 3.0]),
         np.array([[here, there], [there, here], [here, there]]),
     )  # fmt: skip
-    named = tracks._nearest(np.array([10, 15, 20, 29, 30]), np.full((5, 3), 10.0))
+    now = RunTicks.of_run(0, np.array([10, 15, 20, 29, 30]))
+    named = tracks._nearest(now, np.full((5, 3), 10.0))
     assert named.tolist() == [0, 0, 1, 1, 0]
 
 

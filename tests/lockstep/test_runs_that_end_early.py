@@ -95,7 +95,7 @@ def test_what_has_ended_runs_no_more(tmp_path):
     class Watching:
         @staticmethod
         def run(wake):
-            seen.extend(zip(wake.replica.tolist(), wake.time_s.tolist(), strict=True))
+            seen.extend(zip(wake.run.tolist(), wake.time_s.tolist(), strict=True))
             return runner.run(wake)
 
     node.runner = Watching

@@ -127,16 +127,16 @@ def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
 
 def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
     """Rows of an optional input: -1 stays -1, and no row of another replica slips in."""
-    ticks = np.array([3, 5, 1003, 1005], dtype=np.int64)
-    message = Message(np.array([2, 1004], dtype=np.int64))
+    ticks, run = np.array([3, 5, 3, 5], dtype=np.int64), np.array([0, 0, 1, 1])
+    message = Message(np.array([2, 4], dtype=np.int64), run=np.array([0, 1]))
     held = {"cue": (message, np.array([0, 0, -1, 1]))}
-    wake = Wake(ticks, np.full(4, -1), 1, held, {}, None, 1000)
+    wake = Wake(ticks, np.full(4, -1), 1, held, {}, None, run)
     of_first, rows = _part(wake, slice(0, 2), 0).held("cue")
     assert of_first.tick.tolist() == [2] and rows.tolist() == [0, 0]
     of_second, rows = _part(wake, slice(2, 4), 1).held("cue")
     assert of_second.tick.tolist() == [4] and rows.tolist() == [-1, 0]
     nothing = Wake(
-        ticks[2:3], np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {}, None, 1000
+        ticks[2:3], np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {}, None, run[2:3]
     )
     assert _part(nothing, slice(0, 1), 1).held("cue") is None
 

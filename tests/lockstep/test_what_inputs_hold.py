@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
-from dsa_des.replicas.channel import ReplicaChannel
+from dsa_des.running.channel import Channel
 from dsa_des.running.windows import EqualWindows
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
@@ -14,26 +15,27 @@ RUN_TICKS = 60
 
 def as_held(time, ends, sent, asked, longest, together=None):
     """Whether every replica holds at each tick that it asks about what came there last."""
-    channel = ReplicaChannel("source", 0, None, time, ends)
+    channel = Channel("source", 0, None, time, ends)
     windows = EqualWindows(time, longest, together)
-    span, told = time.span_ticks, 0
+    told = 0
 
-    def line(ticks, start, end):
-        inside = [k * span + t for k in time.runs for t in ticks[k] if start <= t < end]
-        return np.array(inside, dtype=np.int64)
+    def inside(ticks, start, end):
+        found = [(k, t) for k in time.runs for t in ticks[k] if start <= t < end]
+        return RunTicks(*np.array(found, dtype=np.int64).reshape(-1, 2).T)
 
     while (window := windows.next()) is not None:
         start, end = window[:2]
-        new, ticks = line(sent, start, end), line(asked, start, end)
+        new, now = inside(sent, start, end), inside(asked, start, end)
         if len(new):
-            channel.push(Message(new))
-        found = channel.sample(ticks, end) if len(ticks) else None
-        rows = np.full(len(ticks), -1) if found is None else found[1]
-        for tick, row in zip(ticks.tolist(), rows.tolist(), strict=True):
-            replica, own = divmod(tick, span)
-            came = [t for t in sent[replica] if t <= own]
-            got = None if found is None or row < 0 else int(found[0].tick[row]) - replica * span
-            assert got == (max(came) if came else None), (replica, own)
+            channel.push(Message(new.tick, run=new.run))
+        found = channel.sample(now, end) if len(now) else None
+        rows = np.full(len(now), -1) if found is None else found[1]
+        for run, tick, row in zip(now.run, now.tick, rows, strict=True):
+            came = [(run, t) for t in sent[run] if t <= tick]
+            got = None
+            if found is not None and row >= 0:
+                got = int(found[0].run[row]), int(found[0].tick[row])
+            assert got == (max(came) if came else None), (run, tick)
             told += got is not None
         windows.heard(window, None)
     return told
@@ -42,10 +44,10 @@ def as_held(time, ends, sent, asked, longest, together=None):
 @pytest.mark.parametrize("ended", [(), (2,), (0, 2)])
 def test_what_came_long_ago_is_held_beside_a_replica_that_is_told_all_the_time(ended):
     """The first asks at the instants at which it is told, for longer than rows pile up."""
-    time = ReplicaTime.of_replicas(4, RUN_TICKS)
+    time = ReplicaTime(4, RUN_TICKS)
     ends = RunEnds(time)
     for replica in ended:
-        ends.note(np.array([replica * time.span_ticks + 40]), "over")
+        ends.note(RunTicks.of_run(replica, np.array([40])), "over")
     last = [40 if replica in ended else RUN_TICKS for replica in range(4)]
     sent = [range(last[0]), [3], [0, 5], [2, 30]]
     asked = [range(last[0]), [50, 58], [5], [30, 55]]
@@ -55,6 +57,6 @@ def test_what_came_long_ago_is_held_beside_a_replica_that_is_told_all_the_time(e
 @pytest.mark.parametrize("step", [1, 7, 64, 300])
 def test_what_came_at_the_very_start_is_held_to_the_end_of_its_run(step):
     """One replica runs after the other, or some at a time."""
-    time = ReplicaTime.of_replicas(3, RUN_TICKS)
+    time = ReplicaTime(3, RUN_TICKS)
     sent, asked = [[0], [4], [0, 20]], [range(0, RUN_TICKS, 3)] * 3
     assert as_held(time, RunEnds(time), sent, asked, step) == 20 + 18 + 20

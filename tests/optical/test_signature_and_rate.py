@@ -113,7 +113,7 @@ def test_each_replica_s_targets_are_compared_with_their_own_look_before():
         row, target = np.nonzero(rng.uniform(size=(len(replica), 4)) < 0.7)
         azimuth, elevation = rng.uniform(-3, 3, len(row)), rng.uniform(-1, 1, len(row))
         cells = SimpleNamespace(
-            replica_of_scan=replica, roster=range(4), row=row, target=target, scan_ticks=tick,
+            run_of_scan=replica, roster=range(4), row=row, target=target, scan_ticks=tick,
             azimuth_rad=azimuth, elevation_rad=elevation,
         )  # fmt: skip
         wanted = []

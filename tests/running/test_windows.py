@@ -40,7 +40,7 @@ def test_equal_windows_cover_a_run_once(longest, expected):
 
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
 def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
-    time, ran, count = ReplicaTime.of_replicas(4, 10), [], 0
+    time, ran, count = ReplicaTime(4, 10), [], 0
     windows = EqualWindows(time, longest)
     while (window := windows.next()) is not None:
         ran += [(run, tick) for tick in range(*window[:2]) for run in time.runs]
@@ -52,7 +52,7 @@ def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
 
 
 def test_windows_of_runs_together_come_back_to_each_of_them():
-    time = ReplicaTime.of_replicas(4, 10)
+    time = ReplicaTime(4, 10)
     windows = EqualWindows(time, 4, together=3)
     found = []
     while (window := windows.next()) is not None:
@@ -63,12 +63,11 @@ def test_windows_of_runs_together_come_back_to_each_of_them():
 
 
 def test_rows_are_final_up_to_where_all_runs_have_come():
-    time = ReplicaTime.of_replicas(9, 10)
-    span = time.span_ticks
-    assert time.final_before(range(2, 5), 7) == 2 * span
-    assert time.final_before(range(2, 5), 10) == 5 * span
-    assert time.final_before(range(2, 3), 7) == 2 * span + 7
-    assert ReplicaTime(1, 10).final_before(range(1), 7) == 7
+    time = ReplicaTime(9, 10)
+    assert time.final_before(range(2, 5), 7) == (2, 0)
+    assert time.final_before(range(2, 5), 10) == (5, 0)
+    assert time.final_before(range(2, 3), 7) == (2, 7)
+    assert ReplicaTime(1, 10).final_before(range(1), 7) == (0, 7)
 
 
 def a_loop(lab, end, back):

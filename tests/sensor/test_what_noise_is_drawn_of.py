@@ -80,7 +80,7 @@ def places(first, second, apart_s=0.5, angle_variance=(0.0, 0.0), range_variance
     """Two detections at (angle rad, range m) in two scans."""
     angles = np.array([first[0], second[0]])
     return SeenPlaces(
-        np.array([3, 4]), np.array([1.0, 1.0 + apart_s]),
+        np.zeros(2, dtype=int), np.array([3, 4]), np.array([1.0, 1.0 + apart_s]),
         np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1),
         np.array([first[1], second[1]]), np.array(angle_variance), np.array(range_variance),
     )  # fmt: skip

@@ -115,11 +115,13 @@ def test_the_noise_of_a_late_instant_is_its_own():
     from dsa_des.time.randomness import Streams
 
     context = Context(Streams(1), sections={"navigation": Navigation(position_noise_m=(0, 0, 9))})
-    believed = NavigationErrors().build(SimpleNamespace(context=context, span_ticks=0))
+    believed = NavigationErrors().build(SimpleNamespace(context=context))
     ticks = np.array([7, 7 + 2**48, 7 + 2**50, 7])
     zeros = np.zeros(4)
     names = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
-    states = SimpleNamespace(tick=ticks, **{f"own_{name}": zeros for name in names})
+    states = SimpleNamespace(
+        tick=ticks, run=np.zeros(4, int), **{f"own_{name}": zeros for name in names}
+    )
     alt = believed(states)["alt_m"]
     assert alt[0] == alt[3] and len(set(alt.tolist())) == 3
 

@@ -6,7 +6,6 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.time.gauss_markov import LONGEST_S, MOST_PROCESSES, GaussMarkov
 from dsa_des.time.randomness import Stream, target_keys
 
@@ -123,7 +122,7 @@ def test_targets_processes_streams_and_seeds_are_independent():
 
 def test_replicas_in_lock_step_draw_as_each_by_itself():
     seeds = [5, 9, 12]
-    together = GaussMarkov(ReplicaStreams(seeds).stream("radar", "errors"), 0.7)
+    together = GaussMarkov(Stream(seeds, "radar", "errors"), 0.7)
     replica = np.repeat(np.arange(3), 40)
     instants = np.tile(np.arange(40) * 10**14, 3)
     values = together(np.uint64(8), instants, 2, replica).reshape(3, 40)

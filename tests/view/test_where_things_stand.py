@@ -209,6 +209,19 @@ def test_a_recorded_encounter_shows_the_two_minutes_before_its_closest_approach(
     page.close()
 
 
+@pytest.mark.parametrize("width", [1280, 390])
+def test_what_is_pressed_is_large_enough_for_a_finger(browser, tmp_path, width):
+    """WCAG 2.2 AA, 2.5.8: 24 by 24 pixels; and nothing is wider than the page."""
+    page, _ = opened_page(browser, shown(recorded(tmp_path, NEAR)), width)
+    pressed = page.locator("button:visible, select:visible, input:visible").all()
+    assert len(pressed) > 10
+    for one in pressed:
+        box = one.bounding_box()
+        assert min(box["width"], box["height"]) >= 24, one.evaluate("e => e.outerHTML")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.close()
+
+
 def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     one = recorded(tmp_path, NEAR, "one")
     longer = NEAR.replace("duration_s = 6", "duration_s = 9").replace(
@@ -216,7 +229,7 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     )
     other = recorded(tmp_path, longer.replace("title = '''t'''", "title = '''<b>'''"), "other")
     page, wrong = opened_page(browser, shown(one, other), hash="#t=2.5")
-    assert page.title() == "one: t | other: <b>"
+    assert page.title() == page.locator("main h1").inner_text() == "one: t | other: <b>"
     left, right = (frame for frame in page.frames if frame.parent_frame)
     titles = [frame.locator("h1").inner_text() for frame in (left, right)]
     assert titles == ["one: t", "other: <b>"]

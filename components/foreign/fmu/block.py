@@ -17,6 +17,7 @@ from components.messages.detections import Detections
 from components.messages.reach import Reach, farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.message import Message
@@ -183,7 +184,7 @@ class ForeignFmu(Component):
         answer = self._process.ask(
             {
                 "do": "run", "instance": self._number, "slot": self._saved.slot, "freed": freed,
-                "ticks": wake.own_ticks(wake.ticks)[own].tolist(), "per_s": wake.ticks_per_s,
+                "ticks": wake.ticks[own].tolist(), "per_s": wake.ticks_per_s,
                 "inputs": rows, "changed": changed.tolist(), "due": [due[row] for row in own],
                 "save": type(self).rewindable,
             },
@@ -212,7 +213,7 @@ class ForeignFmu(Component):
 
     def _due(self, wake: Wake) -> list[list[int]]:
         """Return the clocks that tick at each row."""
-        per_s, ticks = wake.ticks_per_s, wake.own_ticks(wake.ticks)
+        per_s, ticks = wake.ticks_per_s, wake.ticks
         due: list[list[int]] = [[] for _ in ticks]
         for number, clock in enumerate(self.p.model.clocks.values()):
             given = self.p.clocks.get(clock.name)
@@ -321,7 +322,7 @@ class ForeignFmu(Component):
         self._told = told[-1].copy()
         names = list(self.p.manoeuvre)
         return Manoeuvres.at_rows(
-            ticks,
+            RunTicks.of_run(0, ticks),
             {
                 row: Manoeuvre(**dict(zip(names, told[row].tolist(), strict=True)))
                 for row in new.tolist()

@@ -66,7 +66,7 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
         found[: len(POSE)] = [message.believed[name] for name in _STATE_OF_OWN]
     if moves:
         state: IntArray = message.tick if message.state_tick is None else message.state_tick
-        time_s = wake.own_ticks(state) / wake.ticks_per_s
+        time_s = state / wake.ticks_per_s
         found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
     return found
 

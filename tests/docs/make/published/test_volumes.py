@@ -1,0 +1,86 @@
+"""The section of volumes: which encounters violate one, against times looked at one by one."""
+
+import math
+
+import numpy as np
+import pytest
+
+from components.encounters.model_file import read_model
+from components.encounters.pair_densities import PairingRules
+from components.encounters.pairing import PairSampler
+from docs.make.published.volumes import (
+    EVEN,
+    GAS,
+    MODELS,
+    UNCREWED,
+    VOLUMES,
+    gas_share,
+    sampled,
+    uncrewed_at,
+)
+
+CREWED = MODELS / "light_aircraft.txt"
+COUNT = 300
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    sampler = PairSampler(read_model(UNCREWED), read_model(CREWED), 0, PairingRules())
+    return sampler.pairs(range(COUNT))
+
+
+def looked_at(pairs, radius_ft, half_ft, factor):
+    """Which pairs are inside at one of 20 times a second, of a cylinder so much larger."""
+    found = np.zeros(COUNT, dtype=bool)
+    for part in np.arange(20) / 20.0:
+        north, east, up = (
+            (1.0 - part) * apart[:-1] + part * apart[1:]
+            for apart in (getattr(pairs, f"{a}_ft")[1] - getattr(pairs, f"{a}_ft")[0]
+                          for a in ("north", "east", "up"))
+        )  # fmt: skip
+        inside = (np.hypot(north, east) < factor * radius_ft) & (np.abs(up) < factor * half_ft)
+        found |= inside.any(axis=0)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "radius_ft", "half_ft"), [("nmac", 500.0, 100.0), ("2000 ft by 250 ft", 2000.0, 250.0)]
+)
+def test_who_violates_a_cylinder_is_inside_at_some_time(pairs, name, radius_ft, half_ft):
+    found = sampled(UNCREWED, CREWED, COUNT, {name: VOLUMES[name]}).violated[name]
+    inside, nearly = (looked_at(pairs, radius_ft, half_ft, factor) for factor in (0.98, 1.02))
+    assert inside.sum() > 3 and nearly.sum() < COUNT
+    assert not (inside & ~found).any() and not (found & ~nearly).any()
+
+
+def test_the_share_is_of_weights_and_larger_volumes_hold_smaller_ones():
+    found = sampled(UNCREWED, CREWED, COUNT, VOLUMES)
+    nmac, lost = found.violated["nmac"], found.violated["2000 ft by 250 ft"]
+    assert not (nmac & ~lost).any()
+    share = found.share("nmac", "2000 ft by 250 ft")
+    assert share.ratio == pytest.approx(found.weight[nmac].sum() / found.weight[lost].sum())
+    assert share.interval[0] < 0.1 < share.interval[1]
+
+
+def test_the_uncrewed_aircraft_flies_straight_and_level_at_its_speeds(tmp_path, pairs):
+    speed_kt = pairs.speed_ft_s[0] / 1.687810
+    assert speed_kt.min() >= 30.0 and speed_kt.max() <= 60.0
+    assert np.ptp(speed_kt, axis=0).max() < 1e-9
+    assert np.ptp(pairs.up_ft[0], axis=0).max() == np.ptp(pairs.heading_rad[0], axis=0).max() == 0.0
+    fast = PairSampler(read_model(uncrewed_at(tmp_path, "80 120")), read_model(CREWED), 0, EVEN)
+    some = fast.pairs(range(20))
+    assert some.speed_ft_s[0].min() / 1.687810 >= 80.0
+    # Drawn alike, weights differ by the speeds of the two alone.
+    assert some.weight.max() / some.weight.min() < 4.0
+
+
+def test_a_gas_flows_into_both_volumes():
+    for radius_nmi, published in GAS.items():
+        radius_ft = radius_nmi * 6076.115
+        level = gas_share(radius_ft, 300.0, 0.0)
+        assert level == pytest.approx(500.0 * 100.0 / (radius_ft * 1000.0))
+        assert level == pytest.approx(published, abs=5.1e-4)
+    # Into lids alone by their areas.
+    assert gas_share(1000.0, 0.0, 5.0) == pytest.approx(0.25)
+    assert math.isclose(gas_share(500.0, 200.0, 5.0) * (4e8 + math.pi * 1.25e6),
+                        4e7 + math.pi * 1.25e6)  # fmt: skip
