@@ -330,10 +330,12 @@ def draw_series(
     title: str,
     confidence: float,
     freedom: float | None,
+    limits: Sequence[float] = (),
 ) -> None:
     """Draw the means of a series with their intervals, one line for each place of the axes.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
+    `limits` are one for all, or one for each number of the series.
     """
     name, _, along = metric.partition(".")
     with drawing(_WIDE_IN, 4.2, path) as figure:
@@ -346,11 +348,17 @@ def draw_series(
                 np.array([getattr(line.estimate, part) for line in lines])
                 for part in ("value", "low", "high")
             )
-            label = series_label or f"mean of the runs, {100 * confidence:g} % interval"
+            of = lines[0].result.quantile
+            what = "mean of the runs" if of is None else f"{100 * of:g} % quantile"
+            label = series_label or f"{what}, {100 * confidence:g} % interval"
             drawn = axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label,
                               zorder=2)  # fmt: skip
             drawn.append(axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2))
             _dodge(axes, drawn, place, len(series))
+        if limits and series:
+            x = series[0][1]
+            known = list(limits) if len(limits) == len(x) else [limits[0]] * len(x)
+            axes.plot(x, known, color="#000000", ls="--", lw=1.2, label="limit", zorder=1)
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel(axis_label(along) if along else "")
         axes.set_ylabel(readable(name))

@@ -77,7 +77,8 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return _draw_spread(target, tables, figure, title)
     if figure.kind == "series":
         series = _series_of(tables, metric)
-        draw_series(target, series, metric, title, confidence, figure.freedom)
+        draw_series(target, series, metric, title, confidence, figure.freedom,
+                    figure.limits)  # fmt: skip
         return True
     if not axes:
         return False
