@@ -288,6 +288,16 @@ def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str,
         values[key] = value
         if unit:
             units[key] = unit
+    if values["daidalus_version"] == "2.0.1":
+        # It has no such key: its horizons count from now.
+        key = "bands_add_time_to_maneuver"
+        if key in lines and not values[key]:
+            problems.add(
+                f"{key} is false and daidalus_version is 2.0.1, whose horizons count from now: "
+                "leave one of them out",
+                line=lines[key][0],
+            )
+        values[key] = True
     return values, units
 
 

@@ -95,7 +95,11 @@ KEYS: Mapping[str, tuple[str, object, str]] = {
     "dta_radius": ("length", 0.0, "nmi"),
     "dta_height": ("length", 0.0, "ft"),
     "dta_alerter": ("count", 0, ""),
+    "daidalus_version": ("version", "2.0.4", ""),
 }
+
+#: Releases whose rules may be taken, the default last: they differ in guidance only.
+VERSIONS = ("2.0.1", "2.0.4")
 
 #: Keys that only their default may be given for, since what they switch on is not there.
 ONLY_OFF = ("conflict_crit", "recovery_crit", "hdir_bands_below_min_as", "dta_logic")
@@ -159,6 +163,13 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
         return plain, ""
     if kind == "region":
         return _region(plain), ""
+    if kind == "version":
+        if plain not in VERSIONS:
+            close = nearest(plain, VERSIONS)
+            hint = f"; did you mean {close}?" if close else ""
+            allowed = " or ".join(VERSIONS)
+            raise BadValue(f"is {shortened(plain, 40)!r}: it must be {allowed}{hint}")
+        return plain, ""
     if kind == "yes or no":
         found = {**_YES, **_NO}.get(plain.lower())
         if found is None:

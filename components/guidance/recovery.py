@@ -67,6 +67,12 @@ class _Search:
     ) -> None:
         self._configuration = configuration
         self._lookahead_s: float = configuration["lookahead_time"]
+        # Release 2.0.1 finds no recovery that begins later than the early time of its last level:
+        # so it was recorded, of altitudes, over one flight.
+        self._latest_s = math.inf
+        if configuration["daidalus_version"] == "2.0.1":
+            last = (one.alerter.levels[-1].early_alerting_time_s for one in intruders)
+            self._latest_s = min(last, default=math.inf)
         self._kind = kind_of(kind_name, own, configuration)
         self._intruders = intruders
         self._sizes = recovery_cylinder(configuration, own.up_m)
@@ -94,7 +100,7 @@ class _Search:
             if leads.any():
                 time_s = self._earliest(leads)
                 clear = self._clear_at(time_s[:, np.newaxis])
-                leads &= self._leads(clear)
+                leads &= self._leads(clear) & (time_s <= self._latest_s)
                 for row in np.flatnonzero(leads).tolist():
                     recovery = Recovery(float(time_s[row]), _of_row(sizes, row), shrinks)
                     found[row] = recovery, intervals_of(self._kind, row, clear)

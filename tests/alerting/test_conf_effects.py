@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from components.alerting.alert_tables import alert_table, bands_table
 from components.alerting.command import alert
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
+from components.formats.text_rows import TrafficFileError
 from components.guidance.bands import GuidedIntruder, guidance
 from components.guidance.situation import State
 from components.well_clear.tcas import recovery_sizes_m
@@ -212,6 +214,46 @@ def test_time_to_manoeuvre_is_added_or_not(tmp_path):
         found = bands("hdir", configuration, bands_add_time_to_maneuver=counts_from_now)
         red[counts_from_now] = sum(b.high - b.low for b in found.bands if b.region == "NEAR")
     assert red[False] > red[True] + math.radians(1) > math.radians(2)
+
+
+def test_an_older_release_counts_its_horizons_from_now(tmp_path):
+    text = CONF.replace("turn_rate = 0", "turn_rate = 3").replace("= 90 [s]", "= 180 [s]")
+    older = conf(tmp_path, f"{text}\ndaidalus_version = 2.0.1\n")
+    newer = conf(tmp_path, text)
+    assert bands("hdir", older).bands == bands("hdir", newer, bands_add_time_to_maneuver=True).bands
+    assert bands("hdir", older).bands != bands("hdir", newer).bands
+
+
+def test_an_older_release_finds_no_recovery_later_than_its_last_early_time(tmp_path):
+    """Inside the volume recovery takes some seconds: more than 1 s, and less than 90 s."""
+    near = CROSSING._replace(east_m=np.float64(-500.0), north_m=np.float64(-300.0))
+    small = "min_horizontal_recovery = 200 [m]\nmin_vertical_recovery = 50 [m]"
+    found = {}
+    for version in ("2.0.1", "2.0.4"):
+        for early_s in (90, 1):
+            text = f"{CONF}\none_alert_1_early_alerting_time = {early_s} [s]\n{small}"
+            configuration = conf(tmp_path, f"{text}\ndaidalus_version = {version}\n")
+            one = guidance("hdir", configuration, OWN, [
+                GuidedIntruder(near, configuration.alerters[0])])  # fmt: skip
+            found[version, early_s] = one.recovery
+    assert found["2.0.4", 1] == found["2.0.4", 90]
+    assert found["2.0.1", 90].time_s > 1.0
+    assert found["2.0.1", 1].time_s == -math.inf
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("daidalus_version = 2.0.3", "daidalus_version is '2.0.3': it must be 2.0.1 or 2.0.4"),
+        (
+            "daidalus_version = 2.0.1\nbands_add_time_to_maneuver = false",
+            "bands_add_time_to_maneuver is false and daidalus_version is 2.0.1",
+        ),
+    ],
+)
+def test_releases_that_are_not_known_are_refused(tmp_path, lines, said):
+    with pytest.raises(TrafficFileError, match=re.escape(said)):
+        conf(tmp_path, f"{CONF}\n{lines}\n")
 
 
 def test_recovery_sizes_of_zero_are_those_of_tcas(tmp_path):

@@ -1,7 +1,6 @@
 """Bands, recovery and resolutions against recorded output of the reference logic."""
 
 import csv
-import gzip
 import math
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ from components.geometry import east_north_m, east_north_mps
 from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many, resolution
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
-from tests.alerting.reference_data import reference_file
+from tests.alerting.reference_data import reference_file, reference_text
 
 UNITS = {"hdir": math.pi / 180, "hs": 1852 / 3600, "vs": 0.3048 / 60, "alt": 0.3048}
 AT_ONCE = dict.fromkeys(
@@ -89,39 +88,47 @@ def compare_resolution(found, configuration, kind, wanted):
     assert str(got.prefers_high).lower() == wanted["preferred_up"]
 
 
-def test_bands_of_an_older_reference_whose_horizons_count_from_now():
-    """Recorded by release 2.0.1, with `bands_add_time_to_maneuver`, every second of a flight.
+def test_every_cell_of_an_older_release_is_equal(tmp_path):
+    """Recorded by release 2.0.1 every second of a flight: 271 directions and 6 altitudes.
 
-    Edges are compared to a step, as directions about a turning ownship are recorded in whole ones.
+    Positions are those of the second, velocities those of the step of 0.1 s before: so that
+    simulation's logic sees them. A value on an edge has the region of either side.
     """
-    configuration = read_conf(reference_file("published/degas/degas_noncoop_daidalus201.conf"))
-    with gzip.open(reference_file("published/degas/daaGuidance_int_perf.csv.gz"), "rt") as file:
-        recorded = np.loadtxt(file, delimiter=",")
-    with reference_file("published/degas/int_perf_1hz.xyz").open(encoding="utf-8") as file:
-        flown = np.array([line.split(",")[1:] for line in list(file)[2:]], dtype=float)
-    flown[:, :3] *= 0.3048
-    both = flown.reshape(-1, 2, 7)
-    both[:, :, :2] -= both[:, :1, :2].copy()
-    code = {"NONE": 0, "RECOVERY": 1, "MID": 3, "NEAR": 4}
-    own, other = (State(*both[:, who, :6].T) for who in (0, 1))
-    others = [GuidedIntruders(other, configuration.alerters[0], np.zeros(len(both), dtype=int))]
+    text = reference_file("published/degas/degas_noncoop_daidalus201.conf").read_text("utf-8")
+    path = tmp_path / "older.conf"
+    path.write_text(f"{text}\ndaidalus_version = 2.0.1\n", encoding="utf-8")
+    configuration = read_conf(path)
+    recorded = np.loadtxt(
+        reference_text("published/degas/daaGuidance_int_perf.csv.gz").splitlines(), delimiter=","
+    )
+    lines = reference_text("published/degas/trajectory_int_perf.csv.gz").splitlines()
+    flown = dict(zip(lines[0].split(","), np.loadtxt(lines[1:], delimiter=",").T, strict=True))
+    now = np.rint(10.0 * recorded[:, 0]).astype(int)
+    before = np.maximum(now - 1, 0)
+
+    def states(who):
+        east, north, up = (0.3048 * flown[f"{who}_{axis}_ft"][now] for axis in
+                           ("east", "north", "up"))  # fmt: skip
+        speed, track = 0.3048 * flown[f"{who}_speed_ftps"][before], flown[f"{who}_psi_rad"][before]
+        return State(east, north, up, speed * np.sin(track), speed * np.cos(track), 0.0 * up)
+
+    own, other = states("own"), states("int")
+    other = other._replace(east_m=other.east_m - own.east_m, north_m=other.north_m - own.north_m)
+    own = own._replace(east_m=0.0 * own.east_m, north_m=0.0 * own.north_m)
+    others = [GuidedIntruders(other, configuration.alerters[0], np.zeros(len(now), dtype=int))]
     turned, climbed = (
         guidance_of_many(kind, configuration, own, others) for kind in ("hdir", "alt")
     )
-    assert both[: len(recorded), 0, 6].tolist() == recorded[:, 0].tolist()
-    wrong, near = 0, 0
-    for line, found, level in zip(recorded, turned, climbed, strict=False):
+    code = {"NONE": 0, "RECOVERY": 1, "MID": 3, "NEAR": 4}
+    cells = 0
+    for line, found, level in zip(recorded, turned, climbed, strict=True):
         turns = (found.own_value + np.radians(np.arange(-135, 136))) % (2 * math.pi)
-        for turn, want in zip(turns, line[1:272], strict=True):
-            got = {code[b.region] for b in found.bands if b.low - 1e-9 <= turn <= b.high + 1e-9}
-            wrong += want not in got
-            near += 4 in got
-        # From when no altitude is clear until the turn alone suffices, that release says red
-        # throughout, and we that some altitudes are the earliest way out: not known why.
-        open_question = 83.0 <= line[0] <= 102.0
-        for altitude_ft, want in line[272:].reshape(6, 2):
-            at_m = 0.3048 * altitude_ft
-            got = {code[b.region] for b in level.bands if b.low <= at_m <= b.high}
-            assert want in got or (open_question and got == {1})
-    assert near > 2500
-    assert wrong <= 8
+        heights = 0.3048 * line[272::2]
+        for bands, values, wanted in (
+            (found.bands, turns, line[1:272]), (level.bands, heights, line[273::2])
+        ):  # fmt: skip
+            for value, want in zip(values, wanted, strict=True):
+                got = {code[b.region] for b in bands if b.low - 1e-9 <= value <= b.high + 1e-9}
+                assert want in got, (line[0], value)
+                cells += 1
+    assert cells == 49_051 + 1_086

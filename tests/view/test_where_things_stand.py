@@ -191,6 +191,37 @@ def test_alerts_say_how_far_it_looks_and_every_aircraft_has_one_name(browser, tm
     page.close()
 
 
+def test_a_recorded_encounter_shows_the_two_minutes_before_its_closest_approach(browser, tmp_path):
+    """Head on at 100 m/s, at one place after 200 s; another one passes 30 km away."""
+    lines = [
+        "NAME, lat, lon, alt, vx, vy, vz, time",
+        "[], [deg], [deg], [m], [m/s], [m/s], [m/s], [s]",
+    ]
+    for t in range(0, 301, 5):
+        for name, north, speed in (("own", 50.0 * (t - 200), 50), ("one", -50.0 * (t - 200), -50)):
+            lat, lon, _ = pymap3d.enu2geodetic(0.0, north, 0.0, -41.3, 174.2, 0.0)
+            lines.append(f"{name}, {float(lat)!r}, {float(lon)!r}, 900, 0, {speed}, 0, {t}")
+        lines.append(f"far, -41.3, 174.56, 900, 0, 1, 0, {t}")
+    (tmp_path / "met.daa").write_text("\n".join(lines) + "\n")
+    assert CliRunner().invoke(view, [str(tmp_path / "met.daa")]).exit_code == 0
+    page, _ = opened_page(browser, tmp_path / "met.html")
+    assert page.evaluate("Data.reach.near_m") == pytest.approx(120 * 100.0, rel=2e-3)
+    page.close()
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_what_is_pressed_is_large_enough_for_a_finger(browser, tmp_path, width):
+    """WCAG 2.2 AA, 2.5.8: 24 by 24 pixels; and nothing is wider than the page."""
+    page, _ = opened_page(browser, shown(recorded(tmp_path, NEAR)), width)
+    pressed = page.locator("button:visible, select:visible, input:visible").all()
+    assert len(pressed) > 10
+    for one in pressed:
+        box = one.bounding_box()
+        assert min(box["width"], box["height"]) >= 24, one.evaluate("e => e.outerHTML")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.close()
+
+
 def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     one = recorded(tmp_path, NEAR, "one")
     longer = NEAR.replace("duration_s = 6", "duration_s = 9").replace(
@@ -198,7 +229,7 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     )
     other = recorded(tmp_path, longer.replace("title = '''t'''", "title = '''<b>'''"), "other")
     page, wrong = opened_page(browser, shown(one, other), hash="#t=2.5")
-    assert page.title() == "one: t | other: <b>"
+    assert page.title() == page.locator("main h1").inner_text() == "one: t | other: <b>"
     left, right = (frame for frame in page.frames if frame.parent_frame)
     titles = [frame.locator("h1").inner_text() for frame in (left, right)]
     assert titles == ["one: t", "other: <b>"]

@@ -63,7 +63,7 @@ const Legend = (() => {
     const reaches = sensors.filter((s) => s.range && s.azimuth).map((s) => [
       (c) => across(c, Symbols.colours[s.kind], 2, Rose.DASHES[s.kind]),
       `${s.name}: beyond it this ${s.kind === "radar" ? "radar" : "camera"} sees nothing`]);
-    const tag = [(c) => Canvas.text(c, Units.above(-150), WIDE / 2, HIGH / 2 + 4,
+    const tag = [(c) => Canvas.text(c, Units.above(-90), WIDE / 2, HIGH / 2 + 4,
       Symbols.colours.traffic, "center"), `altitude from the ownship's, in ${HEIGHTS[Units.name]}; an ` +
       "arrow from 500 ft/min (2.5 m/s) on"];
     list.replaceChildren(...[...ROWS, tag, ...reaches].map((one) => row(...one)));

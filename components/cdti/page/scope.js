@@ -3,7 +3,7 @@
 const Scope = (() => {
   const canvas = document.getElementById("scope");
   const rad = Math.PI / 180;
-  const MOST_TAGS = 40;
+  const MOST_TAGS = 40, LONGEST = 24, NARROW = 150;
   let place = 5;
 
   const ranges = () => Units.system.ranges;
@@ -57,7 +57,7 @@ const Scope = (() => {
       Labels.add(`${scene.name(one.number)} no range`, one.x, one.y, 8, 4, Symbols.ink(one.level));
     }
     const tagged = drawn.symbols.slice(-MOST_TAGS);
-    const words = tagged.reverse().map((one) => tag(c, one, scene)).reverse();
+    const words = tagged.reverse().map((one) => tag(c, one, scene, outer)).reverse();
     tagged.reverse().forEach((one, i) => {
       Labels.add(words[i], one.x, one.y, 14, 4, Symbols.ink(one.level));
     });
@@ -117,12 +117,15 @@ const Scope = (() => {
   }
   // Writes the relative altitude above or below a symbol; returns the words beside it, which hold
   // the altitude as well where there was no room for it.
-  function tag(c, one, scene) {
+  function tag(c, one, scene, outer) {
     const colour = Symbols.ink(one.level), halo = Symbols.colours.ground;
-    const word = one.level ? ` ${Symbols.WORDS[Math.min(one.level, 3)]}` : "";
+    // In a hand there is room for names only: the level is told by the symbol, list and banner.
+    const word = one.level && outer > NARROW ? ` ${Symbols.WORDS[Math.min(one.level, 3)]}` : "";
+    const whole = scene.name(one.number);
+    const name = whole.length > LONGEST ? `${whole.slice(0, LONGEST - 1)}…` : whole;
     const height = `${one.tag}${one.arrow}`, x = one.x - Labels.width(c, height) / 2;
     const written = Labels.place(c, height, x, one.above ? one.y - 18 : one.y + 28, colour, halo);
-    return `${scene.name(one.number)}${word}${written ? "" : ` ${height}`}`;
+    return `${name}${word}${written ? "" : ` ${height}`}`;
   }
 
   return { canvas, draw, zoom, fit, hold, range };

@@ -1,12 +1,14 @@
-"""What a foreign part's seam costs: ``python -m docs.make.foreign.cost_per_call`` prints the table.
+"""What a foreign part's seam costs: ``python -m docs.make.foreign.cost_per_call [FMU]`` prints it.
 
 Blocks that do next to nothing are called at every look of a camera; a call costs what a run takes
-longer with them, the best of twelve. Doors whose package or compiler is missing are left out.
+longer with them, the best of twelve. Doors whose package or compiler is missing are left out, and
+FMUs where none is named.
 """
 
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -63,8 +65,11 @@ def scene(part: dict[str, Any] | None, eye: dict[str, Any] | None = None) -> Any
     wires: list[Any] = ["traffic -> transform -> eye -> fusion"]
     if part is not None:
         blocks["part"] = part
-        blocks["other"] = {"type": "fusion.pick_best"}
-        wires += ["eye -> part -> other"]
+        if part["type"] == "foreign.fmu":
+            wires += ["eye -> part"]
+        else:
+            blocks["other"] = {"type": "fusion.pick_best"}
+            wires += ["eye -> part -> other"]
     tables = {"duration_s": _CALLS // _RATE_HZ, "seed": 1, "wires": wires, "blocks": blocks}
     return dsa_des.load_scene(tables)
 
@@ -80,11 +85,11 @@ def best_s(work: Callable[[], Callable[[], Any]]) -> float:
     return min(took)
 
 
-def of_run(loaded: Any) -> float:
+def of_run(loaded: Any, window: int | None = None) -> float:
     """Return the wall time of a run without building and recording; programs have started."""
 
     def prepared() -> Callable[[], Any]:
-        simulation = Simulation(loaded)
+        simulation = Simulation(loaded, window=window)
         part: Any = simulation.components.get("part")
         if hasattr(part, "start"):
             part.start()
@@ -175,6 +180,7 @@ def programs(folder: Path) -> dict[str, list[str]]:
 def main() -> None:
     """Measure every door, and print the rows of the table."""
     pin()
+    fmu = next(iter(sys.argv[1:]), None)
     here = __name__ if __name__ != "__main__" else "docs.make.foreign.cost_per_call"
     alone = of_run(scene(None))
     rows = {
@@ -190,6 +196,10 @@ def main() -> None:
         recorded = {"type": "sensor.recorded", "file": str(folder / "run"), "block": "eye"}
         recorded["scan_rate_hz"] = _RATE_HZ  # type: ignore[assignment]
         rows["file (`sensor.recorded`)"] = of_run(scene(None, recorded))
+    if fmu is not None:
+        loaded = scene({"type": "foreign.fmu", "file": fmu, "scan_rate_hz": _RATE_HZ})
+        rows["FMU, in windows"] = of_run(loaded) - alone
+        rows["FMU, scan by scan"] = of_run(loaded, 1) - of_run(scene(None), 1)
     rows["the scene itself, each look of a run whole"] = alone
     rows["host program, a call with all of the chain"] = of_host()
     if find_spec("mosaik") is not None:

@@ -23,7 +23,7 @@ def pictures(folder: Path) -> None:
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     with TemporaryDirectory() as place, sync_playwright() as playwright:
-        words = [str(_SESSION), "--out", f"{place}/run", "--no-figures", "--realtime", "2"]
+        words = [str(_SESSION), "--out", f"{place}/run", "--no-figures", "--realtime", "1"]
         command = [sys.executable, "-m", "dsa_des", "cdti", *words]
         session = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True

@@ -136,8 +136,12 @@ int fmi2SetReal(void *c, const uint32_t *vr, size_t n, const double *v) {
   return 0; }
 int fmi2SetInteger(void *c, const uint32_t *vr, size_t n, const int *v) {
   ((Model *)c)->fault = v[0]; return 0; }
+int fmi2GetBooleanStatus(void *c, int kind, int *v) {
+  *v = kind == 3 && ((Model *)c)->fault == 5; return 0; }
+int fmi2GetRealStatus(void *c, int kind, double *v) { *v = ((Model *)c)->t; return 0; }
 int fmi2DoStep(void *c, double t, double h, int np) {
   Model *m = c; int status = misbehave(m); if (status) return status;
+  if ((m->fault == 5 || m->fault == 6) && t + h > 1.03) { advance(m, 1.03); return 2; }
   advance(m, t + h); return 0; }
 """
 

@@ -369,6 +369,17 @@ def test_one_that_ends_gives_nothing_more(lab, lag):
         assert time_s[-1] == pytest.approx(0.5)  # it asks to at its event at 0.55 s
 
 
+def test_one_of_fmi_2_that_ends_gives_nothing_more_and_one_that_discards_a_step_fails(lab, lag):
+    text = f'foreign.fmu; file = "{lag(2)}"; scan_rate_hz = 10; start = {{ u = 1, fault = FAULT }}'
+    for window in (None, 1):
+        scene = lab.write({"lag": text.replace("FAULT", "5")}, [], duration_s=2)
+        time_s, x = _values(lab.run(scene, window=window).tables, "lag", "x")
+        assert time_s[-1] == pytest.approx(1.0)
+        assert x == pytest.approx(1 - np.exp(-time_s), rel=1e-12)
+    with pytest.raises(BlockFailure, match=r"at 1\.1 s: fmi2DoStep returned Discard"):
+        lab.run(lab.write({"lag": text.replace("FAULT", "6")}, [], duration_s=2))
+
+
 def test_a_terminal_takes_its_members_from_one_message(lab, lag):
     import zipfile
 
