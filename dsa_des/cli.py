@@ -264,5 +264,26 @@ def compare(**options: Any) -> None:
     compare_command(**options)
 
 
+@main.command()
+@click.argument("case", metavar="CASE")
+@click.option("--out", required=True, metavar="PACK", help="Folder of the pack.")
+@set_option
+@click.option(
+    "--encounters", type=int, metavar="N", help="Of the system and what stands beside it."
+)
+@_workers_option
+@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
+@plain_errors
+def evidence(**options: Any) -> None:
+    """Run a CASE from requirement to verdict: a folder that a stranger can run again.
+
+    --set changes a value of the case's file: requirements[0].most=0.2, or, for one of the system's
+    scene, set.blocks.radar.range_km=5. Exit code 1 where no verdict can be given.
+    """
+    from dsa_des.commands.evidence import evidence_command
+
+    evidence_command(**options)
+
+
 if __name__ == "__main__":
     main()

@@ -19,7 +19,7 @@ from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
 
 CONFIGS = Path(__file__).parent.parent / "configs"
-PARTS = ("aircraft", "encounters", "obstacles", "sensors", "studies")
+PARTS = ("aircraft", "encounters", "evidence", "obstacles", "sensors", "studies")
 #: Chains and sets of intruders that other scenes extend; they cannot run by themselves.
 UNFINISHED = {
     "detect_and_sense.toml",
@@ -36,7 +36,10 @@ ENDS_S = {
     "avoidance/crossing_seen_late.toml": 110,
     "avoidance/crossing_tracked.toml": 55,
     "avoidance/crossing_tracked_late.toml": 105,
+    "avoidance/looking_out.toml": 60,
+    "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
+    "tracking/do365_sensors.toml": 20,
     "operator/session.toml": 15,
     "optical/pictures.toml": 10,
     "systems/afrl_tracked.toml": 25,

@@ -24,6 +24,7 @@ from components.well_clear.separation import separation
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
+from dsa_des.block.ladder import Verified
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Arrivals, Wake
 
@@ -76,6 +77,10 @@ class DaidalusAlerting(Component):
     Parameters = DaidalusParameters
     windowed = True
     lockstep = True
+    verified = (
+        Verified("alert levels and times to violation", "recorded output of DAIDALUS 2.0.4",
+                 "levels equal, times 1e-8 s", "tests/alerting/test_against_reference.py"),
+    )  # fmt: skip
 
     def request(self, port: str) -> Any:
         """Ask for no poses beside what is fused: the ownship's own come with the states."""

@@ -39,6 +39,8 @@ _MOST_POINTS, _ELLIPSES = 400, 8
 _MOST_NAMED = 12
 #: Of more tracks than this, no ellipses and bands are drawn, which would cover each other.
 _MOST_SPREADS = 40
+#: A target that moves less is a dot on the plan.
+_STILL_M = 10.0
 _MOST_ERRORS = 2000
 _LOWEST, _HIGHEST = 0.02, 1000.0
 #: Stretches of time over which innovations are averaged.
@@ -142,6 +144,8 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         for position in positions:  # under a density their lines only make room
             style = {"color": _TRUTH, "alpha": 0.0 if dense else 1.0}
             _flight(plan, height, grid, position, drawn.origin[2], style)
+            if np.nanmax(np.ptp(position, axis=1), initial=0.0) < _STILL_M:
+                plan.scatter(position[1, :1] / 1e3, position[0, :1] / 1e3, s=6, color=_TRUTH)
         spreads = len(drawn.tracks) <= _MOST_SPREADS
         for one in drawn.tracks:
             _draw_one(plan, height, one, drawn.origin[2], spreads)

@@ -13,11 +13,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.encounters.made_encounters import read_made
 from components.encounters.model_file import read_model
-from components.encounters.pair_densities import PairingRules
+from components.encounters.pair_densities import (
+    PairingRules,
+    horizontal_density,
+    vertical_density,
+)
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.sampled_flight import CELLS_AT_ONCE, SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
@@ -28,7 +32,8 @@ from components.geometry.ellipsoid import enu_to_geodetic, line_of_sight
 from components.traffic.files import FileParameters, RecordedTraffic
 from components.traffic.scripted import Ownship, flight_arguments
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import ScenePath
+from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.block.ladder import Verified
 
 #: An encounter: its set, and its place there.
 Encounter = tuple[EncounterSet, int]
@@ -162,6 +167,16 @@ class SetParameters(OneEncounter):
     )
 
 
+class MissDistances(Parameters):
+    """How often encounters of a model pass at which distance; their weights undo it."""
+
+    edges_ft: tuple[float, ...] = Field(description="Rising edges of steps, ft.")
+    proportions: tuple[float, ...] = Field(
+        description="Of each step between two edges: of horizontal distances the share of "
+        "encounters in it, of vertical ones the chance (at most 1) with which they are accepted."
+    )
+
+
 class ModelParameters(OneEncounter):
     """Parameters of traffic that an encounter model makes."""
 
@@ -174,6 +189,37 @@ class ModelParameters(OneEncounter):
         ge=0,
         description="Seed of the encounters; the scene's own seed does not change them.",
     )
+    horizontal: MissDistances | None = Field(
+        default=None,
+        description="Of the signed horizontal miss distance; by default as published. Encounters "
+        "that pass farther than the outer edges do not happen.",
+    )
+    vertical: MissDistances | None = Field(
+        default=None, description="Of the vertical miss distance, the intruder's height above."
+    )
+
+    @model_validator(mode="after")
+    def _densities(self) -> Any:
+        self.pairing_rules()
+        return self
+
+    def pairing_rules(self) -> PairingRules:
+        """Return how tracks become encounters.
+
+        Raises
+        ------
+        ValueError
+            Where edges and proportions do not fit.
+        """
+        changes: dict[str, Any] = {}
+        for name, make in (("horizontal", horizontal_density), ("vertical", vertical_density)):
+            if (given := getattr(self, name)) is not None:
+                try:
+                    density = make(np.array(given.edges_ft), np.array(given.proportions))
+                except ValueError as error:
+                    raise ValueError(f"{name}: {error}") from None
+                changes[f"{name}_ft"] = density
+        return PairingRules(**changes)
 
 
 class _EncounterTraffic(RecordedTraffic):
@@ -245,6 +291,12 @@ class ModelTraffic(_EncounterTraffic):
 
     Parameters = ModelParameters
     lockstep = True
+    verified = (
+        Verified("sampled tracks", "exact distributions of the network, by enumeration",
+                 "chi-square and 4 standard errors", "tests/encounters/test_sampling.py"),
+        Verified("pairs and their weights", "the gas model's closed form; a plain Monte Carlo",
+                 "4 standard errors", "tests/encounters/test_pairing.py"),
+    )  # fmt: skip
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -278,25 +330,28 @@ def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     return (found if None in at else replace(found, reference_deg=at)), place
 
 
+#: What makes encounters of a model: both files, the seed, and how miss distances are drawn.
+_ModelKey = tuple[Path, Path, int, MissDistances | None, MissDistances | None]
 #: Encounters of models that were made last, each a set of its own, by model and number.
 _MADE: OrderedDict[Any, EncounterSet] = OrderedDict()
 # So many are kept: a study asks for each encounter of a chunk several times.
 _MOST_MADE = 1200
 
 
-def _model_key(parameters: Any) -> tuple[Path, Path, int]:
-    intruder = parameters.intruder_file or parameters.file
-    return parameters.file, intruder, parameters.model_seed
+def _model_key(parameters: Any) -> _ModelKey:
+    p = parameters
+    return p.file, p.intruder_file or p.file, p.model_seed, p.horizontal, p.vertical
 
 
-def _made(key: tuple[Path, Path, int], number: int) -> EncounterSet:
+def _made(key: _ModelKey, number: int) -> EncounterSet:
     if (*key, number) not in _MADE:
         _make(key, range(number, number + 1))
     return _MADE[(*key, number)]
 
 
-def _make(key: tuple[Path, Path, int], numbers: range) -> None:
-    pairs, rules = _sampler(*key).pairs(numbers, paths=False), PairingRules()
+def _make(key: _ModelKey, numbers: range) -> None:
+    sampler = _sampler(key)
+    pairs, rules = sampler.pairs(numbers, paths=False), sampler.rules
     for place, number in enumerate(numbers):
         one = pairs if len(numbers) == 1 else pairs.take(np.array([place]))
         made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
@@ -306,5 +361,7 @@ def _make(key: tuple[Path, Path, int], numbers: range) -> None:
 
 
 @lru_cache(maxsize=4)
-def _sampler(file: Path, intruder: Path, seed: int) -> PairSampler:
-    return PairSampler(read_model(file), read_model(intruder), seed, PairingRules())
+def _sampler(key: _ModelKey) -> PairSampler:
+    file, intruder, seed, horizontal, vertical = key
+    drawn = ModelParameters(file=file, horizontal=horizontal, vertical=vertical)
+    return PairSampler(read_model(file), read_model(intruder), seed, drawn.pairing_rules())

@@ -12,7 +12,11 @@ import numpy as np
 from components.encounters.made_encounters import made_set, read_recipe
 from components.encounters.model import EncounterModel
 from components.encounters.model_file import ModelFileError, read_model
-from components.encounters.pair_densities import PairingRules, StepDensity
+from components.encounters.pair_densities import (
+    PairingRules,
+    horizontal_density,
+    vertical_density,
+)
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
@@ -147,8 +151,6 @@ def _write(path: Path, batches: Iterator[_Columns]) -> int:
     return rows
 
 
-#: Edges of miss distances: farther than any aircraft sees another.
-_FARTHEST_FT = 1e6
 # Processor time (s) and bytes of an encounter, as measured with a small model.
 _PAIR = (1e-3, 900.0)
 
@@ -215,20 +217,11 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
                 f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
                 "step between two, all with commas between them"
             ) from None
-        said = f"{option} {' '.join(given)}"
-        if not (np.abs(edges) <= _FARTHEST_FT).all():
-            raise UsageError(f"{said}: edges must lie within ±{_FARTHEST_FT:g} ft")
-        if option == "--vertical" and not (parts <= 1.0).all():
-            raise UsageError(f"{said}: chances must lie above 0 and be 1 at most")
-        # Shares of horizontal distances are of a step as a whole, those of heights its chance.
-        wide = np.diff(edges) if option == "--horizontal" and len(edges) == len(parts) + 1 else 1.0
+        make = horizontal_density if option == "--horizontal" else vertical_density
         try:
-            with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
-                density = StepDensity(edges, parts / wide)
+            density = make(edges, parts)
         except ValueError as error:
-            raise UsageError(f"{said}: {error}") from None
-        if edges[0] > 0.0 or edges[-1] < 0.0:
-            raise UsageError(f"{said}: the edges must lie about 0")
+            raise UsageError(f"{option} {' '.join(given)}: {error}") from None
         changes["horizontal_ft" if option == "--horizontal" else "vertical_ft"] = density
     return PairingRules(**changes)
 

@@ -64,6 +64,45 @@ class StepDensity:
         return found
 
 
+#: Edges of miss distances: farther than any aircraft sees another.
+FARTHEST_FT = 1e6
+
+
+def horizontal_density(edges_ft: FloatArray, shares: FloatArray) -> StepDensity:
+    """Return the density of signed horizontal miss distances with these shares between edges.
+
+    Raises
+    ------
+    ValueError
+        Where they do not fit.
+    """
+    wide = np.diff(edges_ft) if len(edges_ft) == len(shares) + 1 else 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
+        return _about_zero(edges_ft, shares / wide)
+
+
+def vertical_density(edges_ft: FloatArray, chances: FloatArray) -> StepDensity:
+    """Return the chances with which vertical miss distances between edges are accepted.
+
+    Raises
+    ------
+    ValueError
+        Where they do not fit.
+    """
+    if not (chances <= 1.0).all():
+        raise ValueError("chances must lie above 0 and be 1 at most")
+    return _about_zero(edges_ft, chances)
+
+
+def _about_zero(edges_ft: FloatArray, heights: FloatArray) -> StepDensity:
+    if not (np.abs(edges_ft) <= FARTHEST_FT).all():
+        raise ValueError(f"edges must lie within ±{FARTHEST_FT:g} ft")
+    density = StepDensity(edges_ft, heights)
+    if edges_ft[0] > 0.0 or edges_ft[-1] < 0.0:
+        raise ValueError("the edges must lie about 0")
+    return density
+
+
 def _steps(edges: list[float], heights: list[float]) -> StepDensity:
     return StepDensity(np.array(edges), np.array(heights))
 

@@ -20,7 +20,7 @@ from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, NUMBER, RATIO, Group, Metric, RatioOf, Result
+from dsa_des.studies.metric import CLASS, EVENT, NUMBER, RATIO, Group, Metric, RatioOf, Result
 
 
 def has_weights(scene: Scene) -> bool:
@@ -65,6 +65,8 @@ class EncounterWeight(Metric):
 BEARINGS = ("ahead", "right", "behind", "left")
 _CLASSES = {"geometry": GEOMETRIES, "bearing": BEARINGS}
 _EVENTS = ("nmac", "well_clear_lost")
+# Of needless manoeuvres.
+_KEPT, _TOLD, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # Courses are taken over this time to both sides of the closest approach.
 _BASE_S = 0.5
 
@@ -77,6 +79,11 @@ class RiskRatioParameters(RiskParameters):
         description="Also a ratio for each class: by `geometry` (head-on, overtaking, crossing "
         "from the left or right) or by the `bearing` from which the intruder closes in (ahead, "
         "right, behind, left: sectors of 90°), as without manoeuvres.",
+    )
+    needless: bool = Field(
+        default=False,
+        description="Also the share of the encounters that stay well clear without manoeuvres in "
+        "which the ownship is told to manoeuvre.",
     )
 
 
@@ -110,11 +117,25 @@ class RiskRatios(Mitigated):
                 )
                 for by in self.p.by for kind in _CLASSES[by]
             ]  # fmt: skip
+        if self.p.needless:
+            said = "share with a manoeuvre of the encounters that stay well clear without any"
+            found += [
+                Result(_KEPT, EVENT, "without manoeuvres, well clear is kept"),
+                Result(_TOLD, EVENT, "the ownship is told to manoeuvre"),
+                Result(_NEEDLESS, EVENT, "it is told to, and well clear is kept without"),
+                Result("needless_manoeuvre_share", RATIO, said,
+                       ratio=RatioOf(_KEPT, _NEEDLESS, weight, cluster)),
+            ]  # fmt: skip
         return found
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all but the ratios for every replica."""
         found = dict(super().measure(group))
+        if self.p.needless:
+            told = np.zeros(len(group))
+            told[list(self._steering.of(group))] = 1.0
+            kept = 1.0 - found["well_clear_lost_nominal"]
+            found |= {_KEPT: kept, _TOLD: told, _NEEDLESS: kept * told}
         if self._weight is not None:
             found |= self._weight.measure(group)
         if self.p.by:

@@ -22,7 +22,7 @@ from components.sensor.ladder_values import (
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 
@@ -349,3 +349,9 @@ class Ellipsoid(Transform):
 
     earth = "ellipsoid"
     lockstep = True
+    verified = (
+        Verified("line of sight", "evaluation at 40 digits", "1e-12 m + 1e-13 of the range",
+                 "tests/geometry/test_ellipsoid_exact.py"),
+        Verified("directions in body axes of a banked ownship", "pymap3d and rotation matrices",
+                 "1e-3 m across", "tests/line_of_sight/test_line_of_sight.py"),
+    )  # fmt: skip

@@ -103,6 +103,11 @@ class Coverage:
         self._source, self.duration_s = traffic_of(scene)
         self._reaches = reaches_of(scene)
 
+    @property
+    def aircraft(self) -> tuple[Any, Sequence[Any]]:
+        """The flights of the ownship and of all targets."""
+        return self._source.own, self._source.targets
+
     def holds(self, target: Any, time_s: FloatArray) -> BoolArray:
         """Return whether a target is covered at times (n,)."""
         own, other = self._source.own.at(time_s), target.at(time_s)

@@ -18,6 +18,7 @@ from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component, Input, Output
+from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
@@ -218,6 +219,13 @@ class Stochastic(Component):
     Parameters = StochasticParameters
     windowed = True
     lockstep = True
+    verified = (
+        Verified("delays, sides and sizes of manoeuvres", "the published distributions (R6)",
+                 "2 % of the mean", "tests/alerting/test_pilot_model.py"),
+        Verified("bands that are flown out of", "recorded output of DAIDALUS 2.0.4",
+                 "regions equal, edges to 1e-8 of the unit",
+                 "tests/guidance/test_bands_against_reference.py"),
+    )  # fmt: skip
     rewindable = True
 
     def setup(self) -> None:

@@ -114,6 +114,8 @@ def initiated(
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
     for i in range(3, 6):
         spread[i, i] = rules.p.start_speed_m_s**2
+    if rules.p.start_climb_m_s is not None:
+        spread[5, 5] = rules.p.start_climb_m_s**2
     states, covariances = [], []
     for size in sizes:
         state, covariance = np.zeros((size, count)), np.zeros((size, size, count))

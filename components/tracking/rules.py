@@ -150,6 +150,11 @@ class TrackerParameters(Parameters):
         default=70.0, gt=0,
         description="Standard deviation of a new track's velocity along each axis, m/s.",
     )  # fmt: skip
+    start_climb_m_s: float | None = Field(
+        default=None, gt=0,
+        description="That of its vertical speed, m/s: aircraft climb slower than they fly. By "
+        "default the same.",
+    )  # fmt: skip
     assumed_range_m: float | None = Field(
         default=None, gt=0,
         description="Range that is assumed of what is seen without one, m; its inverse is taken to "

@@ -39,6 +39,7 @@ from components.tracking.track_store import TrackStore, records_of
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
+from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
 
 #: Bits of a mask of sensors.
@@ -66,6 +67,12 @@ class Tracker(Component):
     windowed = True
     rewindable = True
     ladders = LADDERS
+    verified = (
+        Verified("estimates and covariances, update by update", "Stone Soup 1.9.1, frozen results",
+                 "1e-10 of the value", "tests/estimation/test_filters_agree.py"),
+        Verified("normalised error squared of its tracks", "chi-square, 6 degrees of freedom",
+                 "bounds of the mean, 99.9 %", "tests/tracking/test_covariances_are_honest.py"),
+    )  # fmt: skip
 
     def estimator(self) -> Estimator:
         """Return the filter; a subclass may give another."""

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from dsa_des.block.effect import Effect
-from dsa_des.block.ladder import Ladder
+from dsa_des.block.ladder import Ladder, Verified
 from dsa_des.block.mark import Mark
 from dsa_des.block.message import Message
 from dsa_des.block.parameters import ClockedParameters as ClockedParameters
@@ -199,6 +199,8 @@ class Component:
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.block.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: What the model was held against; that of base classes counts too.
+    verified: ClassVar[tuple[Verified, ...]] = ()
     #: Message types that `records` may name beside those of the outputs.
     also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.

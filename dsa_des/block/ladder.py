@@ -7,7 +7,7 @@ quantities rungs differ. The engine knows no quantity: the ladder's own function
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,27 @@ from dsa_des.block.wake import Wake
 
 class Unavailable(Exception):
     """A rung cannot be had in this scene; the message says what it needs."""
+
+
+class Verified(NamedTuple):
+    """What a model was held against that is not our own code, and how closely it agrees.
+
+    Parameters
+    ----------
+    what : str
+        Of the model.
+    oracle : str
+        What it was held against.
+    tolerance : str
+        With its unit.
+    test : str
+        The test that does it, from the root of the working copy.
+    """
+
+    what: str
+    oracle: str
+    tolerance: str
+    test: str
 
 
 def absolute_difference(value: AnyArray, reference: AnyArray) -> FloatArray:

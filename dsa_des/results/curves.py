@@ -201,8 +201,9 @@ def _signed(value: float) -> str:
 
 
 def draw_polar(
-    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str, title: str
-) -> None:
+    target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str, title: str,
+    confidence: float,
+) -> None:  # fmt: skip
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     place = axes.index(axis)
     with drawing(6.2, 6.0, target) as figure:
@@ -227,6 +228,8 @@ def draw_polar(
             polar.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         polar.set_ylim(bottom=0.0)
         over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
+        if any(np.isfinite(line.estimate.low) for line in lines):
+            over += f"\nshaded: {100 * confidence:g} % interval"
         polar.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
             polar.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
@@ -274,18 +277,16 @@ def draw_cdf(
         axes = figure.add_subplot()
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
+            colour = _style(mark, number, len(shown))[0]
             if not len(ascending):
-                axes.plot(
-                    [],
-                    [],
-                    color=_style(mark, number, len(shown))[0],
-                    label=f"{series_label}: no value",
-                )
+                axes.plot([], [], color=colour, label=f"{series_label}: no value")
                 continue
             share = np.arange(1, len(ascending) + 1) / len(values)
+            # Wider the earlier: of curves that are alike all are seen.
+            wider = min(len(shown) - 1 - number, 3)
             axes.step(
                 np.concatenate((ascending[:1], ascending)), np.concatenate(([0.0], share)),
-                where="post", color=_style(mark, number, len(shown))[0], lw=1.4,
+                where="post", color=colour, lw=1.4 + 1.3 * wider,
                 label=_counted(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)
@@ -329,10 +330,12 @@ def draw_series(
     title: str,
     confidence: float,
     freedom: float | None,
+    limits: Sequence[float] = (),
 ) -> None:
     """Draw the means of a series with their intervals, one line for each place of the axes.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
+    `limits` are one for all, or one for each number of the series.
     """
     name, _, along = metric.partition(".")
     with drawing(_WIDE_IN, 4.2, path) as figure:
@@ -345,11 +348,17 @@ def draw_series(
                 np.array([getattr(line.estimate, part) for line in lines])
                 for part in ("value", "low", "high")
             )
-            label = series_label or f"mean of the runs, {100 * confidence:g} % interval"
+            of = lines[0].result.quantile
+            what = "mean of the runs" if of is None else f"{100 * of:g} % quantile"
+            label = series_label or f"{what}, {100 * confidence:g} % interval"
             drawn = axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label,
                               zorder=2)  # fmt: skip
             drawn.append(axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2))
             _dodge(axes, drawn, place, len(series))
+        if limits and series:
+            x = series[0][1]
+            known = list(limits) if len(limits) == len(x) else [limits[0]] * len(x)
+            axes.plot(x, known, color="#000000", ls="--", lw=1.2, label="limit", zorder=1)
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel(axis_label(along) if along else "")
         axes.set_ylabel(readable(name))

@@ -77,7 +77,8 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return _draw_spread(target, tables, figure, title)
     if figure.kind == "series":
         series = _series_of(tables, metric)
-        draw_series(target, series, metric, title, confidence, figure.freedom)
+        draw_series(target, series, metric, title, confidence, figure.freedom,
+                    figure.limits)  # fmt: skip
         return True
     if not axes:
         return False
@@ -94,7 +95,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return True
     axis = figure.axis or axes[0]
     if figure.kind == "polar":
-        draw_polar(target, axes, lines, metric, axis, title)
+        draw_polar(target, axes, lines, metric, axis, title, confidence)
     else:
         own = tables.baseline is not None and tables.baseline[0] == axis
         compared = [c for c in tables.compared if own and c.result.name == metric]

@@ -109,6 +109,8 @@ class Result:
     least, most : float, optional
         What no value of a number can lie below or above, such as 0 for a distance; the interval of
         its mean ends there.
+    quantile : float, optional
+        Of a number: what is told of it is this quantile over the units, not the mean.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Result:
     ratio: RatioOf | None = None
     least: float | None = None
     most: float | None = None
+    quantile: Annotated[float, Field(gt=0, lt=1)] | None = None
 
     @property
     def is_number(self) -> bool:

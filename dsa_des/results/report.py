@@ -37,10 +37,11 @@ _MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 _LONGEST = 400
 _MOST_SHOWN = 60
 
-_PAGE = """<!doctype html>
+#: The beginning of a page that loads nothing, up to its body, and how its tables are written.
+PAGE_HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" \
 content="default-src 'none'; img-src data:; style-src 'unsafe-inline'"><meta name="viewport" \
-content="width=device-width,initial-scale=1"><title>{{ record.title }}</title><style>
+content="width=device-width,initial-scale=1"><title>{{ title }}</title><style>
 :root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
 @media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
 --note:#a5abb3}figure img{background:#fff;border-radius:4px}}
@@ -74,7 +75,11 @@ table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
 {% endfor %}
 </table></div>
 {% endif %}{% endmacro %}
-{% macro where(scene, first) %}{% if scene.where %}
+"""
+
+_PAGE = (
+    PAGE_HEAD
+    + """{% macro where(scene, first) %}{% if scene.where %}
 <p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
 {% endif %}{% endmacro %}
 <header><h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
@@ -205,6 +210,7 @@ with the seed, axes and draws that stand in its row of the parts; rows of failed
 <code>command</code>.</p>
 </main></body></html>
 """
+)
 
 
 def study_report(folder: StudyFolder) -> bytes:
@@ -224,7 +230,8 @@ def study_report(folder: StudyFolder) -> bytes:
     pictures = _pictures(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
-    page = _environment().from_string(_PAGE).render(
+    page = page_environment().from_string(_PAGE).render(
+        title=record.title,
         tables=tables, record=record, explained=explained, errors=read_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
         version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_asked(tables),
@@ -281,7 +288,7 @@ def study_report(folder: StudyFolder) -> bytes:
     return page.encode()
 
 
-def _environment() -> Environment:
+def page_environment() -> Environment:
     """Return the language of the page: whatever it is given is shown as text, on one line."""
     environment = Environment(
         autoescape=True, finalize=_text, undefined=StrictUndefined, trim_blocks=True
@@ -333,7 +340,10 @@ def _methods(tables: Tables) -> str:
     known = {EVENT: "shares by Wilson's score", FRACTION: "fractions by Wilson's score",
              NUMBER: f"means by {means}"}  # fmt: skip
     known[RATIO] = "ratios of events by a gamma interval or by drawing units again, as they say"
-    return ", ".join(text for kind, text in known.items() if kind in kinds)
+    found = [text for kind, text in known.items() if kind in kinds]
+    if any(line.result.quantile is not None for line in tables.lines):
+        found.append("quantiles by order statistics")
+    return ", ".join(found)
 
 
 def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:

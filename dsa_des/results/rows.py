@@ -20,6 +20,7 @@ from dsa_des.results.statistics import (
     fraction,
     mean,
     normal_error,
+    quantile,
     share,
     symmetric,
 )
@@ -196,6 +197,8 @@ class Rows:
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
             _, of_units = self.by_unit(result.name, rows)
+            if result.quantile is not None:
+                return quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
                 return fraction(of_units, confidence), missing
             return mean(of_units, confidence, method), missing

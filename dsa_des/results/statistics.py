@@ -147,6 +147,30 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     return Estimate(value, low, high, count, count < FEW)
 
 
+def quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
+    """Return a quantile over independent units, whose interval lies between two order statistics.
+
+    Either end errs with at most half the probability that is left (H. A. David and H. N. Nagaraja,
+    "Order statistics", 3rd edition, 2003, section 7.1). Of too few units an end is infinite.
+    """
+    known = np.sort(values[~np.isnan(values)])
+    count = len(known)
+    if count == 0:
+        return Estimate(math.nan, math.nan, math.nan, 0, True)
+    from scipy.special import bdtr
+
+    tail = (1.0 - confidence) / 2.0
+    below = np.asarray(bdtr(np.arange(count), count, share))  # of at most so many
+    # The ends are the values with these numbers, from 1; none is number 0, or count + 1.
+    first = int(np.count_nonzero(below <= tail))
+    last = int(np.count_nonzero(1.0 - below > tail)) + 1
+    low = known[first - 1] if first else -math.inf
+    high = known[last - 1] if last <= count else math.inf
+    value = known[max(0, math.ceil(share * count - 1e-9) - 1)]
+    few = not (first and last <= count)
+    return Estimate(float(value), float(low), float(high), count, few)
+
+
 def fraction(values: FloatArray, confidence: float) -> Estimate:
     """Return the mean of independent values between 0 and 1; NaN ones are left out.
 

@@ -101,8 +101,8 @@ def compare_axis(
         if at[place] == baseline or base not in by_place:
             continue
         for result in results:
-            if result.kind == CLASS:
-                continue
+            if result.kind == CLASS or result.quantile is not None:
+                continue  # paired differences are of means
             others = (*at[:place], *at[place + 1 :])
             if result.kind == RATIO:
                 change = rows.ratio_difference(result, by_place[base], chosen, confidence)

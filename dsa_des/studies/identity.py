@@ -44,16 +44,27 @@ def description_text(study: Study) -> str:
     }
     if study.over:  # each member of a sample has seeds and draws of its own
         identity["over"] = sorted(study.over)
-    given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
-    given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
-    beside = study.path.parent, study.scene_path.parent
     try:
-        files = _files_in([study.base.data, given], beside)
+        files = files_of(study)
         identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
     text = json.dumps(json_safe(identity), sort_keys=True)
     return record_text(study, hashlib.sha256(text.encode()).hexdigest())
+
+
+def files_of(study: Study) -> set[Path]:
+    """Return the files that a study's values name: their content fixes results too.
+
+    Raises
+    ------
+    OSError
+        If one of them cannot be read.
+    """
+    given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
+    given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
+    beside = study.path.parent, study.scene_path.parent
+    return _files_in([study.base.data, given], beside)
 
 
 def record_of(study: Study) -> StudyRecord:

@@ -106,7 +106,7 @@ FIGURES = {
     "polar": ("metric", "axis"),
     "histogram": ("metric", "axis"),
     "cdf": ("metric", "axis"),
-    "series": ("metric", "freedom"),
+    "series": ("metric", "freedom", "limit"),
     "run": ("cell", "replica"),
 }
 _MOST_FREEDOM = 1e6

@@ -19,25 +19,26 @@ browser = chromium
 FOOT, KNOT, MILE = 0.3048, 1852 / 3600, 1852
 KINDS = "blocks.guidance.kinds=['direction', 'altitude', 'speed']"
 LONG = "a name as long as those that people give to what they fly when nobody stops them"
-#: Two side by side, so near that their labels would lie on each other.
+#: Two side by side that stay before the ownship, so near that their labels would lie on each other
+#: and alerts never end.
 TWO = """
 extends = "{session}"
 [[blocks.traffic.intruders]]
 name = "{long}"
 extends = "{aircraft}"
-east_m = 3000
-north_m = 2500
+east_m = 400
+north_m = 800
 up_m = 20
-heading_deg = 270
-speed_mps = 60
+heading_deg = 0
+speed_mps = 50
 [[blocks.traffic.intruders]]
 name = "beside"
 extends = "{aircraft}"
-east_m = 3050
-north_m = 2550
+east_m = 450
+north_m = 850
 up_m = 60
-heading_deg = 265
-speed_mps = 60
+heading_deg = 0
+speed_mps = 50
 """
 
 
@@ -48,7 +49,12 @@ def operated(browser, tmp_path_factory):
         place = tmp_path_factory.mktemp("operated")
         aircraft = folder() / "aircraft" / "general_aviation_fitted.toml"
         (place / "two.toml").write_text(TWO.format(session=SCENE, long=LONG, aircraft=aircraft))
-        sets = (*SETS[2:], KINDS, "blocks.operator.turn_rate_deg_s=0.5")
+        sets = (
+            *SETS[2:],
+            KINDS,
+            "blocks.operator.turn_rate_deg_s=0.1",
+            "blocks.operator.vertical_rate_mps=0.3",
+        )
         session = Session(
             patch, place / "run", scene=str(place / "two.toml"), realtime="2", duration="600",
             sets=sets, swaps=("tracker=tracking.stub",),
@@ -237,7 +243,7 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
           window.alert_ = { target, level, since: 1e4, at: 1e4, to_loss: 20, closest: 100 };
           window.show = (alerts) => {
             window.heard({ ...window.frame, alerts }); return App.state().alerts; };
-          Link.hears.frame = () => {};
+          Link.hears.frame = ({ frame }) => Link.send({ type: 'drawn', frame });
           Link.hears.taken({ decision: 'rejected', target, level, time: 1, value: 0 });
         }""",
         [target, level],
@@ -249,7 +255,7 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
     assert again["rejected"] and operated.state()["sounds"] == sounds
     (worse,) = page.evaluate("show([{ ...alert_, level: alert_.level + 1 }])")
     assert not worse["rejected"]
-    page.evaluate("Link.hears.frame = window.heard")
+    page.evaluate("() => { Link.hears.frame = window.heard; }")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -267,6 +273,21 @@ def test_green_stands_for_one_thing(operated, theme):
         if strength > 0.2 and 70 <= 360 * hue <= 170:
             green.append(name)
     assert green == ["recovery"]
+
+
+def test_an_alert_chosen_by_itself_is_looked_at_when_somebody_picks_it(operated):
+    page = operated.page
+    state = operated.when("App.state().alerts.some(one => one.target === App.state().chosen)")
+    page.locator("#contacts li[aria-selected='true']").click()
+    operated.when("App.said.some(one => one.decision === 'looked')")
+    said = page.evaluate("App.said")
+    looked = next(one for one in said if one["decision"] == "looked")
+    assert looked["target"] == state["chosen"] == operated.state()["chosen"]
+    page.locator("#contacts li[aria-selected='true']").click()  # not once more
+    page.keyboard.press("v")
+    operated.when("App.said.some(one => one.decision === 'verified')")
+    said = [one["decision"] for one in page.evaluate("App.said")]
+    assert said.count("looked") == 1
 
 
 def test_a_legend_names_every_line_and_key(operated):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import QuadMesh
+from matplotlib.collections import PathCollection, QuadMesh
 from scipy.stats import chi2
 
 import dsa_des
@@ -127,6 +127,28 @@ def test_of_many_aircraft_the_density_is_drawn(tmp_path, monkeypatch, shown, man
     assert bool(figure.axes[0].patches) == (many < 100)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert ("truth (darker: more)" in words) == (many >= 100) == ("95 %" not in words)
+
+
+@pytest.mark.parametrize("still", [True, False])
+def test_a_target_that_stays_where_it_is_is_a_dot(tmp_path, monkeypatch, shown, still):
+    drawn = copy(shown)
+
+    class Posts:
+        def __getattr__(self, name):
+            return getattr(shown.targets, name)
+
+        def at(self, time_s):
+            places = shown.targets.at(time_s)
+            return np.repeat(places[:, :, :1], len(time_s), axis=2) if still else places
+
+    drawn.targets = Posts()
+    plan = drawn_figure(monkeypatch, draw_tracks, tmp_path / "x.png", drawn).axes[0]
+    dots = [one.get_offsets()[0] for one in plan.collections if isinstance(one, PathCollection)]
+    if still:
+        places = shown.targets.at(np.array([drawn.time_s[0]]))[:, :, 0]
+        np.testing.assert_allclose(dots, places[:, [1, 0]] / 1e3)
+    else:
+        assert dots == []
 
 
 def one_track(rng):

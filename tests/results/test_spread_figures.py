@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from dsa_des.cli import main
 from dsa_des.record.drawing import drawing
-from dsa_des.results.curves import _dodge, _edges
+from dsa_des.results.curves import _dodge, _edges, draw_cdf, draw_polar
+from dsa_des.results.record import NUMBER, Result
+from dsa_des.results.statistics import Estimate
+from dsa_des.results.summary import Line
 
 STUDY = """
 scene = "small.toml"
@@ -36,6 +40,38 @@ def test_a_spread_is_drawn_to_the_same_bytes(small: Path, kind: str) -> None:
         study(f'kind = "{kind}"\nmetric = "first_detection_range_m.ir"', "--out", out)
         drawn.append(Path(out, f"figure-01-{kind}.png").read_bytes())
     assert drawn[0] == drawn[1] and drawn[0].startswith(b"\x89PNG")
+
+
+def figure_of(draw, *arguments):
+    """The figure that is drawn, before it is a picture."""
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            FigureCanvasAgg, "print_png", lambda self, *_, **__: found.append(self.figure)
+        )
+        draw(io.BytesIO(), *arguments)
+    return found[0]
+
+
+def test_of_curves_that_are_alike_all_are_seen():
+    alike = [(name, np.array([1.0, 2.0, 4.0])) for name in "abc"]
+    (axes,) = figure_of(draw_cdf, alike, "range_m", "t", None).axes
+    widths = [line.get_linewidth() for line in axes.lines]
+    assert widths == sorted(widths, reverse=True) and np.diff(widths).max() <= -1.0
+
+
+def test_a_polar_figure_says_what_is_shaded():
+    result = Result("range_m", NUMBER, "a distance")
+
+    def lines(low):
+        found = Estimate(2.0, low, 3.0, 4, False)
+        return [Line((angle,), result, found, 0, None) for angle in (0.0, 90.0, 180.0)]
+
+    for low, said in ((1.0, True), (float("nan"), False)):
+        figure = figure_of(
+            draw_polar, ["bearing_deg"], lines(low), "range_m", "bearing_deg", "t", 0.9
+        )
+        assert ("shaded: 90 % interval" in figure.axes[0].get_title(loc="left")) == said
 
 
 @pytest.mark.parametrize(

@@ -116,3 +116,13 @@ def test_ads_b_positions_err_by_the_equipage_for_minutes():
         across.append(level[first] * off(columns, "azimuth_rad")[first])
     assert has_deviation(np.concatenate(across), 185.2 / math.sqrt(-2.0 * math.log(0.05)))
     assert not len(detected("ads_b", 1, targets=around(2, 21 * NMI_M, 9.0), duration_s=9)["scan"])
+
+
+def test_the_eo_ir_sensor_s_directions_err_by_a_milliradian_and_no_farther_than_2_5_nmi():
+    columns = detected("eo_ir", 5, targets=around(9, 4600.0, 320.0), duration_s=20)
+    for name in ("azimuth_rad", "elevation_rad"):
+        error = off(columns, name)
+        assert has_deviation(error, 1e-3)
+        assert abs(error.mean()) < Z * 1e-3 / len(error) ** 0.5
+    far = detected("eo_ir", 5, targets=around(2, 4640.0, 320.0), duration_s=2)
+    assert not len(far["scan"])

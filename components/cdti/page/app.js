@@ -30,11 +30,11 @@ const App = (() => {
     return Link.decide(content);
   }
   function choose(number, picked = true) {
+    const anew = number !== state.chosen, heeded = picked && (anew || !state.picked);
     state.picked = picked;
-    if (number === state.chosen) return;
     state.chosen = number;
-    Link.send({ type: "chosen", target: number });
-    if (picked && number >= 0 && levels.get(number) && may()) decide("looked");
+    if (anew) Link.send({ type: "chosen", target: number });
+    if (heeded && number >= 0 && levels.get(number) && may()) decide("looked");
     state.dirty = true;
   }
   function step(by) {

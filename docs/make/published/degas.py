@@ -8,6 +8,7 @@ import pyarrow.compute as pc
 
 import dsa_des
 from components.geometry import line_of_sight
+from docs.make.published import degas_sensors
 from docs.make.published.rows import PublishedRow, table
 
 TITLE = "DEGAS, from encounter to metric"
@@ -46,6 +47,15 @@ what was recorded, and each of these is a key of its own: `alerting.m_of_n`, and
 the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing that the
 rows need. Other encounters of the same source fly through the same scene by `traffic.daa_file`
 and `traffic.csv_file` in the place of its traffic.
+"""
+
+_BANDS = """
+**Its bands, cell by cell.** It asks DAIDALUS 2.0.1, and recorded 271 directions and 6 altitudes at
+each of 181 seconds. With `daidalus_version = 2.0.1` all 49,051 and all 1,086 are equal (a value on
+an edge has the region of either side), given the velocity of the step of 0.1 s before, which is
+what its logic sees; with that of the instant itself 8 cells at edges of a turning ownship's bands
+differ.
+The tests compare them (`tests/guidance/test_bands_against_reference.py`).
 """
 
 _TRACKED = """
@@ -113,14 +123,16 @@ def mitigated(scene: Any = SCENE) -> list[PublishedRow]:
     ]
 
 
-def section(images: Path) -> str:
-    """Run the encounter and return the section."""
+def section(images: Path, runs: Any = None) -> str:
+    """Run the encounter, and the study of its sensors or take its `runs`; return the section."""
     across_ft = 125.0 * (10_000.0 - 1852.0 / FOOT_M) + 250.0
     return "\n".join(
         [
             _HEAD,
             table([*unmitigated(), *mitigated()]),
             _CHOSEN,
+            _BANDS,
+            degas_sensors.text(images, runs),
             _TRACKED.format(across_ft=across_ft),
         ]
     )

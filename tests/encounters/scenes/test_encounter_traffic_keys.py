@@ -276,3 +276,44 @@ def test_the_encounters_own_ownship_flies_in_a_scene_that_had_another(swapped, t
         scene = dsa_des.load_scene(str(mine), sets=settings)
     [first, *_] = [r for r in dsa_des.run(scene).truth.to_pylist() if r["target"] is None]
     assert (first["lat_deg"], first["lon_deg"]) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+def misses(traffic: dict, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return signed horizontal and vertical miss distances of encounters, and their weights."""
+    from components.encounters.encounter_traffic import ModelTraffic, chosen_encounter
+
+    ModelTraffic.prepare([ModelTraffic.Parameters(**traffic, encounter=k) for k in range(count)])
+    found = []
+    for k in range(count):
+        one, place = chosen_encounter(ModelTraffic, ModelTraffic.Parameters(**traffic, encounter=k))
+        found.append([float(one.extra[n][place]) for n in ("horizontal_miss_m", "vertical_miss_m")]
+                     + [float(one.weights[place])])  # fmt: skip
+    table = np.array(found)
+    return table[:, :2] / 0.3048, table[:, 2]
+
+
+@covers(
+    *(f"{way}.{key}" for way in ("horizontal", "vertical") for key in ("edges_ft", "proportions")),
+    of=("traffic.encounter_model",),
+)
+def test_miss_distances_are_drawn_as_asked_and_weights_undo_it(tmp_path):
+    file = model(tmp_path)
+    near = {
+        "horizontal": {"edges_ft": (-3000, -200, 400, 6000), "proportions": (1, 6, 3)},
+        "vertical": {"edges_ft": (-300, 100, 1500), "proportions": (1, 0.25)},
+    }
+    miss, weight = misses({"file": file, **near}, 400)
+    share = np.histogram(miss[:, 0], (-3000, -200, 400, 6000))[0] / 400
+    assert np.abs(share - (0.1, 0.6, 0.3)).max() < 4 * 0.5 / 20
+    assert (miss[:, 1] >= -300).all() and (miss[:, 1] <= 1500).all()
+    # By hand: the weight is in inverse proportion to the density of both, at one relative speed.
+    density = np.select([miss[:, 0] < -200, miss[:, 0] < 400], (1 / 2800, 6 / 600), 3 / 5600)
+    chance = np.where(miss[:, 1] < 100, 1.0, 0.25)
+    alone, _ = misses({"file": file}, 40)
+    speeds = weight * density * chance
+    assert speeds.min() / speeds.max() > 0.2 and weight.max() / weight.min() > 20
+    assert np.abs(alone).max() > 6000
+    flown = {"type": "traffic.encounter_model", "file": file, "encounter": 3}
+    assert seen({**flown, "horizontal": near["horizontal"]}, 2) != seen(flown, 2)
+    with pytest.raises(Exception, match=r"traffic: vertical: 2 edges need 1 proportions"):
+        seen({**flown, "vertical": {"edges_ft": [-1, 1], "proportions": [1, 1]}})

@@ -73,3 +73,15 @@ def test_classes_are_those_of_the_flights(bearing_deg, course_deg, kind, side, t
     mine = {n for n, v in found.items() if n.startswith(LOSS) and not math.isnan(v)}
     assert mine == {LOSS, f"{LOSS}.{kind.replace(' ', '_')}", f"{LOSS}.{side}"}
     assert "encounter_geometry" not in found
+
+
+@covers("needless", of=KIND)
+def test_a_manoeuvre_is_needless_where_well_clear_is_kept_without():
+    """It is told to turn whatever is asked; whether that was needed hangs on what is lost."""
+    names = ("well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre")
+    lost = ratios(scene(), needless=True)
+    assert [lost[name] for name in names] == [0, 1, 0]
+    assert math.isnan(lost["needless_manoeuvre_share"])
+    kept = ratios(scene(), needless=True, vertical_m=45.0)
+    assert [kept[name] for name in (*names, "needless_manoeuvre_share")] == [1, 1, 1, 1]
+    assert not set(names) & set(ratios(scene()))

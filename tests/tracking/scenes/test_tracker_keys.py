@@ -38,6 +38,14 @@ def fading(seconds, **keys):
     return tracks(sensors={"radar": radar}, targets=[AWAY], duration_s=12, **keys)
 
 
+@covers("start_climb_m_s", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_new_track_knows_how_fast_aircraft_climb(kind):
+    first = tracks(kind, start_speed_m_s=33.0, start_climb_m_s=8.0)[0]
+    found = [first[f"covariance_{i}{i}_m2_s2"] for i in (3, 4, 5)]
+    assert found == pytest.approx([33.0**2, 33.0**2, 8.0**2])
+
+
 @covers("start_speed_m_s", of=TRACKERS)
 @pytest.mark.parametrize("kind", TRACKERS)
 def test_a_first_detection_s_velocity_is_as_uncertain_as_said(kind):

@@ -6,7 +6,8 @@ from reference_data import reference_text
 
 import dsa_des
 from docs.make.published import __main__ as maker
-from docs.make.published import degas
+from docs.make.published import degas, degas_sensors
+from docs.make.published.degas_sensors import quantiles
 
 PAGE = maker.PAGE.read_text(encoding="utf-8").splitlines()
 FOOT_M = 0.3048
@@ -69,3 +70,22 @@ def test_its_flights_from_a_file_give_the_same(tmp_path):
     )
     for row in degas.mitigated(scene):
         assert row.verdict == "equal", row.line()
+
+
+def test_the_middle_99_percent_are_of_the_runs_that_have_a_value():
+    values = [*range(1, 200), float("nan")]
+    assert quantiles(values) == pytest.approx((1.99, 100.0, 198.01))
+
+
+def test_the_study_of_sensors_gives_its_table(tmp_path):
+    """In short form: three seeds of each sensor."""
+    runs = dsa_des.study(degas_sensors.STUDY, replicas=3, workers=1).runs
+    found = degas_sensors.lines(runs)
+    assert len(found) == 2 + len(degas_sensors.SENSORS)
+    assert all(line.count("|") == 6 for line in found)
+    first = runs["first_alert_time_s.filter"].to_numpy()
+    assert ((first > 60.0) & (first < 125.0)).all()
+    acted = runs["first_manoeuvre_time_s"].to_numpy(zero_copy_only=False)
+    assert (acted >= first + 8.0).all()
+    degas_sensors.draw(tmp_path / "spread.png", runs)
+    assert (tmp_path / "spread.png").stat().st_size > 10_000

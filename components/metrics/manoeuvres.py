@@ -1,0 +1,36 @@
+"""When the ownship is first told to fly otherwise, and how often (``manoeuvres``)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.metrics.flown_flights import RecordedManoeuvres
+from dsa_des.arrays.types import FloatArray
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import NUMBER, Group, Metric, Result
+
+
+class ManoeuvreTimes(Metric):
+    """When the first manoeuvre reaches the ownship, and how many do."""
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        self._steering = RecordedManoeuvres(scene)
+        if not self._steering:
+            raise ValueError("needs a block that steers the ownship: no manoeuvres are wired")
+        self.tables = self._steering.tables
+
+    def results(self) -> list[Result]:
+        """Return a time and a number."""
+        return [
+            Result("first_manoeuvre_time_s", NUMBER, "first manoeuvre of the ownship, s"),
+            Result("manoeuvres", NUMBER, "manoeuvres that reach the ownship"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return both for every replica; no time where there is no manoeuvre."""
+        first, count = np.full(len(group), np.nan), np.zeros(len(group))
+        for replica, steering in self._steering.of(group).items():
+            first[replica], count[replica] = steering[0][0], len(steering)
+        return {"first_manoeuvre_time_s": first, "manoeuvres": count}

@@ -1,0 +1,169 @@
+"""How wrong tracks are at which range (``track_errors_by_range``), against bounds such as DO-365's.
+
+Of every run there is one sample at each range: the instant at which the target is nearest to it,
+while a sensor covers it. So samples of different runs are independent, and the quantile of an error
+over runs has an interval by order statistics.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from components.messages.state_tracks import STATUSES
+from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Parameters
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
+
+#: A nautical mile, m.
+MILE_M = 1852.0
+_TABLE = "state_tracks"
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+_ERRORS = {
+    "error_across_m": "horizontal error of the position across the line of sight, m",
+    "error_horizontal_m": "horizontal error of the position, m",
+    "error_vertical_m": "vertical error of the position, m",
+    "error_horizontal_rate_m_s": "horizontal error of the velocity, m/s",
+    "error_vertical_rate_m_s": "vertical error of the velocity, m/s",
+}
+
+
+class ErrorsByRangeParameters(Parameters):
+    """At which ranges, and which share of the errors lies within what is told."""
+
+    ranges_nmi: tuple[float, ...] = Field(
+        default=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), min_length=1, max_length=40,
+        description="Ranges at which tracks are looked at, nautical miles.",
+    )  # fmt: skip
+    quantile: float = Field(
+        default=0.95, gt=0, lt=1, description="Share of the runs whose error is at most the result."
+    )
+    from_s: float = Field(
+        default=30.0, ge=0,
+        description="Time from which on instants count, s: a target that is near when the run "
+        "begins would have been tracked before.",
+    )  # fmt: skip
+    step_s: float = Field(
+        default=1.0, gt=0, le=10,
+        description="Spacing of the instants that are looked at, s; a track is at most twice as "
+        "old.",
+    )  # fmt: skip
+    within_m: float = Field(
+        default=3000.0, gt=0, description="Distance up to which a track is the target's, m."
+    )
+
+
+class ErrorsByRange(Metric):
+    """Quantiles of the errors of confirmed tracks at given ranges, and the share with a track."""
+
+    Parameters = ErrorsByRangeParameters
+    tables = {
+        _TABLE: ("block", "time_s", "state_s", "track_status", "has_range", *_STATE, *_ORIGIN)
+    }
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        if any(not 0.0 < r <= 1000.0 for r in self.p.ranges_nmi):
+            raise ValueError("ranges_nmi: must lie above 0, at most 1000")
+        if len(set(self.p.ranges_nmi)) < len(self.p.ranges_nmi):
+            raise ValueError("ranges_nmi: names a range twice")
+
+    def results(self) -> list[Result]:
+        """Return a result for each kind of error and range, and where tracks begin."""
+        share = f"{100 * self.p.quantile:g} % quantile over runs"
+        found = [Result("first_track_range_nmi", NUMBER, "range at the first confirmed track")]
+        for r in self.p.ranges_nmi:
+            found.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
+            found += [
+                Result(f"{name}.{r:g}", NUMBER, f"{what}, at {r:g} nmi: {share}",
+                       quantile=self.p.quantile)
+                for name, what in _ERRORS.items()
+            ]  # fmt: skip
+        return found
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return the sample of every replica at every range."""
+        found = {result.name: np.full(len(group), np.nan) for result in self.results()}
+        columns: Any = group.tables[_TABLE]
+        held = np.isin(columns["track_status"].codes, _confirmed(columns["track_status"].names))
+        held &= np.asarray(columns["has_range"], dtype=bool)
+        replica = np.asarray(columns["replica"])[held]
+        rows = np.flatnonzero(held)
+        starts = np.searchsorted(replica, np.arange(len(group) + 1))
+        for number, scene in enumerate(group.scenes):
+            mine = rows[starts[number] : starts[number + 1]]
+            end_s = float(group.duration_s[number])
+            for name, value in self._of_run(columns, mine, scene, end_s).items():
+                found[name][number] = value
+        return found
+
+    def _of_run(self, columns: Any, rows: IntArray, scene: Scene, end_s: float) -> dict[str, float]:
+        coverage = Coverage(scene)
+        own, targets = coverage.aircraft
+        time_s = np.arange(self.p.from_s, end_s + 1e-9, self.p.step_s)
+        found: dict[str, float] = {}
+        if len(targets) != 1 or not len(time_s):
+            return found  # whose sample it would be is not known
+        (target,) = targets
+        state = own.at(time_s)
+        origin = np.stack([np.broadcast_to(v, time_s.shape) for v in
+                           (state.lat_deg, state.lon_deg, state.alt_m)])  # fmt: skip
+        place, there = position_in_frame(target, time_s, origin)
+        range_m = np.sqrt((place**2).sum(axis=0))
+        seen = coverage.holds(target, time_s) & there
+        error, of_rows, first_m = self._errors(columns, rows, own, target)
+        if math.isfinite(first_m):
+            found["first_track_range_nmi"] = first_m / MILE_M
+        for r in self.p.ranges_nmi:
+            k = _nearest(range_m, r * MILE_M, seen)
+            if k < 0:
+                continue
+            told_s = columns["time_s"][of_rows]
+            inside = (told_s <= time_s[k] + 1e-9) & (told_s > time_s[k] - 2.0 * self.p.step_s)
+            found[f"tracked.{r:g}"] = float(inside.any())
+            if inside.any():
+                last = int(np.flatnonzero(inside)[-1])
+                found |= {f"{n}.{r:g}": float(error[n][last]) for n in _ERRORS}
+        return found
+
+    def _errors(
+        self, columns: Any, rows: IntArray, own: Any, target: Any
+    ) -> tuple[dict[str, FloatArray], IntArray, float]:
+        """Return errors of rows that are the target's, these rows, and the range of the first."""
+        origin = np.stack([columns[name][rows] for name in _ORIGIN])
+        estimate = np.stack([columns[name][rows] for name in _STATE])
+        true, there = states_in_frame([target], columns["state_s"][rows], origin)
+        apart = estimate - true[0]
+        mine = there[0] & (np.sqrt((apart[:3] ** 2).sum(axis=0)) < self.p.within_m)
+        apart, rows = apart[:, mine], rows[mine]
+        seen_from, _ = position_in_frame(own, columns["state_s"][rows], origin[:, mine])
+        sight = true[0][:3, mine] - seen_from
+        with np.errstate(invalid="ignore", divide="ignore"):
+            level = np.hypot(sight[0], sight[1])
+            across = np.abs(apart[0] * sight[1] - apart[1] * sight[0]) / level
+        error = dict(
+            zip(
+                _ERRORS,
+                (across, np.hypot(apart[0], apart[1]), np.abs(apart[2]),
+                 np.hypot(apart[3], apart[4]), np.abs(apart[5])),
+                strict=True,
+            )
+        )  # fmt: skip
+        first = float(np.sqrt((sight[:, 0] ** 2).sum())) if len(rows) else math.nan
+        return error, rows, first
+
+
+def _nearest(range_m: FloatArray, wanted_m: float, seen: BoolArray) -> int:
+    """Return the first instant nearest to a range, within half a mile of it, or -1."""
+    apart = np.where(seen, np.abs(range_m - wanted_m), np.inf)
+    k = int(np.argmin(apart))
+    return k if apart[k] <= 0.5 * MILE_M else -1
+
+
+def _confirmed(names: tuple[str, ...]) -> list[int]:
+    return [code for code, name in enumerate(names) if name in STATUSES[1:3]]

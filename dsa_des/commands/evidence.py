@@ -1,0 +1,76 @@
+"""``dsa-des evidence``: run a case and leave the pack that shows what came of it."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from dsa_des.commands.study import check_workers, report_crashes, run_into
+from dsa_des.errors import UsageError
+from dsa_des.evidence.case import ASSESSED, read_case
+from dsa_des.evidence.figures import draw_convergence, draw_sensitivity
+from dsa_des.evidence.inputs import files_of_case
+from dsa_des.evidence.pack import INPUTS, MACHINE, PAGE, STUDIES, Pack
+from dsa_des.evidence.page import evidence_page
+from dsa_des.files.output_file import write_file
+from dsa_des.files.output_names import check_place, named, reason_of
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.tables import Tables
+from dsa_des.scene.examples import chosen_file
+from dsa_des.studies.runner import tables_of
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import shell_line
+
+
+def evidence_command(
+    case: str,
+    out: str,
+    sets: tuple[str, ...],
+    encounters: int | None,
+    workers: int | None,
+    resume: bool,
+) -> None:
+    """Do what the command line asks for; exit code 1 where no verdict can be given."""
+    check_workers(workers)
+    if encounters is not None and encounters < 2:
+        raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
+    found = read_case(chosen_file(case), sets, encounters)
+    target = named(out)
+    check_place(target)
+    if target.is_dir() and any(target.iterdir()) and not resume:
+        raise UsageError(f"--out {target}: is not empty; --resume continues a pack")
+    words = ["dsa-des", "evidence", "--resume", "--out", out]
+    words += [word for one in sets for word in ("--set", one)]
+    words += ["--encounters", str(encounters)] if encounters else []
+    again = shell_line([*words, case])
+    try:
+        for name, content in files_of_case(found).copies().items():
+            _write(target / INPUTS / name, content)
+    except OSError as error:
+        raise UsageError(f"--out {target}: cannot be written: {reason_of(error)}") from error
+    folders: dict[str, StudyFolder] = {}
+    tables: dict[str, Tables] = {}
+    for name, study in found.studies.items():
+        path = target / STUDIES / name
+        folders[name] = run_into(study, path, workers, resume, again=_saying(again))
+        tables[name] = tables_of(study, folders[name])
+        tables[name].write()
+    pack = Pack(found, folders, tables, sets, encounters)
+    evidence = pack.evidence()
+    settled = draw_convergence(pack.findings, tables[ASSESSED].record.confidence)
+    changed = draw_sensitivity(pack.changes) if pack.changes else None
+    _write(target / MACHINE, pack.machine_readable())
+    _write(target / PAGE, evidence_page(evidence, settled, changed))
+    say(pack.line, err=pack.passes is None)
+    say(f"wrote {target / PAGE}")
+    report_crashes(list(tables.values()), again)
+    if pack.passes is None:
+        sys.exit(1)
+
+
+def _saying(again: str) -> Callable[[Path], str]:
+    return lambda path: again
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, content)

@@ -1,0 +1,328 @@
+"""The file of a case: what is asked of which system, and the studies that answer it.
+
+Everything is checked before anything runs: a limit without a unit, a result that no study gives, a
+parameter whose source nobody states, are errors of the file.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, ValidationError, model_validator
+
+from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.errors import SceneError, did_you_mean
+from dsa_des.results.record import CLASS, Result, as_text
+from dsa_des.scene.keys import key_in
+from dsa_des.scene.overrides import apply_sets
+from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene_file import SceneFile, read_scene_file
+from dsa_des.studies.identity import results_of
+from dsa_des.studies.study import Study, set_text
+from dsa_des.studies.study_file import read_study
+from dsa_des.studies.study_tables import flat_values
+
+#: The name of the study of the system itself, and of the one that changes a parameter at a time.
+ASSESSED, SENSITIVITY = "assessed", "sensitivity"
+#: What the wires of a scene are called among the sources.
+WIRES = "wires"
+#: The axis of that study, and its value where nothing is changed.
+CHANGED, AS_STATED = "changed", "as stated"
+
+
+def _said(text: str) -> str:
+    if not text.strip():
+        raise ValueError("must not be empty")
+    return text
+
+
+_Text = Annotated[str, AfterValidator(_said)]
+
+
+class AssessedSystem(Parameters):
+    """What is assessed."""
+
+    name: _Text
+    version: _Text
+    description: str = ""
+
+
+class CaseRequirement(Parameters):
+    """A limit on a result of a study, as somebody asks for it."""
+
+    name: _Text
+    text: _Text = Field(description="What is asked for, in words.")
+    source: _Text = Field(description="Who asks for it.")
+    result: _Text
+    study: str = ASSESSED
+    unit: _Text = Field(description="Of the limit.")
+    most: float | None = None
+    least: float | None = None
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Any:
+        if (self.most is None) == (self.least is None):
+            raise ValueError("a requirement has one limit: most = NUMBER or least = NUMBER")
+        return self
+
+    @property
+    def limit(self) -> float:
+        """The number that the result is held against."""
+        return self.most if self.most is not None else self.least  # type: ignore[return-value]
+
+    def met(self, low: float, high: float) -> bool:
+        """Return whether an interval (or a value, given twice) lies within the limit."""
+        return high <= self.limit if self.most is not None else low >= self.limit
+
+    def asked(self) -> str:
+        """Return ``at most 0.3``, with the unit."""
+        return f"at {'most' if self.most is not None else 'least'} {self.limit:g} {self.unit}"
+
+
+class ConvergenceRule(Parameters):
+    """When an estimate counts as known: how little it may still have moved."""
+
+    share: float = Field(default=0.05, gt=0, le=1)
+    of: Literal["estimate", "limit"] = Field(
+        default="estimate", description="Of what it is a share: of the estimate or of the limit."
+    )
+    over_last: float = Field(
+        default=0.5, gt=0, lt=1, description="Share of the units over which it may not move more."
+    )
+
+    def text(self) -> str:
+        """Return the rule as a sentence."""
+        return (
+            f"over the last {100 * self.over_last:g} % of the encounters the running estimate stays"
+            f" within {100 * self.share:g} % of the {self.of} of where it ends"
+        )
+
+
+class BesideStudy(Parameters):
+    """Another study of the same encounters, which is shown beside the system's."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,40}$")
+    study: ScenePath
+    about: _Text
+    replicas: int | None = Field(default=None, ge=1)
+
+
+class SampleSource(Parameters):
+    """What the encounters are drawn from."""
+
+    model: _Text
+    licence: _Text
+    weights: _Text = Field(description="What the weight of an encounter undoes.")
+
+
+class SensitivityKey(Parameters):
+    """A parameter of the system's scene that is changed alone."""
+
+    key: _Text
+    unit: _Text
+    values: tuple[Any, ...] = Field(min_length=1, max_length=9)
+
+
+class LeftOutItem(Parameters):
+    """What the case leaves out, and why it may."""
+
+    what: _Text
+    why: _Text
+
+
+class CaseTables(Parameters):
+    """A case as its file states it."""
+
+    title: _Text
+    description: str = ""
+    study: ScenePath = Field(description="Of the system: one cell, whose replicas are encounters.")
+    set: dict[str, Any] = Field(default={}, description="Changes of the system's scene.")
+    system: AssessedSystem
+    requirements: tuple[CaseRequirement, ...] = Field(min_length=1)
+    sample: SampleSource
+    sources: dict[str, Any] = Field(description="Block or dotted key → where its values are from.")
+    also: tuple[str, ...] = Field(default=(), description="Further results that are shown.")
+    beside: tuple[BesideStudy, ...] = ()
+    convergence: ConvergenceRule = ConvergenceRule()
+    sensitivity: tuple[SensitivityKey, ...] = ()
+    sensitivity_replicas: int = Field(default=300, ge=2)
+    left_out: tuple[LeftOutItem, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class EvidenceCase:
+    """A checked case.
+
+    Parameters
+    ----------
+    file : SceneFile
+        Its tables as read.
+    tables : CaseTables
+    studies : dict
+        By name, in the order in which they run.
+    results : dict
+        What each study gives, by its name and the result's.
+    sensitivity : tuple of (SensitivityKey, object, str)
+        For each value of the axis after the first: key, value, label.
+    """
+
+    file: SceneFile
+    tables: CaseTables
+    studies: Mapping[str, Study]
+    results: Mapping[str, Mapping[str, Result]]
+    sensitivity: tuple[tuple[SensitivityKey, Any, str], ...] = ()
+
+    @property
+    def assessed(self) -> Study:
+        """The study of the system itself."""
+        return self.studies[ASSESSED]
+
+
+def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None) -> EvidenceCase:
+    """Read and check a case with all its studies.
+
+    `replicas` takes the place of those that the system's study states, and of those beside it
+    where the case states none.
+
+    Raises
+    ------
+    SceneError
+        With every problem of the case, or of the first study that has any.
+    """
+    file = read_scene_file(path)
+    problems = apply_sets(file, sets)
+    if problems:
+        raise SceneError(problems)
+    try:
+        tables = CaseTables.model_validate(file.data)
+    except ValidationError as error:
+        raise SceneError(explain(file, (), "a case", CaseTables, error)) from None
+    studies = {ASSESSED: _assessed(file, tables, replicas)}
+    for place, one in enumerate(tables.beside):
+        if one.name in {*studies, SENSITIVITY}:
+            raise SceneError([file.problem(("beside", place, "name"), "is given twice", one.name)])
+        many = one.replicas or replicas
+        studies[one.name] = read_study(one.study, sets=[f"replicas={many}"] if many else [])
+    varied: tuple[tuple[SensitivityKey, Any, str], ...] = ()
+    if tables.sensitivity:
+        varied, studies[SENSITIVITY] = _sensitivity(file, tables, studies[ASSESSED])
+    results = {name: {r.name: r for r in results_of(study)} for name, study in studies.items()}
+    case = EvidenceCase(file, tables, studies, results, varied)
+    problems = [*_unknown_results(case), *_without_source(case)]
+    if problems:
+        raise SceneError(problems)
+    return case
+
+
+def _assessed(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
+    sets = [f"replicas={replicas}"] if replicas else []
+    sets += [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
+    study = read_study(tables.study, sets=sets)
+    if len(study.cells) != 1:
+        message = f"has {len(study.cells)} cells; a case is one: a study without axes"
+        raise SceneError([file.problem(("study",), message, str(file.data["study"]))])
+    return study
+
+
+def _sensitivity(
+    file: SceneFile, tables: CaseTables, assessed: Study
+) -> tuple[tuple[tuple[SensitivityKey, Any, str], ...], Study]:
+    """Return the changes of one parameter at a time, and the study of them."""
+    scene = assessed.scene(0).resolved()
+    stated: dict[str, Any] = {}
+    for place, one in enumerate(tables.sensitivity):
+        found: Any = scene
+        for part in key_in(scene, one.key):
+            inside = isinstance(found, dict) and part in found
+            if not inside and not (isinstance(found, list) and isinstance(part, int)):
+                known = list(found) if isinstance(found, dict) else []
+                message = f"the scene has no such value{did_you_mean(str(part), known)}"
+                at = ("sensitivity", place, "key")
+                raise SceneError([file.problem(at, message, one.key)])
+            found = found[part]
+        stated[one.key] = found
+    varied = tuple(
+        (one, value, f"{one.key} = {written(value)}")
+        for one in tables.sensitivity for value in one.values
+    )  # fmt: skip
+    columns = {
+        key: [value, *(v if one.key == key else value for one, v, _ in varied)]
+        for key, value in stated.items()
+    }
+    axis = {"values": [AS_STATED, *(label for _, _, label in varied)], "set": columns}
+    sets = [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
+    keys = {
+        "axes": {CHANGED: axis},
+        "compare": {"axis": CHANGED, "baseline": AS_STATED},
+        "replicas": min(tables.sensitivity_replicas, assessed.replicas),
+        "figures": [], "requirements": [],
+    }  # fmt: skip
+    return varied, read_study(tables.study, sets=sets, keys=keys)
+
+
+def written(value: Any) -> str:
+    """Return a value as a case's lines show it: as a scene would hold it."""
+    return set_text(value) if isinstance(value, list | dict) else as_text(value)
+
+
+def _unknown_results(case: EvidenceCase) -> list[Any]:
+    """Return a problem for every result that no study gives."""
+    found = []
+    named = [
+        (("requirements", place), one.study, one.result)
+        for place, one in enumerate(case.tables.requirements)
+    ]
+    named += [(("also", place), ASSESSED, name) for place, name in enumerate(case.tables.also)]
+    for at, study, name in named:
+        inside = at[0] == "requirements"
+        if study not in case.studies or study == SENSITIVITY:
+            known = [name for name in case.studies if name != SENSITIVITY]
+            message = f"the case has no such study{did_you_mean(study, known)}"
+            found.append(case.file.problem((*at, "study"), message, study))
+            continue
+        known = [r.name for r in case.results[study].values() if r.kind != CLASS]
+        if name not in known:
+            message = f"the study gives no such result{did_you_mean(name, known)}"
+            found.append(case.file.problem((*at, "result") if inside else at, message, name))
+        elif inside and len(case.studies[study].cells) != 1:
+            message = f"has {len(case.studies[study].cells)} cells; a requirement is held to one"
+            found.append(case.file.problem((*at, "study"), message, study))
+    return found
+
+
+def _without_source(case: EvidenceCase) -> list[Any]:
+    """Return a problem for every block whose scene states a value that no source covers."""
+    found = []
+    sources, scene = case.tables.sources, case.assessed.scene(0)
+    for key in flat_values(sources):
+        parts = key.removeprefix("blocks.").split(".")
+        if parts[0] not in {*scene.blocks, WIRES}:
+            hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
+            message = f"the scene has no block {parts[0]!r}{hint}"
+            found.append(case.file.problem(("sources", key), message))
+    for name, block in scene.blocks.items():
+        stated = block.parameters.model_fields_set
+        missing = [key for key in sorted(stated) if source_of(sources, name, key) is None]
+        if missing:
+            message = (
+                f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
+            )
+            found.append(case.file.problem(("sources", name), message))
+    if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
+        message = "is missing: nobody says where delays and losses of wires come from"
+        found.append(case.file.problem(("sources", WIRES), message))
+    return found
+
+
+def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
+    """Return the wires of a scene that delay or lose messages, as tables."""
+    whole = [wire for wire in scene.resolved()["wires"] if isinstance(wire, dict)]
+    return [dict(wire) for wire in whole if set(wire) - {"from", "to", "holds"}]
+
+
+def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
+    """Return where a parameter's value is from: what is said of the key, or else of its block."""
+    known = {name.removeprefix("blocks."): str(text) for name, text in flat_values(sources).items()}
+    return known.get(f"{block}.{key}", known.get(block))

@@ -1,0 +1,154 @@
+"""What a case is made of: its files, with digests and copies, and its parameters with sources."""
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dsa_des.block.ladder import Verified
+from dsa_des.block.shipped_files import folders
+from dsa_des.evidence.case import WIRES, EvidenceCase, source_of, wires_with_options, written
+from dsa_des.results.folder import StudyFolder
+from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
+from dsa_des.studies.draws import file_digest
+from dsa_des.studies.identity import files_of
+from dsa_des.studies.study import Study
+
+#: Where a parameter is written that no file states.
+DEFAULT = "default"
+
+
+@dataclass(frozen=True)
+class CaseFiles:
+    """The files of a case.
+
+    Parameters
+    ----------
+    root : Path
+        What relative names count from.
+    names : dict
+        File → its name below the root; a shipped one's place among those.
+    case : str
+        Name of the case's own file.
+    """
+
+    root: Path
+    names: Mapping[Path, str]
+    case: str
+
+    def shown(self, text: str) -> str:
+        """Return a text that is a path of the case as a name below the root."""
+        path = Path(os.path.abspath(text))
+        if path in self.names:
+            return self.names[path]
+        return path.name if os.path.isabs(text) else text
+
+    def digests(self) -> list[dict[str, str]]:
+        """Return every file with the SHA-256 of its content, by name."""
+        rows = [{"file": name, "sha256": file_digest(path)} for path, name in self.names.items()]
+        return sorted(rows, key=lambda row: (row["file"], row["sha256"]))
+
+    def copies(self) -> dict[str, bytes]:
+        """Return the content of every file below the root, by its name there."""
+        return {
+            name: path.read_bytes()
+            for path, name in self.names.items()
+            if path.is_relative_to(self.root)
+        }
+
+
+def files_of_case(case: EvidenceCase) -> CaseFiles:
+    """Return the files that a case and its studies read.
+
+    Raises
+    ------
+    OSError
+        If one of them cannot be read.
+    """
+    own = Path(os.path.abspath(case.file.path))
+    found = {own, *_paths(case.file.sources.values())}
+    for study in case.studies.values():
+        found |= {Path(os.path.abspath(study.path)), *_paths(study.base.sources.values())}
+        found |= set(_paths(read_scene_file(study.path).sources.values()))
+        found |= {Path(os.path.abspath(path)) for path in files_of(study)}
+    shipped = [Path(os.path.abspath(folder)) for folder in folders()]
+    home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
+    mine = [p for p in found if not any(p.is_relative_to(folder) for folder in shipped)]
+    root = home or Path(os.path.commonpath([path.parent for path in mine]))
+    names = {path: _below(path, [root, *shipped]) for path in sorted(found)}
+    return CaseFiles(root, names, names[own])
+
+
+def _below(path: Path, folders: Iterable[Path]) -> str:
+    """Return a file's name below the first of some folders that holds it, or its last part."""
+    inside = [folder for folder in folders if path.is_relative_to(folder)]
+    return path.relative_to(inside[0]).as_posix() if inside else path.name
+
+
+def _paths(sources: Iterable[str]) -> list[Path]:
+    return [Path(os.path.abspath(source)) for source in set(sources) if source != COMMAND_LINE]
+
+
+def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
+    """Return every parameter of the system's blocks: value, meaning, where written, its source."""
+    study = case.assessed
+    scene = study.scene(0)
+    changed = {key.removeprefix("blocks.") for key, _ in study.sets}
+    rows = []
+    for name, block in scene.blocks.items():
+        fields = type(block.parameters).model_fields
+        values = block.parameters.model_dump(mode="json", exclude_none=True)
+        for key, value in values.items():
+            where = DEFAULT
+            if key in block.parameters.model_fields_set:
+                where = files.shown(study.base.source_of(("blocks", name, key)))
+            if any(f"{one}.".startswith(f"{name}.{key}.") for one in changed):
+                where = "the study or the case"
+            rows.append({
+                "key": f"{name}.{key}",
+                "value": files.shown(value) if isinstance(value, str) else written(value),
+                "meaning": (fields[key].description or "") if key in fields else "",
+                "written_in": where,
+                "source": source_of(case.tables.sources, name, key) if where != DEFAULT else None,
+            })  # fmt: skip
+    for wire in wires_with_options(scene):
+        way = f"{wire.pop('from')} -> {wire.pop('to')}"
+        rows.append({
+            "key": f"{WIRES}.{way}",
+            "value": ", ".join(f"{key} = {written(value)}" for key, value in wire.items()),
+            "meaning": "What the wire does to messages.",
+            "written_in": files.shown(study.base.source_of((WIRES,))),
+            "source": source_of(case.tables.sources, WIRES, way),
+        })  # fmt: skip
+    return rows
+
+
+def models_of(study: Study) -> list[dict[str, Any]]:
+    """Return every block of a study's first scene: what it is, and what it was held against."""
+    return [
+        {
+            "block": name, "type": block.type_name,
+            "about": " ".join((block.cls.__doc__ or "").strip().partition("\n\n")[0].split()),
+            "verified": [one._asdict() for one in verified_of(block.cls)],
+        }
+        for name, block in study.scene(0).blocks.items()
+    ]  # fmt: skip
+
+
+def verified_of(cls: type) -> list[Verified]:
+    """Return what a block's class and its bases were held against."""
+    return [one for base in reversed(cls.__mro__) for one in vars(base).get("verified", ())]
+
+
+def digest_of_results(folder: StudyFolder) -> str:
+    """Return the SHA-256 of all rows of a study, whatever the folder and the parts they lie in."""
+    import pyarrow as pa
+
+    table = folder.results()
+    kept = table.drop_columns([n for n in ("command", "error") if n in table.column_names])
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, kept.schema) as writer:
+        writer.write_table(kept)
+    return hashlib.sha256(sink.getvalue()).hexdigest()

@@ -1,0 +1,178 @@
+"""The pack of a case: one folder with what was asked, what was found, and all that repeats it."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from dsa_des.evidence.case import AS_STATED, ASSESSED, SENSITIVITY, EvidenceCase
+from dsa_des.evidence.findings import (
+    MET,
+    NOT_KNOWN,
+    Convergence,
+    Finding,
+    ParameterChange,
+    changes_of,
+    findings_of,
+    first_line,
+    numbers_of,
+)
+from dsa_des.evidence.inputs import (
+    CaseFiles,
+    digest_of_results,
+    files_of_case,
+    models_of,
+    parameters_of,
+)
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.models import read_explained, versions
+from dsa_des.results.tables import Tables
+from dsa_des.text.safe_text import shell_line
+
+#: The parts of a pack: what is read by people, and by programs; inputs; the studies' own folders.
+PAGE, MACHINE, INPUTS, STUDIES = "evidence.html", "evidence.json", "inputs", "studies"
+
+
+class Pack:
+    """What a case shows, once its studies have run.
+
+    Parameters
+    ----------
+    case : EvidenceCase
+    folders : mapping
+        Of every study of the case, finished.
+    sets : sequence of str
+        Changes of the case's file from the command line.
+    replicas : int, optional
+        That the command line asked for.
+    """
+
+    def __init__(
+        self, case: EvidenceCase, folders: Mapping[str, StudyFolder], tables: Mapping[str, Tables],
+        sets: tuple[str, ...] = (), replicas: int | None = None,
+    ) -> None:  # fmt: skip
+        self.case, self.folders, self.tables = case, folders, tables
+        self.files: CaseFiles = files_of_case(case)
+        self.findings: list[Finding] = findings_of(case, tables)
+        self.changes: list[ParameterChange] = changes_of(case, tables)
+        self.line = first_line(self.findings)
+        words = ["dsa-des", "evidence", f"{INPUTS}/{self.files.case}"]
+        words += [word for one in sets for word in ("--set", one)]
+        words += ["--encounters", str(replicas)] if replicas else []
+        self.command = shell_line([*words, "--out", "AGAIN"])
+
+    @property
+    def passes(self) -> bool | None:
+        """Whether all requirements are met; None where no verdict can be given."""
+        found = {one.verdict for one in self.findings}
+        return None if NOT_KNOWN in found else found == {MET}
+
+    def evidence(self) -> dict[str, Any]:
+        """Return all of it as one table of plain values: no path, no time, nothing of this run."""
+        tables = self.case.tables
+        return {
+            "verdict": {"line": self.line, "passes": self.passes},
+            "case": {"title": tables.title, "description": tables.description},
+            "system": tables.system.model_dump(),
+            "requirements": [self._requirement(one) for one in self.findings],
+            "also": [numbers_of(line) for name in tables.also for line in self._lines(name)],
+            "beside": [self._beside(one.name, one.about) for one in tables.beside],
+            "sample": self._sample(),
+            "convergence": {
+                "rule": tables.convergence.text(),
+                "estimates": [_running(one) for one in self.findings],
+            },
+            "sensitivity": [_changed(one) for one in self.changes],
+            "sensitivity_encounters": self._units(SENSITIVITY),
+            "parameters": parameters_of(self.case, self.files),
+            "models": models_of(self.case.assessed),
+            "left_out": self._left_out(),
+            "seeds": {name: study.seed for name, study in self.case.studies.items()},
+            "inputs": self.files.digests(),
+            "results": [
+                {"study": name, "runs": len(self.tables[name].rows.places),
+                 "failed": self.tables[name].rows.failed, "rows_sha256": digest_of_results(folder)}
+                for name, folder in self.folders.items()
+            ],
+            "versions": versions(),
+            "command": self.command,
+        }  # fmt: skip
+
+    def machine_readable(self) -> bytes:
+        """Return the content of ``evidence.json``."""
+        text = json.dumps(_finite(self.evidence()), indent=1, allow_nan=False, ensure_ascii=False)
+        return f"{text}\n".encode()
+
+    def _lines(self, name: str, study: str = ASSESSED) -> list[Any]:
+        return [line for line in self.tables[study].lines if line.result.name == name]
+
+    def _units(self, study: str) -> int:
+        return self.case.studies[study].replicas if study in self.case.studies else 0
+
+    def _requirement(self, one: Finding) -> dict[str, Any]:
+        asked = one.requirement
+        found = numbers_of(one.line)
+        return {
+            "name": asked.name, "text": asked.text, "source": asked.source,
+            "limit": asked.limit, "sense": "most" if asked.most is not None else "least",
+            "unit": asked.unit, "study": asked.study, **found,
+            "confidence": self.tables[asked.study].record.confidence,
+            "moved": one.convergence.moved, "may_move": one.convergence.allowed,
+            "converged": one.convergence.holds, "verdict": one.verdict,
+        }  # fmt: skip
+
+    def _beside(self, name: str, about: str) -> dict[str, Any]:
+        wanted = [one.result for one in self.case.tables.requirements if one.study == ASSESSED]
+        wanted += self.case.tables.also
+        numbers = [numbers_of(line) for one in wanted for line in self._lines(one, name)]
+        return {"name": name, "about": about, "encounters": self._units(name), "results": numbers}
+
+    def _sample(self) -> dict[str, Any]:
+        ratios = [one.line.ratio for one in self.findings if one.line.ratio is not None]
+        size = ratios[0].effective_sample_size if ratios else None
+        return {
+            **self.case.tables.sample.model_dump(),
+            "encounters": self._units(ASSESSED), "effective_sample_size": size,
+            "drawn": [draw.key for draw in self.tables[ASSESSED].record.draws],
+        }  # fmt: skip
+
+    def _left_out(self) -> dict[str, Any]:
+        explained = read_explained(self.folders[ASSESSED])
+        scene = explained.scenes[0] if explained and explained.scenes else None
+        return {
+            "stated": [one.model_dump() for one in self.case.tables.left_out],
+            "effects": [
+                {"block": e.block, "effect": e.effect, "because": e.because}
+                for e in (scene.effects if scene else ()) if not e.simulated
+            ],
+        }  # fmt: skip
+
+
+def _running(one: Finding) -> dict[str, Any]:
+    c: Convergence = one.convergence
+    return {
+        "requirement": one.requirement.name, "rule_counts_from": c.last_from,
+        "moved": c.moved, "may_move": c.allowed,
+        "encounters": c.counts, "value": [e.value for e in c.estimates],
+        "low": [e.low for e in c.estimates], "high": [e.high for e in c.estimates],
+    }  # fmt: skip
+
+
+def _changed(one: ParameterChange) -> dict[str, Any]:
+    d = one.difference
+    return {
+        "key": one.key, "unit": one.unit, AS_STATED.replace(" ", "_"): one.stated,
+        "value": one.value, "result": one.result, "difference": d.value, "low": d.low,
+        "high": d.high, "in_limits": one.in_limits,
+    }  # fmt: skip
+
+
+def _finite(value: Any) -> Any:
+    """Return plain values in which what is no number is null, floats rounded."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float):
+        return float(f"{value:.12g}") if math.isfinite(value) else None
+    return value

@@ -1,0 +1,25 @@
+"""What a block says it was held against: there is such a test, and it says how closely."""
+
+from pathlib import Path
+
+from dsa_des.block.entry_points import COMPONENTS, registered
+from dsa_des.block.registry import find
+from dsa_des.evidence.inputs import verified_of
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_claim_names_a_test_that_is_there():
+    claims = {}
+    for name in registered(COMPONENTS):
+        claims |= {(name, one.what): one for one in verified_of(find(name))}
+    assert len(claims) >= 12
+    for one in claims.values():
+        assert (ROOT / one.test).is_file(), one
+        assert all(text and text == text.strip() for text in one), one
+    assert {"line of sight", "errors of measured values"} <= {what for _, what in claims}
+
+
+def test_a_sensor_is_held_to_what_all_sensors_are():
+    what = [one.what for one in verified_of(find("radar.range_boundary"))]
+    assert "field of view and range" in what

@@ -1,0 +1,57 @@
+"""What is wrong with a case is said in a line before anything runs, and nothing is left."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.evidence.small_case import CASE, evidence, write_case
+
+BAD = {
+    'unit = "of what is lost without"\n': ("", "requirements[0].unit: is required"),
+    'unit = "of the encounters"': ('unit = " "', "requirements[1].unit = ' ': must not be empty"),
+    "most = 2\n": ("", "requirements[0]: a requirement has one limit"),
+    "least = 0.01": ("least = 0.01\nmost = 3", "requirements[1]: a requirement has one limit"),
+    'result = "manoeuvred"': ('result = "manoeuverd"', "did you mean 'manoeuvred'?"),
+    'study = "study.toml"': ('study = "studi.toml"', "did you mean"),
+    'avoidance = "a report"\n': ("", "sources.avoidance: is missing: nobody says where"),
+    'wires = "a guess"\n': ("", "sources.wires: is missing"),
+    'traffic = "us"': ('trafic = "us"', "did you mean 'traffic'?"),
+    '[sample]\nmodel = "light aircraft"\n': ("[sample]\n", "sample.model: is required"),
+    'also = ["needless_manoeuvre_share"]': ('also = ["needles"]', "also[0] = 'needles'"),
+    'key = "blocks.avoidance.range_km"': ('key = "blocks.avoidance.rang"', "no such value"),
+    'name = "slow"': ('name = "assessed"', "beside[0].name = 'assessed': is given twice"),
+    'of = "estimate"': ('of = "limits"', "did you mean 'limit'?"),
+    'title = "A small case"': ('title = "A"\ntitel = "B"', "did you mean 'title'?"),
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_case(text, tmp_path):
+    other, said = BAD[text]
+    assert CASE.count(text) == 1
+    case = write_case(tmp_path)
+    case.write_text(CASE.replace(text, other), encoding="utf-8")
+    output, code = evidence(case, "--out", tmp_path / "pack")
+    assert code == 2 and said in output, output
+    assert output.startswith("error: ") and not (tmp_path / "pack").exists()
+
+
+def test_bad_calls(tmp_path):
+    case = write_case(tmp_path)
+    assert (
+        "--encounters is 1: it must be 2 or more"
+        in evidence(case, "--out", tmp_path / "pack", "--encounters", 1)[0]
+    )
+    (tmp_path / "full").mkdir()
+    Path(tmp_path / "full" / "mine.txt").write_text("kept")
+    output, code = evidence(case, "--out", tmp_path / "full")
+    assert code == 2 and "is not empty; --resume continues a pack" in output
+    assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
+
+
+def test_a_study_of_several_cells_is_no_case(tmp_path):
+    case = write_case(tmp_path)
+    study = tmp_path / "study.toml"
+    study.write_text(study.read_text() + "[axes]\nblocks.radar.range_km = [4, 9]\n")
+    output, code = evidence(case, "--out", tmp_path / "pack")
+    assert code == 2 and "study = 'study.toml': has 2 cells" in output
