@@ -223,7 +223,8 @@ Means of six seeds, with their 95 % intervals; "never" where half of the looks n
 one of the seeds at least. On a calm background the signature sees about a sixth farther (why, see
 the next section), and large, faint targets more than that: it counts the signal of all pixels and
 the noise of a point, and to filters of their size the noise is that of all their pixels. From abeam
-both detect from the start of the run on, 4.4 km away. The signature knows neither smear nor clutter.
+both detect from the start of the run on, 4.4 km away. The signature knows neither smear nor
+clutter.
 
 **Price.** A look of a picture costs {image_us:.0f} µs of CPU time on one core here, and one of the
 signature {signature_us:.2f} µs.
