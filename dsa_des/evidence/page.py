@@ -16,16 +16,18 @@ from dsa_des.text.safe_text import printable
 
 _PAGE = (
     PAGE_HEAD
-    + """<style>table{width:auto}td{min-width:4em}</style><h1>{{ title }}</h1>
+    + """<style>table{width:auto}td{min-width:4em}</style>
+<header><h1>{{ title }}</h1>
 <p class="verdict"><strong>{{ verdict }}</strong></p>
 <p>{{ e.case.description }}</p>
 <p class="note">Assessed: {{ e.system.name }}, version {{ e.system.version }}. Made by dsa_des \
-{{ e.versions.dsa_des }}. The same in numbers: <code>evidence.json</code>.</p>
+{{ e.versions.dsa_des }}. The same in numbers: <code>evidence.json</code>.</p>\
+</header>
 <nav><a href="#requirements">Requirements</a> <a href="#beside">Beside it</a> \
 <a href="#encounters">Encounters</a> <a href="#convergence">Convergence</a> \
 <a href="#sensitivity">Sensitivity</a> <a href="#parameters">Parameters</a> \
 <a href="#models">Models</a> <a href="#left_out">Left out</a> \
-<a href="#repeat">To repeat it</a></nav>
+<a href="#repeat">To repeat it</a></nav><main>
 <h2 id="system">The system</h2><p>{{ e.system.description }}</p>
 <h2 id="requirements">Requirements and evidence</h2>
 {{ table(("requirement", "asked", "found", level + " interval", "verdict"), requirements) }}
@@ -87,7 +89,7 @@ that matters most stands first.</p>
 {{ table(("study", "seed", "runs", "without result", "SHA-256 of all rows"), results) }}
 <details><summary>Inputs and versions</summary>
 {{ table(("input", "SHA-256"), inputs) }}{{ table(("package", "version"), versions) }}</details>
-</body></html>
+</main></body></html>
 """
 )
 
