@@ -12,8 +12,7 @@ from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
-from dsa_des.running.channel import WireFaults
-from dsa_des.running.effects import plan
+from dsa_des.running.effects import WireFaults, plan
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams

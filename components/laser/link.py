@@ -51,11 +51,7 @@ def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) 
     ValueError
         If an argument is out of range or not finite.
     """
-    shape, (area, distance) = broadcast_flat(
-        area_m2=not_negative("area_m2", area_m2), range_m=positive("range_m", range_m)
-    )
-    width_m = float(positive("divergence_rad", divergence_rad)) * distance
-    return unflatten(np.minimum(area / (0.25 * math.pi * width_m**2), 1.0), shape)
+    return _filled("area_m2", area_m2, range_m, divergence_rad, 2)
 
 
 def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
@@ -79,11 +75,17 @@ def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float)
     ValueError
         If an argument is out of range or not finite.
     """
-    shape, (thick, distance) = broadcast_flat(
-        diameter_m=not_negative("diameter_m", diameter_m), range_m=positive("range_m", range_m)
+    return _filled("diameter_m", diameter_m, range_m, divergence_rad, 1)
+
+
+def _filled(
+    name: str, size: ArrayLike, range_m: ArrayLike, divergence_rad: float, power: int
+) -> Any:
+    shape, (filled, distance) = broadcast_flat(
+        **{name: not_negative(name, size), "range_m": positive("range_m", range_m)}
     )
     width_m = float(positive("divergence_rad", divergence_rad)) * distance
-    return unflatten(np.minimum(thick / (0.25 * math.pi * width_m), 1.0), shape)
+    return unflatten(np.minimum(filled / (0.25 * math.pi * width_m**power), 1.0), shape)
 
 
 def laser_power_w(

@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TARGET_VELOCITY
-from components.messages.detections import Detections, LastingError, LastingPart, SensorOffer
+from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
-from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import (
     OwnBelief,
     carried_on,
@@ -23,13 +22,7 @@ from components.surveillance.believed_line import (
     towards,
     variances_in_body,
 )
-from components.surveillance.broadcast import (
-    CLIMB_SCALE_M_S,
-    CORRELATION_TIME_S,
-    Broadcasts,
-    Sent,
-    Who,
-)
+from components.surveillance.broadcast import Broadcasts, Sent, Who
 from components.surveillance.cooperative import (
     PLACE,
     STEP_S,
@@ -37,11 +30,10 @@ from components.surveillance.cooperative import (
     CooperativeSensor,
     velocity_of,
 )
-from components.surveillance.extended_squitter import KNOT_M_S
 from components.surveillance.reception import LAWS
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
-from components.well_clear.volume import FOOT_M
+from components.surveillance.stated_errors import StatedByAircraft, lasting_errors
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -190,21 +182,9 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=self._lasting(), unstated_across_m2=0.0, measures_velocity=True,
+            lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
+            measures_velocity=True,
         )  # fmt: skip
-
-    def _lasting(self) -> dict[str, LastingError]:
-        """Return what lasts of what aircraft say: all but rounding, which is taken to last too."""
-        if self.p.position_errors == "none":
-            return {}
-        lasts_s = {"elevation": math.inf}  # an aircraft keeps its altimeter
-        if self.p.position_errors == "gauss_markov":
-            for name in ("azimuth", "range", "range_rate", "velocity"):
-                lasts_s[name] = CORRELATION_TIME_S
-        return {
-            name: LastingError(parts=(LastingPart(lasts_s=time_s, share=1.0),))
-            for name, time_s in lasts_s.items()
-        }
 
     @property
     def steps(self) -> dict[str, float]:
@@ -375,7 +355,12 @@ class AdsB(CooperativeSensor):
         ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + STEP_S)))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = in_body(own, ned)
-        variances, rate_variance = self._variances(own, ned, said, age_s, cells, found)
+        stated = StatedByAircraft(
+            cells.roster.equipage, cells.craft[found], said,
+            errs=self.p.position_errors != "none", rounds=self.p.compact,
+        )  # fmt: skip
+        variances = variances_in_body(own, ned, stated.place_m2(age_s))
+        rate_variance = stated.speed_m2_s2
         moves = np.stack([look.signal[f"own_{axis}"][found] for axis in ("north", "east", "down")])
         rate = ((moving - moves) * ned).sum(axis=0) / distance
         beside = {
@@ -384,50 +369,11 @@ class AdsB(CooperativeSensor):
             "range_variance_m2": variances[2],
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
-            "target_velocity": self._told_velocity(cells, found, said, moving, rate_variance),
+            "target_velocity": stated.velocity(
+                moving, cells.state_ns[found] / NANOSECONDS - said["velocity_s"]
+            ),
         }
         return azimuth, elevation, distance, beside
-
-    def _told_velocity(
-        self,
-        cells: Cells,
-        found: IntArray,
-        said: dict[str, AnyArray],
-        moving: FloatArray,
-        variance: FloatArray,
-    ) -> dict[str, FloatArray]:
-        """Return velocities as `TARGET_VELOCITY`; since they were sent aircraft may have turned."""
-        age_s = cells.state_ns[found] / NANOSECONDS - said["velocity_s"]
-        turned = (_MANOEUVRE_M_S2 * age_s) ** 2
-        climb = 2.0 * CLIMB_SCALE_M_S**2 if self.p.position_errors != "none" else _LEAST_M2
-        climb += (64.0 * FOOT_M / 60.0) ** 2 / 12.0 if self.p.compact else 0.0
-        spread = [variance + turned, variance + turned, climb + turned]
-        return dict(zip(TARGET_VELOCITY, [*moving, *spread], strict=True))
-
-    def _variances(
-        self,
-        own: OwnBelief,
-        ned: FloatArray,
-        said: dict[str, AnyArray],
-        age_s: FloatArray,
-        cells: Cells,
-        found: IntArray,
-    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """Return the variances of lines of sight and of range rates that the categories state."""
-        equipage, craft = cells.roster.equipage, cells.craft[found]
-        errs, rounds = self.p.position_errors != "none", self.p.compact
-        moving = ~np.isnan(said["reported_north_m_s"])
-        place = np.where(errs, equipage.position_deviation_m[craft] ** 2, _LEAST_M2)
-        speed = np.where(errs, equipage.velocity_deviation_m_s[craft] ** 2, _LEAST_M2)
-        feet = said["reported_alt_m"] / FOOT_M
-        high = np.where(errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
-        if rounds:
-            place, speed = place + _COMPACT_M2, speed + KNOT_M_S**2 / 12.0
-            high = high + (25.0 * FOOT_M) ** 2 / 12.0
-        # Without a velocity an aircraft may have gone anywhere at the speed of one.
-        unknown_m2 = np.where(moving, speed, _UNKNOWN_M_S**2) * age_s**2
-        level = place + unknown_m2
-        return variances_in_body(own, ned, (level, level, high)), speed
 
     def run(self, wake: Wake) -> Detections | None:
         """Report what was received, with the ownship's velocity beside."""
@@ -445,12 +391,3 @@ class AdsB(CooperativeSensor):
             told = {name: np.zeros(0) for name in TARGET_VELOCITY}
         own = dict(zip(OWN_VELOCITY, moves, strict=True))
         return replace(report, own_velocity=own, target_velocity=told)
-
-
-#: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
-_COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
-_UNKNOWN_M_S = 100.0
-#: How much aircraft change their velocity on the way from a message to a scan, a deviation.
-_MANOEUVRE_M_S2 = 1.0
-#: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
-_LEAST_M2 = 1e-4

@@ -70,19 +70,15 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """What a replica must remember of looks, for later ones that come late."""
+    """What is remembered of a run's looks, for later ones that come late."""
 
     replica: int
     scans: Scans
     before: dict[int, Before]
 
     @classmethod
-    def of(
-        cls, scans: Scans, memory: Memory | None, before: dict[int, Before], replica: int
-    ) -> "Past | None":
+    def of(cls, scans: Scans, memory: Memory, before: dict[int, Before], replica: int) -> "Past":
         """Return the looks in memory, numbered anew in their order."""
-        if memory is None:
-            return None
         kept = {
             new: Before(
                 before[old].store.take(before[old].store.replica == replica),
@@ -92,9 +88,13 @@ class Past:
         }
         return cls(replica, scans.take(np.array(memory.looks, dtype=np.int64)), kept)
 
-    def memory(self) -> Memory:
-        """Return the looks in memory."""
-        return Memory(keys_of(self.scans), list(range(len(self.scans))))
+    def memory(self, first: int) -> Memory:
+        """Return the looks in memory, numbered from `first` on."""
+        return Memory(keys_of(self.scans), list(range(first, first + len(self.scans))))
+
+    def numbered(self, first: int) -> dict[int, Before]:
+        """Return how tracks were before each of its looks, numbered from `first` on."""
+        return {first + look: before for look, before in self.before.items()}
 
 
 def keys_of(scans: Scans) -> list[Key]:

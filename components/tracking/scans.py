@@ -92,6 +92,8 @@ class Scans:
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the looks of all parts, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
         names = ("row", "run", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
                  "variance", "contributors", "source")  # fmt: skip

@@ -105,16 +105,13 @@ class Tracker(Component):
         self._sensors: tuple[str, ...] = ()
         self._store = self._no_tracks(0)
         self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
-        self._past: Past | None = None
+        #: By run.
+        self._past: dict[int, Past] = {}
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
         self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
-
-    def goes_side_by_side(self) -> bool:
-        """Say no where looks are worked on again: one replica's are remembered."""
-        return super().goes_side_by_side() and not self._remembers
 
     def _lag_s(self) -> Fraction:
         if self.p.lag_s is not None:
@@ -176,13 +173,19 @@ class Tracker(Component):
             return None
         records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
-        past = self._past
         begin = 0
         before: dict[int, Before] = {}
         memory: dict[int, Memory] = {}
-        if past is not None and past.replica == records.replica[0]:
-            begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
-            scans = Scans.joined([past.scans, scans])
+        remembered = [
+            (number, past)
+            for number, run in enumerate(records.replica.tolist())
+            if (past := self._past.get(run)) is not None
+        ]
+        for number, past in remembered:
+            memory[number] = past.memory(begin)
+            before |= past.numbered(begin)
+            begin += len(past.scans)
+        scans = Scans.joined([*(past.scans for _, past in remembered), scans])
         of = np.searchsorted(records.replica, scans.run)
         if not self._remembers:
             plan, left_out = straight_plan(scans, of, records.tick)
@@ -231,9 +234,10 @@ class Tracker(Component):
                 )
         self._records = self._records.after(records.replica, records, wake.first_run)
         self._store = store
-        self._past = Past.of(
-            scans, memory.get(len(records.replica) - 1), before, records.replica[-1]
-        )
+        self._past = {run: old for run, old in self._past.items() if run >= wake.first_run} | {
+            int(records.replica[number]): Past.of(scans, known, before, records.replica[number])
+            for number, known in memory.items()
+        }
         if len(plan.look) == 0:
             return None
         rows = np.unique(plan.row)

@@ -140,22 +140,33 @@ def _one_run(parts: Sequence[RunTicks]) -> bool:
 
 def _keys(*parts: RunTicks) -> list[IntArray]:
     """Return numbers that lie as the instants do, also where these are in no order."""
+    if all(says_no_runs(part.run) for part in parts):
+        return [part.tick for part in parts]
+    return _coded(parts)[0]
+
+
+def _coded(parts: Sequence[RunTicks]) -> tuple[list[IntArray], int, int]:
+    """Return a number for each instant, how many bits of it are the tick's, and the tick of 0.
+
+    Where runs and ticks do not go into one number, ranks of the ticks do, and there are -1 bits.
+    """
     filled = [part for part in parts if len(part)]
-    if all(says_no_runs(part.run) for part in filled):
-        return [part.tick for part in parts]
-    first = min(int(part.run.min()) for part in filled)
-    runs = max(int(part.run.max()) for part in filled) - first + 1
-    if runs == 1:
-        return [part.tick for part in parts]
-    earliest = min(int(part.tick.min()) for part in filled)
-    span = max(int(part.tick.max()) for part in filled) - earliest + 1
-    if runs * span < _MOST:
-        return [(part.run - first) * span + (part.tick - earliest) for part in parts]
-    # Ranks of the ticks stay small where ticks times runs would overflow.
+    runs = max((int(part.run.max()) for part in filled), default=0) + 1
+    earliest = min((int(part.tick.min()) for part in filled), default=0)
+    earliest = min(earliest, 0)
+    bits = (max((int(part.tick.max()) for part in filled), default=0) - earliest).bit_length()
+    if runs << bits < _MOST:
+        keys = [part.run << bits for part in parts]
+        for key, part in zip(keys, parts, strict=True):
+            key += part.tick
+            if earliest:
+                key -= earliest
+        return keys, bits, earliest
     ticks, rank = np.unique(np.concatenate([part.tick for part in parts]), return_inverse=True)
     ends = np.cumsum([len(part) for part in parts])[:-1]
     ranks: Any = np.split(rank.reshape(-1), ends)
-    return [(part.run - first) * len(ticks) + rank for part, rank in zip(parts, ranks, strict=True)]
+    keys = [part.run * len(ticks) + rank for part, rank in zip(parts, ranks, strict=True)]
+    return keys, -1, 0
 
 
 def union(parts: Sequence[RunTicks]) -> RunTicks:
@@ -164,17 +175,14 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
         ticks = sorted_union([part.tick for part in parts])
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         return RunTicks.of_run(run, ticks)
-    else:
-        found = RunTicks.joined(parts)
-        (key,) = _keys(found)
-        order = np.argsort(key, kind="stable")
-        found = found.take(order)
-    if len(found) == 0:
-        return found
-    new = np.append(True, found.tick[1:] != found.tick[:-1])
-    if not says_no_runs(found.run):
-        new[1:] |= found.run[1:] != found.run[:-1]
-    return found if bool(new.all()) else found.take(new)
+    keys, bits, earliest = _coded(parts)
+    if bits < 0:
+        _, first = np.unique(np.concatenate(keys), return_index=True)
+        return RunTicks.joined(parts).take(first)
+    every = sorted_union(keys)
+    runs = every >> bits
+    every -= runs << bits
+    return RunTicks(runs, every + earliest if earliest else every)
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
@@ -198,11 +206,21 @@ def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
         return np.arange(len(asked))
     if _one_run((instants, asked)):
         return last_at_or_before(instants.tick, asked.tick)
+    if _alike(instants, asked):
+        return np.arange(len(asked))
     places = last_at_or_before(*_keys(instants, asked))
     other = instants.run[places] != asked.run
     if other.any():
         places[other] = -1
     return places
+
+
+def _alike(some: RunTicks, others: RunTicks) -> bool:
+    """Whether all instants are the same, and no two that follow each other are."""
+    if len(some) != len(others) or not np.array_equal(some.tick, others.tick):
+        return False
+    same = some.run is others.run or np.array_equal(some.run, others.run)
+    return same and bool((some.tick[1:] != some.tick[:-1]).all())
 
 
 def ranks(*parts: RunTicks) -> tuple[list[IntArray], int]:
@@ -218,6 +236,8 @@ def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
 
     Where its run has none so late it is the place behind the run's last one.
     """
+    if _one_run((instants, asked)):
+        return np.searchsorted(instants.tick, asked.tick)
     keys = _keys(instants, asked)
     return np.searchsorted(keys[0], keys[1])
 

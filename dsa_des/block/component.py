@@ -337,10 +337,6 @@ class Component:
             effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
         )
 
-    def goes_side_by_side(self) -> bool:
-        """Return whether this block, which may serve replicas, may serve them side by side."""
-        return True
-
     def together(self, replicas: "ReplicaRuns") -> "Runner | None":
         """Return what runs this block for all replicas in lock step, or None: one instance each.
 

@@ -4,24 +4,30 @@ import base64
 import math
 from collections import Counter
 from collections.abc import Mapping
+from html import escape
 from typing import Any
+
+from markupsafe import Markup
 
 from dsa_des.evidence.inputs import DEFAULT
 from dsa_des.results.labels import readable, short
 from dsa_des.results.report import PAGE_HEAD, page_environment
+from dsa_des.text.safe_text import printable
 
 _PAGE = (
     PAGE_HEAD
-    + """<style>table{width:auto}td{min-width:4em}</style><h1>{{ title }}</h1>
-<p class="verdict"><strong>{{ e.verdict.line }}</strong></p>
+    + """<style>table{width:auto}td{min-width:4em}</style>
+<header><h1>{{ title }}</h1>
+<p class="verdict"><strong>{{ verdict }}</strong></p>
 <p>{{ e.case.description }}</p>
 <p class="note">Assessed: {{ e.system.name }}, version {{ e.system.version }}. Made by dsa_des \
-{{ e.versions.dsa_des }}. The same in numbers: <code>evidence.json</code>.</p>
+{{ e.versions.dsa_des }}. The same in numbers: <code>evidence.json</code>.</p>\
+</header>
 <nav><a href="#requirements">Requirements</a> <a href="#beside">Beside it</a> \
 <a href="#encounters">Encounters</a> <a href="#convergence">Convergence</a> \
 <a href="#sensitivity">Sensitivity</a> <a href="#parameters">Parameters</a> \
 <a href="#models">Models</a> <a href="#left_out">Left out</a> \
-<a href="#repeat">To repeat it</a></nav>
+<a href="#repeat">To repeat it</a></nav><main>
 <h2 id="system">The system</h2><p>{{ e.system.description }}</p>
 <h2 id="requirements">Requirements and evidence</h2>
 {{ table(("requirement", "asked", "found", level + " interval", "verdict"), requirements) }}
@@ -83,7 +89,7 @@ that matters most stands first.</p>
 {{ table(("study", "seed", "runs", "without result", "SHA-256 of all rows"), results) }}
 <details><summary>Inputs and versions</summary>
 {{ table(("input", "SHA-256"), inputs) }}{{ table(("package", "version"), versions) }}</details>
-</body></html>
+</main></body></html>
 """
 )
 
@@ -103,7 +109,8 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
     names = list(dict.fromkeys(line["result"] for line in lines if line.get("study") in
                                (None, "assessed")))  # fmt: skip
     page = page_environment().from_string(_PAGE).render(
-        e=e, title=e["case"]["title"], level=f"{100 * confidence:g} %",
+        e=e, title=e["case"]["title"], verdict=_whole(e["verdict"]["line"]),
+        level=f"{100 * confidence:g} %",
         requirements=[
             (r["name"], f"at {r['sense']} {r['limit']:g} {r['unit']}", _number(r["value"]),
              _interval(r), r["verdict"])
@@ -157,6 +164,11 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
     return page.encode()
 
 
+def _whole(text: str) -> Markup:
+    """Return a text as it is, however long: what does not pass is not cut."""
+    return Markup(escape(printable(text)))
+
+
 def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     """Return block, the source of most of its values, and its rows, whose own source may differ."""
     by: dict[str, list[Mapping[str, Any]]] = {}
@@ -183,6 +195,8 @@ def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
     found = []
     for name, results in rows:
         known = {r["result"]: r for r in results}
+        if not known.keys() & set(names):
+            continue
         cells = [f"{_number(known[n]['value'])} ({_interval(known[n])})" if n in known else "-"
                  for n in names]  # fmt: skip
         found.append((name, *cells))

@@ -11,7 +11,6 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.wake import ReplicaRuns, Runner
@@ -22,7 +21,7 @@ from dsa_des.running.effects import plan, unspent
 from dsa_des.running.grain import Grain, opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import EqualWindows, Rewinder, Window, Windows
+from dsa_des.running.windows import EqualWindows, Rewinder, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
@@ -118,8 +117,6 @@ class Replicas(Timeline):
     def _shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
-            return False
-        if self._opened and not component.goes_side_by_side():
             return False
         differing = self._differing(name)
         if isinstance(component.p, ClockedParameters):
@@ -263,10 +260,6 @@ class Replicas(Timeline):
     def grain(self, window: int | None) -> Grain:
         """Return the grain: all run in windows, in loops in those that nothing comes back in."""
         return Grain(set(self.scene.blocks), False, self._opened, {})
-
-    def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
-        """Return the window: clocks are asked for one stretch only, and know it the second time."""
-        return window.start, window.end
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Let instances report; a shared block has seen the rows of all and speaks for none."""

@@ -8,6 +8,7 @@ import base64
 import hashlib
 from collections.abc import Iterable, Sequence
 from html import escape
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined
@@ -37,180 +38,13 @@ _MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 _LONGEST = 400
 _MOST_SHOWN = 60
 
-#: The beginning of a page that loads nothing, up to its body, and how its tables are written.
-PAGE_HEAD = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" \
-content="default-src 'none'; img-src data:; style-src 'unsafe-inline'"><meta name="viewport" \
-content="width=device-width,initial-scale=1"><title>{{ title }}</title><style>
-:root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
-@media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
---note:#a5abb3}figure img{background:#fff;border-radius:4px}}
-body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;
-color:var(--ink);background:var(--paper);overflow-wrap:break-word}
-h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid var(--line)}
-h3{font-size:1em;margin:1.2em 0 .2em}
-.wide{overflow-x:auto;max-width:100%}table{border-collapse:collapse;margin:.6em 0;
-width:max-content}
-td,th{padding:.15em .7em;border-bottom:1px solid var(--line);text-align:left;vertical-align:top;
-}td{max-width:34em}th{background:var(--soft)}code,pre{background:var(--soft);
-font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figure{margin:1em 0}
-img{max-width:100%;height:auto}.note{color:var(--note)}
-nav{position:sticky;top:0;background:var(--paper);padding:.4em 0;
-border-bottom:1px solid var(--line)}
-nav a{margin-right:.8em;color:inherit;display:inline-block;padding:.25em 0}
-details{margin:.6em 0}summary{cursor:pointer}
-h2{scroll-margin-top:3em}
-@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}
-table{width:auto;font-size:.8em}td,th{padding:.15em .3em}}
-@media print{.wide{overflow:visible}}
-</style></head><body>
-{% macro table(heads, rows) %}{% if rows %}
-<div class='wide' tabindex='0'><table>
-{% if heads | join %}
-<tr>{% for head in heads %}{% if head %}<th scope='col'>{{ head }}</th>{% else %}<td></td>\
-{% endif %}{% endfor %}</tr>
-{% endif %}
-{% for row in rows %}
-<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
-{% endfor %}
-</table></div>
-{% endif %}{% endmacro %}
-"""
 
-_PAGE = (
-    PAGE_HEAD
-    + """{% macro where(scene, first) %}{% if scene.where %}
-<p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
-{% endif %}{% endmacro %}
-<header><h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
-{{ tables.rows.failed }} without result; made by dsa_des {{ version }}</p>\
-</header>
-<nav><a href="#question">Question</a> <a href="#answer">Answer</a>
-{% if ratios %} <a href="#risk">Risk</a>{% endif %}
-{% if differences %} <a href="#differences">Differences</a>{% endif %}
-{% if others_drawn %} <a href="#figures">Figures</a>{% endif %} <a href="#models">Models</a> \
-<a href="#effects">Effects</a> <a href="#results">All results</a> <a href="#runs">Runs</a> \
-<a href="#repeat">To repeat it</a></nav><main>
-<h2 id="question">The question</h2>
-{{ table(("axis", "values", ""), axes) }}{{ table(("", ""), asked) }}
-<h2 id="answer">The answer</h2>
-{% for title, heads, rows in pivots %}
-<h3>{{ title }}</h3>{{ table(heads, rows) }}
-{% endfor %}
-{% if pivots %}
-<p class='note'>The cheapest value whose interval, and that of all dearer ones, lies within the \
-limit; {{ sure }} sure. "none": not even the dearest does. The value by the estimate alone, which \
-is sure of nothing, stands in brackets where it differs.</p>
-{% endif %}
-{% for stem, name, data in answering %}
-<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
-<figcaption>{{ name }}</figcaption></figure>
-{% endfor %}
-{% if shown %}
-{{ table(heads, shown) }}
-<p class='note'>{{ level }} intervals: {{ methods }}. Rounded to two digits of half an \
-interval.{% if few %} "few": too few values to rely on it.{% endif %}</p>
-{% endif %}
-{% if ratios %}
-<h2 id="risk">Ratios of events</h2>{{ table(axis_heads + ratio_heads, ratios) }}
-<p class='note'>Unresolved and induced add up to the ratio. Nominal, mitigated, induced: units \
-with the event without and with the remedy, and with it alone. Effective size: Kish's, of the \
-weights.</p>
-{% endif %}
-{% if differences %}
-<h2 id="differences">Paired differences</h2>
-{{ table(others + [tables.baseline[0] | axis, "less", "result", "difference", "interval", "pairs"],
-         differences) }}
-{% endif %}
-{% if others_drawn %}
-<h2 id="figures">Further figures</h2>
-{% for stem, name, data in others_drawn %}
-<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
-<figcaption>{{ name }}</figcaption></figure>
-{% endfor %}
-{% endif %}
-{% if not explained %}
-<h2 id="models">Models and effects</h2><p id="effects">This folder is of a version that kept \
-neither. Which model each block uses, with its proven error, and which effects are left out and \
-why:</p><pre>{{ explain }}</pre>
-{% else %}
-<h2 id="models">Models and their errors</h2>
-{% if not errors %}
-<p class='note'>Errors of the models were not measured (a study of 100 runs or more does it by \
-itself): <code>dsa-des study report FOLDER --measure</code>.</p>
-{% else %}
-<h3>Measured over the first run</h3>
-{{ table(("block", "model", "error of", "mean", "95 %", "largest", "target-scans", "against"),
-         errors | measured) }}
-{% if errors.notes %}
-<p class='note'>Not measured:</p><ul class='note'>\
-{% for note in errors.notes %}<li>{{ note }}</li>{% endfor %}</ul>
-{% endif %}
-{% endif %}
-{% if bounds %}
-<h3>Proven: largest influence</h3>
-{{ table(("block", "effect", "largest influence", ""), bounds) }}
-{% else %}
-<p class='note'>No model was chosen and no effect left out within an allowed error ([accuracy]), \
-so there is no bound to prove.</p>
-{% endif %}
-<details><summary>The model of each block, and its place among those of its kind</summary>
-{% for scene in explained.scenes if scene.models %}
-{{ where(scene, scene is sameas explained.scenes[0]) }}
-{{ table(("block", "model", "what it is", "its place among models of its kind"),
-         scene | models) }}
-{% endfor %}
-</details>
-<h2 id="effects">Effects</h2>
-<details><summary>Which are simulated, which are left out, and why</summary>
-{% for scene in explained.scenes if scene.effects or scene.spared %}
-{{ where(scene, scene is sameas explained.scenes[0]) }}
-{% for title, simulated in (("Simulated", true), ("Left out, and why", false)) %}
-{% set rows = scene.effects | effects(simulated) %}
-{% if rows %}<h3>{{ title }}</h3>{{ table(("where", "effect", "because"), rows) }}{% endif %}
-{% endfor %}
-{% if scene.spared %}
-<h3>Work that is spared</h3>{{ table(("block", "what, and why"), scene.spared) }}
-{% endif %}
-{% endfor %}
-</details>
-{% endif %}
-<h2 id="results">All results</h2>
-<details><summary>{{ tables.lines | length }} values with their intervals</summary>
-<p class='note'>Cut off: values that the beginning or the end of a run censored; the mean holds \
-them.</p>
-{{ table(heads, lines) }}
-{% if tables.lines | length > most %}
-<p>and {{ tables.lines | length - most }} more lines in summary.parquet</p>
-{% endif %}
-</details>
-<details><summary>What each result means</summary>
-{{ table(("result", "kind", "meaning"), results) }}
-</details>
-<h2>The scene</h2><p><code>{{ record.scene }}</code></p>
-{{ table(("in every cell", ""), changes) }}
-{% if explained and explained.scene %}
-<details><summary>The first run's scene, every default written out</summary>\
-{{ explained.scene.splitlines() | verbatim }}</details>
-{% endif %}
-<h2 id="runs">Failed and censored runs</h2><p>Runs: {{ status }}. Values cut off by a run's \
-beginning or end: {{ censored }}.</p>
-{{ table(("cell", "replica", "status", "error", "command"), failed) }}
-{% if tables.rows.failed > failed | length %}
-<p>and {{ tables.rows.failed - failed | length }} more</p>
-{% endif %}
-<h2>Seeds, versions and hashes</h2><p>Seed of the study: <code>{{ record.seed }}</code>. Every \
-run's own seed is in the column <code>seed</code> of the parts.</p>
-<details><summary>Packages, and digests of the parts</summary>
-{{ table(("package", "when the study was begun", "when this page was made"), packages) }}
-{{ table(("", "SHA-256"), hashes) }}
-</details>
-<h2 id="repeat">To repeat it</h2>{{ commands | verbatim }}<p class='note'>Any other run: the same \
-with the seed, axes and draws that stand in its row of the parts; rows of failed runs hold it as \
-<code>command</code>.</p>
-</main></body></html>
-"""
-)
+def _part(name: str) -> str:
+    return (files("dsa_des.results") / "page" / name).read_text(encoding="utf-8")
+
+
+#: The beginning of a page that loads nothing, up to its body, and how its tables are written.
+PAGE_HEAD = _part("head.html")
 
 
 def study_report(folder: StudyFolder) -> bytes:
@@ -230,7 +64,7 @@ def study_report(folder: StudyFolder) -> bytes:
     pictures = _pictures(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
-    page = page_environment().from_string(_PAGE).render(
+    page = page_environment().from_string(PAGE_HEAD + _part("study.html")).render(
         title=record.title,
         tables=tables, record=record, explained=explained, errors=read_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,

@@ -7,55 +7,20 @@ the same whether SimPy wakes it, at whatever grain, or a host program calls it.
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.time.clock import MAX_TICK, nanosecond_of
-from dsa_des.time.randomness import Stream
+from dsa_des.running.effects import WireFaults
+from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
-
-
-@dataclass(frozen=True)
-class WireFaults:
-    """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
-
-    Parameters
-    ----------
-    jitter_ticks : float
-        Largest extra delay; each row takes a uniformly drawn part of it.
-    drop_probability : float
-    jitter, drops : Stream
-        Draws named after the wire.
-    ticks_per_s : int
-    """
-
-    jitter_ticks: float
-    drop_probability: float
-    jitter: Stream
-    drops: Stream
-    ticks_per_s: int
-
-    def kept(self, sent: RunTicks) -> BoolArray:
-        """Return which rows sent at some instants are not lost."""
-        return self._drawn(self.drops, sent) >= self.drop_probability
-
-    def lateness(self, sent: RunTicks) -> IntArray:
-        """Return the extra delay of rows sent at some instants, in ticks."""
-        return np.rint(self._drawn(self.jitter, sent) * self.jitter_ticks).astype(np.int64)
-
-    def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
-        instant = nanosecond_of(sent.tick, self.ticks_per_s).astype(np.uint64)
-        return stream.of_runs(sent.run).uniform(instant, 0)
-
 
 #: Rows and when they arrive.
 Rows = tuple[RunTicks, Message]
@@ -172,11 +137,9 @@ class Channel:
         found = [part for part in found if len(part)]
         if not found:
             return RunTicks.none()
-        if self._faults is not None:
-            return union(found)  # late rows overtake and may coincide
-        if len(self._time.runs) == 1:
+        if self._faults is None and 1 in (len(found), len(self._time.runs)):
             return RunTicks.joined(found)
-        return found[0] if len(found) == 1 else union(found)
+        return union(found)  # late rows overtake and may coincide
 
     def _due(self, arrivals: RunTicks, end: int) -> slice | BoolArray:
         """Return which rows arrive before `end`."""

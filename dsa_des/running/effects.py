@@ -8,12 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
+from dsa_des.arrays.run_ticks import RunTicks
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
-from dsa_des.time.clock import ClockSpec
+from dsa_des.time.clock import ClockSpec, nanosecond_of
+from dsa_des.time.randomness import Stream
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,3 +225,36 @@ def clock_of(block: Block) -> ClockSpec | None:
 def may_be_late(wire: Wire, everything: bool) -> bool:
     """Return whether loss and jitter are drawn for the messages of a wire."""
     return everything or LOSS.verdict(wire).simulated or WIRE_JITTER.verdict(wire).simulated
+
+
+@dataclass(frozen=True)
+class WireFaults:
+    """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
+
+    Parameters
+    ----------
+    jitter_ticks : float
+        Largest extra delay; each row takes a uniformly drawn part of it.
+    drop_probability : float
+    jitter, drops : Stream
+        Draws named after the wire.
+    ticks_per_s : int
+    """
+
+    jitter_ticks: float
+    drop_probability: float
+    jitter: Stream
+    drops: Stream
+    ticks_per_s: int
+
+    def kept(self, sent: RunTicks) -> BoolArray:
+        """Return which rows sent at some instants are not lost."""
+        return self._drawn(self.drops, sent) >= self.drop_probability
+
+    def lateness(self, sent: RunTicks) -> IntArray:
+        """Return the extra delay of rows sent at some instants, in ticks."""
+        return np.rint(self._drawn(self.jitter, sent) * self.jitter_ticks).astype(np.int64)
+
+    def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
+        instant = nanosecond_of(sent.tick, self.ticks_per_s).astype(np.uint64)
+        return stream.of_runs(sent.run).uniform(instant, 0)

@@ -55,9 +55,6 @@ class RunState(Protocol):
     ends: RunEnds
     time: ReplicaTime
 
-    def stretch(self, ticks: IntArray) -> tuple[int, int]:
-        """Return a start and an end between which the rows of a wake lie, as clocks count."""
-
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:

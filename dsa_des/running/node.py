@@ -250,7 +250,10 @@ class Node:
     def _rows_asked_for(self, instants: RunTicks) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
-        start, end = self.simulation.stretch(instants.tick)
+        start, end = int(instants.tick[0]), int(instants.tick[-1]) + 1
+        if self.windowed:  # clocks know the scans of the window: they were asked for before
+            window = self.simulation.window
+            start, end = window.start, self._end_in(window)
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)

@@ -233,10 +233,6 @@ class Simulation:
         for node in self.nodes.values():
             node.start()
 
-    def stretch(self, ticks: IntArray) -> tuple[int, int]:
-        """Return a start and an end between which the rows of a wake lie, as clocks count."""
-        return self.timeline.stretch(ticks, self.window)
-
     def _check_ends(self) -> None:
         """Refuse what ends its run where messages wait for a processor: they would be lost."""
         if self.scene.processors:

@@ -10,15 +10,14 @@ from typing import Any
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.running.channel import Channel, WireFaults
-from dsa_des.running.effects import may_be_late
+from dsa_des.running.channel import Channel
+from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
 from dsa_des.running.windows import (
     EqualWindows,
     Rewinder,
     RewindingWindows,
     SureWindows,
-    Window,
     Windows,
 )
 from dsa_des.scene.scene import Scene
@@ -111,10 +110,6 @@ class Timeline:
     def grain(self, window: int | None) -> Grain:
         """Return at which grain the blocks run; see `Simulation` for the parameters."""
         return grain_of(self.scene, window)
-
-    def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
-        """Return a start and an end between which the instants of a wake lie."""
-        return int(ticks[0]), int(ticks[-1]) + 1
 
     def runner(self, component: Component) -> Any:
         """Return what handles the wakes of a block: itself, or what stands in for it."""

@@ -253,6 +253,11 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
     assert page.evaluate("show([])") == []
     (again,) = page.evaluate("show([alert_])")
     assert again["rejected"] and operated.state()["sounds"] == sounds
+    # A new alert on another contact is chosen, and a more urgent one after it.
+    slight, urgent = (f"{{ ...alert_, target: {4242 + n}, level: {n} }}" for n in (1, 3))
+    assert page.evaluate(f"(show([{slight}]), App.state().chosen)") == 4243
+    assert page.evaluate(f"(show([{urgent}, {slight}]), App.state().chosen)") == 4245
+    assert page.evaluate(f"(show([{slight}]), App.state().chosen)") == 4243
     (worse,) = page.evaluate("show([{ ...alert_, level: alert_.level + 1 }])")
     assert not worse["rejected"]
     page.evaluate("() => { Link.hears.frame = window.heard; }")
@@ -281,12 +286,12 @@ def test_an_alert_chosen_by_itself_is_looked_at_when_somebody_picks_it(operated)
     page.locator("#contacts li[aria-selected='true']").click()
     operated.when("App.said.some(one => one.decision === 'looked')")
     said = page.evaluate("App.said")
-    looked = next(one for one in said if one["decision"] == "looked")
+    looked = next(one for one in said if one.get("decision") == "looked")
     assert looked["target"] == state["chosen"] == operated.state()["chosen"]
     page.locator("#contacts li[aria-selected='true']").click()  # not once more
     page.keyboard.press("v")
     operated.when("App.said.some(one => one.decision === 'verified')")
-    said = [one["decision"] for one in page.evaluate("App.said")]
+    said = [one.get("decision") for one in page.evaluate("App.said")]
     assert said.count("looked") == 1
 
 

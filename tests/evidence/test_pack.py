@@ -116,6 +116,10 @@ def test_the_page_holds_what_was_asked_and_loads_nothing(pack):
     ):
         assert text in page
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
+    # A program that reads it aloud finds its way: everything stands in a landmark.
+    body = page.partition("<body>")[2].partition("</body>")[0]
+    outside = re.sub(r"<(header|nav|main|style)>.*?</\1>", "", body, flags=re.DOTALL)
+    assert re.sub(r"<[^>]*>|\s", "", outside) == "" and page.count("<main>") == 1
 
 
 def test_a_second_run_and_one_from_the_pack_itself_give_the_same_bytes(case, pack, tmp_path):

@@ -132,3 +132,19 @@ def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next(loc
     scene = load_scene("configs/systems/tecvol_tracked.toml", duration_s="6")
     simulation = lock.same_as_alone(lock.replicas_of(scene, {}, {}, {}), window=9)
     assert simulation.time.runs == range(2, 3)
+
+
+@pytest.mark.parametrize("late", ["rerun", "one_step"])
+def test_looks_that_come_late_in_a_loop_are_remembered_by_run(lock, late):
+    sets = [f"blocks.tracker.late={late}", "blocks.tracker.lag_s=2"]
+    scene = load_scene("configs/avoidance/crossing_tracked.toml", duration_s="8", sets=sets)
+    wires = [
+        replace(wire, latency_s=Fraction(6, 10), jitter_s=Fraction(1, 2))
+        if (wire.source, wire.target) == ("radar", "fusion")
+        else wire
+        for wire in scene.wires
+    ]
+    simulation = lock.same_as_alone(lock.replicas_of(replace(scene, wires=wires), {}, {}, {}))
+    assert not simulation.timeline.split
+    assert len(simulation.time.runs) == 3
+    assert simulation.components["tracker"]._past

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from dsa_des.cli import main
 from dsa_des.results import curves
 from dsa_des.results.curves import draw_series
+from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Line, of_series
 from dsa_des.results.tables import Tables
@@ -42,7 +43,8 @@ def test_bounds_are_those_of_the_mean_of_as_many_runs():
 
 
 def test_it_is_drawn_to_the_same_bytes(tmp_path: Path):
-    lines = [Line((), None, Estimate(v, v - 1.0, v + 1.0, 5, False), 0, None) for v in (5.0, 7.0)]
+    found = Result("track_nees", NUMBER, "an error squared")
+    lines = [Line((), found, Estimate(v, v - 1.0, v + 1.0, 5, False), 0, None) for v in (5.0, 7.0)]
     drawn = []
     for name in ("a.png", "b.png"):
         place = tmp_path / name

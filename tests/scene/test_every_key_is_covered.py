@@ -24,11 +24,27 @@ UNCOVERED: dict[str, str] = {
         if key.partition(".calibrate.aircraft.")[2].partition(".")[0]
         in ("mode_s", "mode_c", "icao_address", "ads_b")
     },
-    # The camera of pictures is one of these, and adds keys of its own.
+    # The camera of pictures is one of these; what its own tests do not see.
     **{
-        key.replace("optical.eo.", "optical.image."): "code of optical.eo, whose tests see it"
+        f"optical.image.{key.removeprefix('optical.eo.')}": "code of optical.eo, whose tests see it"
         for key in every_key()
-        if key.startswith("optical.eo.")
+        if key.startswith("optical.eo.calibrate.")
+    },
+    **{
+        f"optical.image.{key}": "code of optical.eo, whose tests see it"
+        for key in (
+            "cued_threshold",
+            "declare_by",
+            "declare_rate_deg_s",
+            "declare_speed_m_s",
+            "glint_correlation_time_s",
+            "glint_share",
+            "model",
+        )
+    },
+    **{
+        f"optical.image.{key}": "a picture has no signature: nothing is added to it by a rate"
+        for key in ("dynamic_weight", "rate")
     },
 }
 

@@ -78,7 +78,7 @@ def test_altimetry_errors_are_laplacian_by_layer(layer):
 def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     them, count = who(2000), 14
     clocks = SquitterClocks(Stream(9, "a", "b"))
-    _, sent, counts = clocks.latest(them.keys, them.replica, np.full(2000, 30 * NS), count)
+    _, sent, counts = clocks.latest(them.keys, them.run, np.full(2000, 30 * NS), count)
     assert counts.all()
     gaps = -np.diff(sent, axis=1).ravel() / NS
     n = gaps.size
@@ -89,7 +89,7 @@ def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     assert abs(np.corrcoef(gaps[:-1], gaps[1:])[0, 1]) < Z / n**0.5
     # At any instant the last message is (E gap²) / (2 E gap) old on average.
     age = 30.0 - sent[:, 0] / NS
-    for ages in (age, clocks.latest(them.keys, them.replica, np.full(2000, NS), 1)[1][:, 0]):
+    for ages in (age, clocks.latest(them.keys, them.run, np.full(2000, NS), 1)[1][:, 0]):
         ages = ages if ages is age else 1.0 - ages / NS
         mean = (0.5**2 + 0.2**2 / 12) / (2 * 0.5)
         assert abs(ages.mean() - mean) < Z * 0.15 / 2000**0.5

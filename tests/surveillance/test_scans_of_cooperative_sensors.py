@@ -6,6 +6,7 @@ import pytest
 from wired import chain
 
 import dsa_des
+from components.surveillance.ads_b import AdsB
 from components.surveillance.squitter_clock import SquitterClocks
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -51,7 +52,14 @@ def test_every_position_is_reported_once(clock):
         assert told == pytest.approx(sent[sent <= last_s].tolist())
 
 
-@pytest.mark.parametrize("sensor", [ADS_B, ACTIVE], ids=["ads_b", "active"])
+class OwnReceiver(AdsB):
+    """One that says nothing of replicas: each has an instance of its own."""
+
+
+SPLIT = {**ADS_B, "type": f"{__name__}:OwnReceiver"}
+
+
+@pytest.mark.parametrize("sensor", [ADS_B, ACTIVE, SPLIT], ids=["ads_b", "active", "split"])
 def test_replicas_together_are_those_alone(sensor):
     """Other seeds, and clocks that differ in all that clocks may differ in."""
     sensor = {**sensor, "reception": "fitted"} if sensor is ADS_B else sensor

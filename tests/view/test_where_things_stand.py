@@ -191,6 +191,24 @@ def test_alerts_say_how_far_it_looks_and_every_aircraft_has_one_name(browser, tm
     page.close()
 
 
+def test_a_recorded_encounter_shows_the_two_minutes_before_its_closest_approach(browser, tmp_path):
+    """Head on at 100 m/s, at one place after 200 s; another one passes 30 km away."""
+    lines = [
+        "NAME, lat, lon, alt, vx, vy, vz, time",
+        "[], [deg], [deg], [m], [m/s], [m/s], [m/s], [s]",
+    ]
+    for t in range(0, 301, 5):
+        for name, north, speed in (("own", 50.0 * (t - 200), 50), ("one", -50.0 * (t - 200), -50)):
+            lat, lon, _ = pymap3d.enu2geodetic(0.0, north, 0.0, -41.3, 174.2, 0.0)
+            lines.append(f"{name}, {float(lat)!r}, {float(lon)!r}, 900, 0, {speed}, 0, {t}")
+        lines.append(f"far, -41.3, 174.56, 900, 0, 1, 0, {t}")
+    (tmp_path / "met.daa").write_text("\n".join(lines) + "\n")
+    assert CliRunner().invoke(view, [str(tmp_path / "met.daa")]).exit_code == 0
+    page, _ = opened_page(browser, tmp_path / "met.html")
+    assert page.evaluate("Data.reach.near_m") == pytest.approx(120 * 100.0, rel=2e-3)
+    page.close()
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_what_is_pressed_is_large_enough_for_a_finger(browser, tmp_path, width):
     """WCAG 2.2 AA, 2.5.8: 24 by 24 pixels; and nothing is wider than the page."""

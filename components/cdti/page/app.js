@@ -62,12 +62,13 @@ const App = (() => {
       if (!on.has(target) && !there.has(target)) rejected.delete(target);
     }
   }
-  // Until somebody picks a contact, and when it is gone, the chosen one is that of an alert.
+  // Until somebody picks a contact, and when it is gone, the chosen one is that of the most urgent
+  // alert; among alerts of one level it stays.
   function follow(frame) {
     if (state.picked && !frame.contacts.some((one) => one[0] === state.chosen)) state.picked = false;
-    if (state.picked || levels.get(state.chosen)) return;
+    const mine = rejected.has(state.chosen) ? 0 : levels.get(state.chosen) || 0;
     const open = frame.alerts.find((one) => !rejected.has(one.target));
-    if (open) choose(open.target, false);
+    if (!state.picked && open && open.level > mine) choose(open.target, false);
   }
   // What was decided, by whichever page: it is known to all of them.
   function take(one) {

@@ -152,8 +152,8 @@ const Data = (() => {
     return [...found.values()];
   }
 
-  // How far around the ownship that happens which matters: alerts, else detections, else the last
-  // minute before the closest approach.
+  // How far around the ownship that happens which matters: alerts, else detections, else the last two
+  // minutes before the closest approach.
   function nearReach() {
     const spanOf = new Map(spans.map((span) => [span.target, span]));
     function apart(target, t) {
@@ -186,7 +186,7 @@ const Data = (() => {
     }
     const span = spanOf.get(closest.target);
     if (!span) return 5000;
-    return apart(closest.target, Math.max(closest.t - 60, tables.truth.time_s[span.from]));
+    return apart(closest.target, Math.max(closest.t - 120, tables.truth.time_s[span.from]));
   }
 
   // Times of detections by sensor and target, with the range at the first.

@@ -46,7 +46,7 @@ what was recorded, and each of these is a key of its own: `alerting.m_of_n`, and
 **Inputs and licence.** The encounter's numbers and its results, from the record of the test (X11);
 the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing that the
 rows need. Other encounters of the same source fly through the same scene by `traffic.daa_file`
-and `traffic.csv_file` in the place of its traffic.
+and `traffic.csv` in the place of its traffic.
 """
 
 _BANDS = """

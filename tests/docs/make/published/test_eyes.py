@@ -2,8 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from components.formats.set_file import read_set
 from docs.make.published import eyes
 from docs.make.published.volumes import MODELS
 
@@ -35,9 +37,31 @@ def test_a_rate_gives_another_table():
     )
 
 
-def test_the_rows_of_the_risk_stand_in_their_order():
-    rows = eyes.risk_rows(MODELS / "light_aircraft.txt", encounters=24, workers=1)
+def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path):
+    files = eyes.sets_of_both(tmp_path, MODELS / "light_aircraft.txt", 12)
+    either = [eyes.flags_of(file, 12, 3, 1) for file in files]
+    for name in ("nmac_nominal", "well_clear_lost_nominal", "encounter_weight"):
+        assert either[0][name].tolist() == either[1][name].tolist(), name
+    own, other = (read_set(file) for file in files)
+    assert own.state["north_m"][::2].tolist() == other.state["north_m"][1::2].tolist()
+    assert own.state["speed_mps"][1] == other.state["speed_mps"][0] != own.state["speed_mps"][0]
+
+
+def test_the_rows_of_the_risk_stand_in_their_order(monkeypatch):
+    flown = iter([
+        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [1.0, 0.0, 0.0]},
+        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [0.0, 0.0, 1.0]},
+    ])  # fmt: skip
+    weight = np.array([3.0, 1.0, 2.0])
+
+    def flags_of(*_):
+        flags = {name: np.array(values) for name, values in next(flown).items()}
+        lost = {name.replace("nmac", "well_clear_lost"): v for name, v in flags.items()}
+        return {**flags, **lost, "encounter_weight": weight}
+
+    monkeypatch.setattr(eyes, "flags_of", flags_of)
+    rows = eyes.risk_rows(MODELS / "light_aircraft.txt", encounters=3)
     assert [row.published for row in rows] == [*eyes.ONE, *eyes.BOTH]
-    lost, both_lost = rows[1], rows[3]
-    assert 0.0 <= lost.interval[0] <= lost.ours <= lost.interval[1]
-    assert both_lost.ours == pytest.approx(lost.ours**2)
+    # By hand: 3 of 4 by the one, 2 of 4 by the other; neither leaves what both do.
+    assert [row.ours for row in rows] == pytest.approx([5.0 / 8.0, 5.0 / 8.0, 0.0, 0.0])
+    assert all(row.interval[0] <= row.ours <= row.interval[1] for row in rows)

@@ -1,0 +1,90 @@
+"""What is stated of the errors of what aircraft say: variances, and what of them lasts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.aircraft.equipage import Equipage
+from components.messages.columns import TARGET_VELOCITY
+from components.messages.detections import LastingError, LastingPart
+from components.surveillance.altimetry import altimetry_variance_ft2
+from components.surveillance.broadcast import CLIMB_SCALE_M_S, CORRELATION_TIME_S
+from components.surveillance.extended_squitter import FOOT_PER_MINUTE_M_S, KNOT_M_S
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+
+#: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
+_COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
+#: What an aircraft without a velocity may have, and how much others change theirs on the way from
+#: a message to a scan, a deviation.
+_UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
+#: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
+_LEAST_M2 = 1e-4
+
+
+def lasting_errors(position_errors: str) -> dict[str, LastingError]:
+    """Return what lasts of what aircraft say: all but rounding, which is taken to last too."""
+    if position_errors == "none":
+        return {}
+    lasts_s = {"elevation": math.inf}  # an aircraft keeps its altimeter
+    if position_errors == "gauss_markov":
+        for name in ("azimuth", "range", "range_rate", "velocity"):
+            lasts_s[name] = CORRELATION_TIME_S
+    return {
+        name: LastingError(parts=(LastingPart(lasts_s=time_s, share=1.0),))
+        for name, time_s in lasts_s.items()
+    }
+
+
+@dataclass(frozen=True)
+class StatedByAircraft:
+    """What the categories of some aircraft state of their reports.
+
+    Parameters
+    ----------
+    equipage : Equipage
+    craft : (n,)
+        Places among its aircraft.
+    said : dict of (n,)
+        What they said (`components.surveillance.reports.REPORTED`).
+    errs, rounds : bool
+        Whether what they send has errors, and is rounded.
+    """
+
+    equipage: Equipage
+    craft: IntArray
+    said: dict[str, AnyArray]
+    errs: bool
+    rounds: bool
+
+    @property
+    def speed_m2_s2(self) -> FloatArray:
+        """Mean square error of each horizontal axis of velocities, (n,)."""
+        square = self.equipage.velocity_deviation_m_s[self.craft] ** 2
+        speed = np.where(self.errs, square, _LEAST_M2)
+        return speed + KNOT_M_S**2 / 12.0 if self.rounds else speed
+
+    def place_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return mean square errors of places carried on for a while: two level axes, vertical."""
+        square = self.equipage.position_deviation_m[self.craft] ** 2
+        place = np.where(self.errs, square, _LEAST_M2)
+        feet = self.said["reported_alt_m"] / FOOT_M
+        high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
+        if self.rounds:
+            place = place + _COMPACT_M2
+            high = high + (25.0 * FOOT_M) ** 2 / 12.0
+        # Without a velocity an aircraft may have gone anywhere at the speed of one.
+        moving = ~np.isnan(self.said["reported_north_m_s"])
+        level = place + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * age_s**2
+        return level, level, high
+
+    def velocity(self, north_east_down_m_s: FloatArray, age_s: FloatArray) -> dict[str, FloatArray]:
+        """Return velocities of some age as `TARGET_VELOCITY`."""
+        turned = (_MANOEUVRE_M_S2 * age_s) ** 2
+        climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else _LEAST_M2
+        climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
+        spread = [self.speed_m2_s2 + turned, self.speed_m2_s2 + turned, climb + turned]
+        return dict(zip(TARGET_VELOCITY, [*north_east_down_m_s, *spread], strict=True))
