@@ -199,6 +199,12 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
         tables = CaseTables.model_validate(file.data)
     except ValidationError as error:
         raise SceneError(explain(file, (), "a case", CaseTables, error)) from None
+    asked = [one.name for one in tables.requirements]
+    for place, name in enumerate(asked):
+        if name in asked[:place]:
+            raise SceneError(
+                [file.problem(("requirements", place, "name"), "is given twice", name)]
+            )
     studies = {ASSESSED: _assessed(file, tables, replicas)}
     for place, one in enumerate(tables.beside):
         if one.name in {*studies, SENSITIVITY}:

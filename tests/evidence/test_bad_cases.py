@@ -19,6 +19,7 @@ BAD = {
     '[sample]\nmodel = "light aircraft"\n': ("[sample]\n", "sample.model: is required"),
     'also = ["needless_manoeuvre_share"]': ('also = ["needles"]', "also[0] = 'needles'"),
     'key = "blocks.avoidance.range_km"': ('key = "blocks.avoidance.rang"', "no such value"),
+    'name = "turns"': ('name = "lost"', "requirements[1].name = 'lost': is given twice"),
     'name = "slow"': ('name = "assessed"', "beside[0].name = 'assessed': is given twice"),
     'of = "estimate"': ('of = "limits"', "did you mean 'limit'?"),
     'title = "A small case"': ('title = "A"\ntitel = "B"', "did you mean 'title'?"),

@@ -1,6 +1,8 @@
 """The pack of a small case: its numbers by hand, the same again, and what a change changes."""
 
+import hashlib
 import json
+import math
 import re
 from pathlib import Path
 from shutil import copytree
@@ -9,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from dsa_des.block.shipped_files import folders
 from tests.evidence.small_case import Made, made
 
 #: Keys that name an item of a list.
@@ -86,7 +89,22 @@ def test_the_sensitivity_is_paired_on_the_same_encounters(pack):
         assert list(mine["encounter"]) == list(as_stated["encounter"])
         apart = mine["manoeuvred"].mean() - as_stated["manoeuvred"].mean()
         assert one["difference"] == pytest.approx(apart, abs=1e-12)
+        # Bonett and Price: one more that gained and one more that lost, of six pairs; t of 5.
+        pairs = [*(mine["manoeuvred"].to_numpy() - as_stated["manoeuvred"].to_numpy()), 1.0, -1.0]
+        half = 2.570582 * np.std(pairs) / math.sqrt(len(pairs))
+        ends = np.mean(pairs) - half, np.mean(pairs) + half
+        assert (one["low"], one["high"]) == pytest.approx(ends, abs=1e-6)
     assert {c["as_stated"] for c in changes} == {"1.2", "300.0"}
+
+
+def test_every_file_that_is_read_has_its_digest(case, pack):
+    shipped = ("avoidance/airspace.toml", "encounters/light_aircraft.parquet")
+    files = {name: case.parent / name for name in ("case.toml", "scene.toml", "slow.toml",
+                                                   "study.toml")}  # fmt: skip
+    for name in shipped:
+        (files[name],) = [folder / name for folder in folders() if (folder / name).is_file()]
+    digests = {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
+    assert {row["file"]: row["sha256"] for row in pack.evidence["inputs"]} == digests
 
 
 def test_every_stated_parameter_has_its_source(pack):
@@ -157,6 +175,14 @@ def test_a_changed_parameter_leaves_what_stands_beside_the_system(case, pack, tm
                      "verdict", "command", "sample"}  # fmt: skip
     assert changed(one["parameters"], two["parameters"]) == {
         "/avoidance.turn_deg/value", "/avoidance.turn_deg/written_in"}  # fmt: skip
+
+
+def test_a_rule_of_the_limit_allows_a_share_of_the_limit(case, pack, tmp_path):
+    copytree(pack.folder, tmp_path / "pack")
+    sets = ("--set", "convergence.of=limit", "--set", "convergence.share=0.5")
+    other = made(case, tmp_path / "pack", "--resume", *sets)
+    allowed = [one["may_move"] for one in other.evidence["requirements"]]
+    assert allowed == pytest.approx([0.5 * 2, 0.5 * 0.01])
 
 
 def test_an_estimate_that_still_moves_gives_no_verdict(case, pack, tmp_path):

@@ -201,9 +201,11 @@ class ForeignFmu(Component):
         if self.p.detections:
             if seen_from is not None and truth is not None:
                 seen_from, truth = seen_from[:, own], truth[:, own]
-            sent["detections"] = wiring.detections.message(
+            looks = wiring.detections.message(
                 wake.ticks[own], wake.scans[own], answer["numbers"], seen_from, truth, self._roster
             )
+            if len(looks):
+                sent["detections"] = looks
         return sent
 
     #: Whether a scheduled FMU has a clock that it sets itself, so that every wake may be its.

@@ -199,7 +199,7 @@ class DetectionOutputs:
         self, tick: IntArray, scan: IntArray, numbers: FloatArray, own: FloatArray | None,
         truth: FloatArray | None, roster: Roster,
     ) -> Detections:  # fmt: skip
-        """Return the looks.
+        """Return the looks; none that saw nothing from where nobody knows.
 
         Parameters
         ----------
@@ -258,7 +258,10 @@ class DetectionOutputs:
             }
         says = own is not None or "own_lat_deg" in values
         looks = {name: of_rows[name] for name in POSE} if says else {}
-        return reported_looks(
+        found = reported_looks(
             tick, scan, np.concatenate(([0], np.cumsum(counts))), entries, looks,
             target, roster, **more,
         )  # fmt: skip
+        # Before anybody has said where it looks from, no look at nothing says anything.
+        nowhere = (counts == 0) & np.isnan(looks["own_lat_deg"]) if says else np.zeros(rows, bool)
+        return found.take(np.flatnonzero(~nowhere)) if nowhere.any() else found

@@ -133,8 +133,15 @@ def test_a_tracker_takes_it_as_any_sensor_of_ours(eye):
         assert told == pytest.approx(own[f"velocity_{axis}_m_s"], abs=1e-4)
 
 
-def test_the_own_velocity_is_that_of_each_look(eye):
+@pytest.mark.parametrize("late", [0, 1])
+def test_the_own_velocity_is_that_of_each_look(eye, late):
+    """A line of sight that comes late, by so many looks, is of where the ownship was then.
+
+    Before it has come nobody knows from where the sensor looks: it has no look to report.
+    """
     found = scene(eye(), duration_s=6)
+    found["wires"][0] = "transform -> gate"
+    found["wires"] += [{"from": "traffic", "to": "transform", "delay_s": 0.2 * late}]
     own = found["blocks"]["traffic"]["ownship"]
     for name in ("yaw_deg", "pitch_deg", "roll_deg"):
         own.pop(name)
@@ -144,11 +151,12 @@ def test_the_own_velocity_is_that_of_each_look(eye):
     run = dsa_des.run(found)
     truth = {row["tick"]: row for row in run.truth.to_pylist() if row["target"] is None}
     scans = [row for row in run.scans.to_pylist() if row["block"] == "eye"]
-    assert len(scans) == 30
+    assert [row["scan"] for row in scans] == list(range(late, 30))
     for row in scans:
+        tick = row["tick"] - late * 200_000_000
         for axis in ("north", "east", "down"):
-            moves = truth[row["tick"]][f"velocity_{axis}_m_s"]
-            error = 0.06 if row["tick"] == 0 else 0.01  # a flight that begins has one side
+            moves = truth[tick][f"velocity_{axis}_m_s"]
+            error = 0.06 if tick == 0 else 0.01  # a flight that begins has one side
             assert row[f"own_velocity_{axis}_m_s"] == pytest.approx(moves, abs=error)
     assert abs(scans[0]["own_velocity_north_m_s"] - scans[-1]["own_velocity_north_m_s"]) > 20
 
@@ -215,6 +223,31 @@ def test_what_the_fmu_says_of_its_errors_goes_before_what_the_scene_says(eye):
         assert row["azimuth_variance_rad2"] == pytest.approx(math.radians(0.1) ** 2)
         assert other["azimuth_variance_rad2"] == pytest.approx(0.002**2)
         assert row["range_variance_m2"] == 25.0 and row["confidence"] == 7.5
+
+
+@pytest.mark.parametrize("range_m", [0.0, -1.0])
+def test_a_range_that_is_not_above_0_is_none(eye, range_m):
+    found = scene(eye(), targets=_NAMES, duration_s=1)
+    found["blocks"]["eye"]["detections"] |= {"range_m": range_m}
+    rows = dsa_des.run(found).detections.to_pylist()
+    assert len(rows) == 10
+    assert {(row["range_m"], row["range_variance_m2"]) for row in rows} == {(None, None)}
+
+
+def test_it_offers_the_errors_that_are_always_the_same(eye):
+    found = scene(eye())
+    found["blocks"]["eye"]["detections"] |= {"elevation_error_rad": 0.005,
+                                             "range_variance_m2": "spread"}  # fmt: skip
+    simulation = Simulation(dsa_des.load_scene(found))
+    offer = simulation.components["eye"].offer("detections")
+    assert offer.azimuth_variance_rad2 == pytest.approx(0.002**2)
+    assert offer.elevation_variance_rad2 == pytest.approx(0.005**2)
+    # That of a cell whose width is the larger one's.
+    assert offer.resolution_rad == pytest.approx(math.sqrt(12.0) * 0.005)
+    assert offer.measures_range and not offer.measures_range_rate
+    assert offer.range_variance_m2 is None  # the FMU says it, look by look
+    for component in simulation.components.values():
+        component.close()
 
 
 def test_text_and_enumerations_of_fmi_2(eye):
