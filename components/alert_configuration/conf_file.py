@@ -23,6 +23,7 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.formats.text_rows import MOST_OF_A_CELL, Problems, did_you_mean, read_lines
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
+from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.text.safe_text import shortened
 
 _LEVEL = re.compile(r"alert_(\d{1,3})_(\w+)")
@@ -221,6 +222,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     Parameters
     ----------
     path : path-like
+        Such as ``mine.conf``, or that of a shipped one: ``alerting/do365b.conf``.
 
     Returns
     -------
@@ -231,8 +233,9 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     TrafficFileError
         With all problems of the file (up to 20): line, key, value, what is allowed.
     """
+    path = found_or_shipped(Path(path), str(path))
     problems = Problems(str(path))
-    lines = _lines(Path(path), problems)
+    lines = _lines(path, problems)
     values, units = _values(lines, problems)
     keys = AlerterKeys(lines, problems)
     alerters = keys.alerters()

@@ -59,7 +59,7 @@ def alert_files(
             if option == "--figure":
                 check_ending(place, PICTURES, option)
             check_file(place, option)
-    configuration = _read(found_or_shipped(Path(conf), conf))
+    configuration = _read(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
     done = _alerts(configuration, paths, _wind_mps(wind))
@@ -82,7 +82,7 @@ def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     several = len(encounters) > 1
     for text in encounters:
         try:
-            path = resolve_home(text)
+            path = found_or_shipped(resolve_home(text), text)
         except InputFileError as error:
             raise UsageError(f"{text}: {error}") from error
         if not is_folder(path):

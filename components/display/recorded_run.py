@@ -12,6 +12,7 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
 from dsa_des.record.run_folder import Run, with_columns_of_rows
+from dsa_des.scene.examples import find_example
 
 _STATE = (
     "time_s", "lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
@@ -114,11 +115,17 @@ def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
     return read_tables(os.fspath(run))
 
 
+def or_a_scene(name: str) -> str:
+    """Return what to do where a shipped scene is named in the place of a run, or nothing."""
+    scene = find_example(name, "scene")
+    return f"; of the scene: dsa-des run {name}, then the folder it names" if scene else ""
+
+
 def read_tables(run: str) -> RecordedTables:
     """Read all tables of a run's folder; `UsageError` where it is none or one cannot be read."""
     folder = Path(run)
     if not folder.is_dir():
-        raise UsageError(f"{run}: there is no such folder")
+        raise UsageError(f"{run}: there is no such folder{or_a_scene(run)}")
     paths = sorted(folder.glob("*.parquet"))
     if not (folder / "run.json").is_file() or not paths:
         raise UsageError(f"{run}: holds no run: run.json or its tables are missing")

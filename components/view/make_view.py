@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.display.recorded_run import or_a_scene
 from components.view.page import RunPicture, page_text, pages_beside
 from components.view.run_picture import encounter_picture, run_picture
 from dsa_des.errors import OutputError, UsageError
@@ -58,4 +59,4 @@ def _picture(source: Path) -> RunPicture:
         return encounter_picture(source)
     if source.exists():
         raise UsageError(f"{source}: is neither a run's folder nor a .daa file")
-    raise UsageError(f"{source}: there is no such folder or file")
+    raise UsageError(f"{source}: there is no such folder or file{or_a_scene(str(source))}")

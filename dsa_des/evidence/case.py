@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from dsa_des.block.component import Parameters, ScenePath
-from dsa_des.errors import SceneError, did_you_mean
+from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.results.record import CLASS, Result, as_text
 from dsa_des.scene.keys import key_in
 from dsa_des.scene.overrides import apply_sets
@@ -195,6 +195,11 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     problems = apply_sets(file, sets)
     if problems:
         raise SceneError(problems)
+    for key, takes_it in (("blocks", "run"), ("axes", "study")):
+        if key in file.data and "requirements" not in file.data:
+            raise SceneError(
+                [Problem(str(file.path), "", f"is no case: dsa-des {takes_it} takes it")]
+            )
     try:
         tables = CaseTables.model_validate(file.data)
     except ValidationError as error:

@@ -96,6 +96,9 @@ def test_the_configuration_of_the_project_alerts(tmp_path: Path) -> None:
     out = tmp_path / "alerts.csv"
     result = call(CONFIGS / "encounters/crossing.daa", "--conf", DO365B, "--out", out)
     assert result.exit_code == 0, result.stderr
+    names = ("encounters/crossing.daa", "--conf", "alerting/do365b.conf", "--out")
+    assert call(*names, tmp_path / "same.csv").exit_code == 0
+    assert (tmp_path / "same.csv").read_bytes() == out.read_bytes()
     levels = [int(row[4]) for row in rows(out.read_text(encoding="utf-8"))[2:]]
     assert levels[0] == 2 and max(levels) == 3 and levels[-1] == 0
 

@@ -41,20 +41,23 @@ _INSTALL = re.compile(r"^python3 -m venv \S+ && \S+/pip install -e \S+ && (?:\.v
 
 #: What is added to a command so that it takes a second: pattern, and options behind the line.
 SHORTER = (
-    (re.compile(r"^dsa-des study \S+\.toml"), "--workers 1 --no-figures"),
+    (re.compile(r"^dsa-des study (?!show |report |.*--replicas)"), "--workers 1 --no-figures"),
     (
-        re.compile(r"^dsa-des study (?!\S+/(?:operators|flown_intercepts)\.toml)\S+\.toml"),
+        re.compile(r"^dsa-des study (?!show |report |operators|flown_intercepts|.*--replicas)"),
         "--replicas 2",
     ),
     (
-        re.compile(r"^dsa-des study \S+/(?:operators|flown_intercepts)\.toml"),
+        re.compile(r"^dsa-des study (?:operators|flown_intercepts)"),
         "--replicas 1 --set set.duration_s=12",
     ),
     (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1"),
     (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),
     (re.compile(r"^dsa-des run .*--(?:set|swap)"), "--duration 10 --no-figures"),
-    (re.compile(r"^dsa-des run configs/closed"), "--duration 10"),
-    (re.compile(r"^dsa-des run configs/avoidance"), "--duration 10 --no-figures"),
+    (re.compile(r"^dsa-des run closed"), "--duration 10"),
+    (
+        re.compile(r"^dsa-des run avoidance/\S+ (?:--seed 2 )?--out runs/"),
+        "--duration 10 --no-figures",
+    ),
 )
 
 

@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -37,9 +36,8 @@ LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
 
 
 def desk(folder: Path) -> Path:
-    """Lay out what the pages suppose: the repository's scenes, encounters and a table of areas."""
-    shutil.copytree(ROOT / "configs", folder / "configs")
-    (folder / "SCENE").write_text('extends = "configs/first_light.toml"\n')
+    """Lay out what stands for a reader's own: a scene, encounters and a table of areas."""
+    (folder / "SCENE").write_text('extends = "first_light"\n')
     recorded = (ROOT / "configs/encounters/crossing.daa").read_bytes()
     (folder / "ENCOUNTER.daa").write_bytes(recorded)
     (folder / "ENCOUNTERS").mkdir()

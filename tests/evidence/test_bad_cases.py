@@ -50,6 +50,13 @@ def test_bad_calls(tmp_path):
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.parametrize(("name", "takes_it"), [("first_light", "run"), ("swerling", "study")])
+def test_a_scene_or_a_study_is_no_case(name, takes_it, tmp_path):
+    output, code = evidence(name, "--out", tmp_path / "pack")
+    assert code == 2 and output.endswith(f"{name}.toml: is no case: dsa-des {takes_it} takes it")
+    assert len(output.splitlines()) == 1 and not (tmp_path / "pack").exists()
+
+
 def test_a_study_of_several_cells_is_no_case(tmp_path):
     case = write_case(tmp_path)
     study = tmp_path / "study.toml"

@@ -227,3 +227,11 @@ def test_what_is_no_run_is_refused(made, says, tmp_path):
     done = call(path)
     assert done.exit_code == 2 and says in done.output and str(path) in done.output
     assert [p.name for p in tmp_path.iterdir()] == ([made] if made else [])
+
+
+def test_a_scene_in_the_place_of_a_run_says_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("first_light")
+    assert done.exit_code == 2
+    assert "of the scene: dsa-des run first_light, then the folder it names" in done.output
+    assert not list(tmp_path.iterdir())
