@@ -46,6 +46,12 @@ ENDS_S = {
     "tracking/cueing.toml": 20,
     "tracking/flown_intercept.toml": 30,
 }
+#: Perfect surveillance has no sensor; the pilot of one encounter finds nobody in its time.
+UNSEEN = {
+    "published/degas.toml",
+    "published/degas_unmitigated.toml",
+    "published/see_and_avoid.toml",
+}
 SCENES = sorted(
     name
     for name in (p.relative_to(CONFIGS).as_posix() for p in CONFIGS.rglob("*.toml"))
@@ -75,16 +81,19 @@ def recorded_both_ways(scene: Scene, folder: Path) -> dict[bool, Path]:
     return {everything: folder / str(everything) for everything in (False, True)}
 
 
-def assert_nothing_changed(folders: dict[bool, Path]) -> None:
+def assert_nothing_changed(folders: dict[bool, Path], *, seen: bool = True) -> None:
     """Compare every table byte by byte, and of `scans` all that is not a count of work."""
     names = sorted(path.name for path in folders[False].iterdir())
     assert names == sorted(path.name for path in folders[True].iterdir())
-    assert {"detections.parquet", "scans.parquet"} <= set(names)
-    assert pq.read_metadata(folders[False] / "detections.parquet").num_rows > 0
+    if seen:
+        assert {"detections.parquet", "scans.parquet"} <= set(names)
+        assert pq.read_metadata(folders[False] / "detections.parquet").num_rows > 0
     for name in names:
         if name != "scans.parquet":
             same = (folders[False] / name).read_bytes() == (folders[True] / name).read_bytes()
             assert same, name
+    if "scans.parquet" not in names:
+        return
     spared, whole = (pq.read_table(folders[e] / "scans.parquet") for e in (False, True))
     for column in set(spared.column_names) - WORK:
         assert spared[column].equals(whole[column]), column
@@ -103,7 +112,8 @@ def test_every_shipped_scene_is_among_those_compared() -> None:
 @pytest.mark.parametrize("name", sorted(set(SCENES) - set(LARGE)))
 def test_simulating_everything_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
     sets = [f"duration_s={ENDS_S[name]}"] if name in ENDS_S else []
-    assert_nothing_changed(recorded_both_ways(load_scene(CONFIGS / name, sets=sets), tmp_path))
+    folders = recorded_both_ways(load_scene(CONFIGS / name, sets=sets), tmp_path)
+    assert_nothing_changed(folders, seen=name not in UNSEEN)
 
 
 @pytest.mark.parametrize("name", LARGE)

@@ -108,10 +108,19 @@ def detections(
     variance: FloatArray,
     metadata: "list[dict[str, Any]]",
 ) -> set[Detection]:
-    """Return detections of one look."""
+    """Return detections of one look.
+
+    Parameters
+    ----------
+    which : list of int
+        Of each detection, which of the poses it was made from.
+    measured, variance : (4 or more, n)
+        Azimuth, elevation, range and range rate, NaN where not measured. What follows, such as the
+        velocity that a target tells (`Scans.measured`), none of the measurement models has.
+    """
     found = set()
     for k, i in enumerate(which):
-        azimuth, elevation, range_m, rate = measured[:, k].tolist()
+        azimuth, elevation, range_m, rate = measured[:4, k].tolist()
         ranged = range_m == range_m
         vector: list[Any] = [Elevation(elevation), Bearing(-azimuth)]
         rows = [1, 0]

@@ -27,12 +27,13 @@ def test_responses_are_the_sum_of_three_times():
     for which, mean in ((0, 5.0), (1, 11.0), (2, 3.0)):
         means = [0.0, 0.0, 0.0]
         means[which] = mean
-        drawn = np.array([response_s(np.eye(3)[which] * u, *means) for u in EVEN])
+        drawn = np.array([sum(response_s(np.eye(3)[which] * u, *means)) for u in EVEN])
         spread = mean / math.sqrt(5.5) if which == 1 else mean
         assert (drawn.mean(), drawn.std()) == pytest.approx((mean, spread), rel=0.02)
-    parts = [response_s(np.eye(3)[k] * 0.3, *(np.eye(3)[k] * 4.0)) for k in range(3)]
-    assert response_s(np.full(3, 0.3), 4.0, 4.0, 4.0) == pytest.approx(sum(parts))
-    assert response_s(None, 5.0, 11.0, 3.0) == 19.0
+    parts = [sum(response_s(np.eye(3)[k] * 0.3, *(np.eye(3)[k] * 4.0))) for k in range(3)]
+    waits_s, executes_s = response_s(np.full(3, 0.3), 4.0, 4.0, 4.0)
+    assert (waits_s, executes_s) == pytest.approx((parts[0] + parts[1], parts[2]))
+    assert response_s(None, 5.0, 11.0, 3.0) == (16.0, 3.0)
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

@@ -48,8 +48,8 @@ def told(monkeypatch):
     """All messages of alerting blocks."""
     messages, levels = [], DaidalusAlerting._levels
 
-    def kept(self, ticks, wake):
-        messages.append((ticks / wake.ticks_per_s, levels(self, ticks, wake)))
+    def kept(self, asked, wake):
+        messages.append((asked.tick / wake.ticks_per_s, levels(self, asked, wake)))
         return messages[-1][1]
 
     monkeypatch.setattr(DaidalusAlerting, "_levels", kept)

@@ -226,6 +226,17 @@ def with_alerts(folder: Path) -> str:
     return "alarm.toml"
 
 
+def with_avoidance(folder: Path) -> str:
+    """The small scene with a block that alerts of tracks and one that steers the ownship."""
+    text = (folder / with_alerts(folder)).read_text(encoding="utf-8")
+    back = '{ from = "avoidance", to = "traffic", delay_s = 0.5, holds = "nothing" }'
+    text = text.replace("wires = [", f'wires = [ "tracker -> alarm -> avoidance", {back},', 1)
+    conf = Path(__file__).parents[2] / "configs" / "alerting" / "do365b.conf"
+    text += f'\n[blocks.avoidance]\ntype = "avoidance.daidalus"\nconf = "{conf}"\n'
+    (folder / "avoidance.toml").write_text(text, encoding="utf-8")
+    return "avoidance.toml"
+
+
 def with_estimates(folder: Path) -> str:
     """The small scene with a tracker that estimates states."""
     text = (folder / "small.toml").read_text(encoding="utf-8")
@@ -243,13 +254,21 @@ def with_estimates(folder: Path) -> str:
 
 # Of traffic and loops that the small scene has not; tests/encounters and tests/metrics have them.
 ELSEWHERE = {"encounter_weight", "mitigated", "risk_ratio"}
+# Of blocks that the small scene has not.
+OF_OTHERS = {
+    "alert_times": with_alerts,
+    "manoeuvres": with_avoidance,
+    "track_errors_by_range": with_estimates,
+    "tracking": with_estimates,
+}
+# Of times and places that the small scene has: 6 s, from 2.7 nautical miles on.
+KEYS = {"track_errors_by_range": {"from_s": 1.0, "ranges_nmi": [2.4, 2.6]}}
 
 
 @pytest.mark.parametrize("name", sorted(registered(METRICS).keys() - ELSEWHERE))
 def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) -> None:
-    of_others = {"alert_times": with_alerts, "tracking": with_estimates}
-    scene = load_scene(of_others[name](small) if name in of_others else "small.toml")
-    metric = MetricSpec(name).build(scene)
+    scene = load_scene(OF_OTHERS[name](small) if name in OF_OTHERS else "small.toml")
+    metric = MetricSpec(name, KEYS.get(name, {})).build(scene)
     wanted = wanted_by([metric])
     replicas = [
         Replica(k, {"blocks.traffic.intruders[0].east_m": 60.0 * k, "blocks.ir.offset_s": k / 16})

@@ -78,10 +78,21 @@ def test_every_sensor_file_makes_a_block(file, tmp_path):
     first_light = CONFIGS / {"laser": "laser/power_line.toml"}.get(kind, "first_light.toml")
     written = tomllib.loads(file.read_text(encoding="utf-8"))
     # What the file takes away of the one that it extends, the scene's own sensor has too.
-    without = f"remove = {json.dumps(written.get('remove', []))}"
+    taken = written.get("remove", [])
+    if str(written.get("type", "")).startswith("surveillance."):
+        taken = ["azimuth_resolution_deg", "elevation_resolution_deg"]  # the radar's, not its own
+    # Two files are no sensor's: what an aircraft carries, and what the ownship believes of itself.
+    tables = {
+        "do365_equipage": "blocks.traffic.intruders.head_on",
+        "do365_navigation": "navigation",
+    }
+    table = tables.get(file.stem, f"blocks.{kind}")
     path.write_text(
-        f'extends = "{first_light}"\n[blocks.{kind}]\nextends = "{file}"\n{without}\n', "utf-8"
+        f'extends = "{first_light}"\n[{table}]\nextends = "{file}"\nremove = {json.dumps(taken)}\n',
+        "utf-8",
     )
     scene = load_scene(path)
+    if "type" in written:
+        assert scene.blocks[kind].type_name == written["type"]
     for name in set(written) & {"azimuth_pixels", "power_w", "azimuth_resolution_deg"}:
         assert getattr(scene.blocks[kind].parameters, name) == written[name]

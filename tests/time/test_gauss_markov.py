@@ -24,6 +24,10 @@ class OneDraw:
     def __init__(self):
         self.known = {}
 
+    def of_runs(self, run):
+        assert not run.any()  # a stream of one run is that of all its rows
+        return self
+
     def normals(self, targets, scans, draw):
         targets = np.broadcast_to(targets, scans.shape)
         self.found = []

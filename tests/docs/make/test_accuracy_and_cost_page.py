@@ -30,7 +30,7 @@ def test_its_figures_are_there():
     ("block", "ladder", "skip"), [("transform", EARTH, {"ellipsoid"}), ("eo", VISIBLE, {"union"})]
 )
 def test_errors_and_effects_are_those_that_are_computed(block, ladder, skip):
-    quick = {rung.name for rung in ladder.rungs} - {"mesh", "geodesic", "aspect_table"}
+    quick = {rung.name for rung in ladder.rungs} - {"mesh", "geodesic", "aspect_table", "image"}
     small = type(ladder)(**{**vars(ladder), "rungs": tuple(
         rung for rung in ladder.rungs if rung.name in quick)})  # fmt: skip
     variants = Variants(str(DOCS.parent / "configs" / "first_light.toml"))
