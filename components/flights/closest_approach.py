@@ -6,13 +6,12 @@ stretch of time in which that leaves nothing nearer than what is known already i
 What is found is what looking at every time would find, to the bit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from components.flights.bounds import intervals_present_s
 from components.flights.sample_times import SampleTimes
 from components.geometry.ellipsoid import line_of_sight
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -118,7 +117,7 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
 
 def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
-    present_s = np.array(present_together_s(source.own, source.targets, end_s))
+    present_s = np.array(present_together_s(source.own, source.targets.intervals_present_s, end_s))
     looked_s = np.array(_looked_at_s(source, *present_s))
     return [
         end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
@@ -136,14 +135,13 @@ def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_
 
 
 def present_together_s(
-    own: Any, targets: Sequence[Any], end_s: float
+    own: Any, intervals_s: FloatArray, end_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last time (targets,) of a run at which both may be there, s."""
-    first, last = intervals_present_s([own])[0].tolist()
-    intervals = intervals_present_s(targets)
+    first, last = own.interval_present()
     return (
-        np.maximum(intervals[:, 0], max(first, 0.0)),
-        np.minimum(intervals[:, 1], min(last, end_s)),
+        np.maximum(intervals_s[:, 0], max(first, 0.0)),
+        np.minimum(intervals_s[:, 1], min(last, end_s)),
     )
 
 

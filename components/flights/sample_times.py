@@ -16,31 +16,18 @@ from dsa_des.arrays.types import FloatArray, IntArray
 class PieceSearch:
     """The pieces of many paths, laid end to end."""
 
-    def __init__(self, starts_s: list[FloatArray]) -> None:
-        lengths = np.array([len(starts) for starts in starts_s], dtype=np.int64)
-        ends = np.cumsum(lengths)
-        self.starts_s = np.concatenate([*starts_s, np.empty(0)])
+    def __init__(self, starts_s: FloatArray, counts: IntArray) -> None:
+        ends = np.cumsum(counts)
+        self.starts_s = starts_s
         #: Index of each aircraft's first and last piece among all.
-        self.first, self.last = ends - lengths, ends - 1
-        self._steps = int(lengths.max(initial=1) - 1).bit_length()
+        self.first, self.last = ends - counts, ends - 1
+        self._steps = int(counts.max(initial=1) - 1).bit_length()
 
     @classmethod
-    def joined(cls, one: "PieceSearch", other: "PieceSearch") -> "PieceSearch":
-        """Return the search for the paths of both, those of `other` after those of `one`."""
-        search = cls([])
-        search.starts_s = np.concatenate([one.starts_s, other.starts_s])
-        search.first = np.concatenate([one.first, other.first + len(one.starts_s)])
-        search.last = np.concatenate([one.last, other.last + len(one.starts_s)])
-        search._steps = max(one._steps, other._steps)
-        return search
-
-    @classmethod
-    def of_one_each(cls, aircraft: int) -> "PieceSearch":
-        """Return the search for paths of one piece, which starts at 0."""
-        search = cls([])
-        search.starts_s = np.zeros(aircraft)
-        search.first = search.last = np.arange(aircraft)
-        return search
+    def of(cls, starts_s: Sequence[FloatArray]) -> "PieceSearch":
+        """Return the search among the pieces of each."""
+        counts = np.array([len(starts) for starts in starts_s], dtype=np.int64)
+        return cls(np.concatenate([*starts_s, np.empty(0)]), counts)
 
     def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
         """Return the last piece that starts at or before a time, or the first one."""
@@ -146,7 +133,7 @@ class OwnTimes:
     """Every target has times of its own."""
 
     def __init__(self, times_s: Sequence[FloatArray]) -> None:
-        self._find = PieceSearch(list(times_s))
+        self._find = PieceSearch.of(times_s)
 
     def at(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return the time of each sample."""

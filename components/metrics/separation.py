@@ -129,7 +129,7 @@ class RelativeFlight:
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""
-        return present_together_s(self.own, [self.target], self.end_s)
+        return present_together_s(self.own, np.array([self.target.interval_present()]), self.end_s)
 
     @property
     def closing_mps(self) -> float:
