@@ -86,3 +86,30 @@ def in_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> Traj
     order = np.argsort(np.concatenate(rows), kind="stable")
     columns = zip(*(state.arrays() for state in states), strict=True)
     return TrajectoryState(*(np.concatenate(parts)[order] for parts in columns))
+
+
+class PieceSearch:
+    """The pieces of many paths, laid end to end."""
+
+    def __init__(self, starts_s: FloatArray, counts: IntArray) -> None:
+        ends = np.cumsum(counts)
+        self.starts_s = starts_s
+        #: Index of each aircraft's first and last piece among all.
+        self.first, self.last = ends - counts, ends - 1
+        self._steps = int(counts.max(initial=1) - 1).bit_length()
+
+    @classmethod
+    def of(cls, starts_s: Sequence[FloatArray]) -> PieceSearch:
+        """Return the search among the pieces of each."""
+        counts = np.array([len(starts) for starts in starts_s], dtype=np.int64)
+        return cls(np.concatenate([*starts_s, np.empty(0)]), counts)
+
+    def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
+        """Return the last piece that starts at or before a time, or the first one."""
+        low, high = self.first[aircraft], self.last[aircraft]
+        for _ in range(self._steps):
+            middle = (low + high + 1) // 2
+            begun = self.starts_s[middle] <= time_s
+            low = np.where(begun, middle, low)
+            high = np.where(begun, high, np.maximum(middle - 1, low))
+        return low

@@ -10,8 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from components.flights.attitude import attitude_from_path, fit_path
-from components.flights.fleet import CELLS_AT_ONCE, Fleet, checked_times, empty_state, in_blocks
-from components.flights.sample_times import PieceSearch
+from components.flights.fleet import (
+    CELLS_AT_ONCE,
+    Fleet,
+    PieceSearch,
+    checked_times,
+    empty_state,
+    in_blocks,
+)
 from components.flights.sampled_segments import evaluate_segments, fit_segments, locate
 from components.geometry.angles import FloatArray, Vector, wrap_heading_rad, wrap_longitude_deg
 from components.geometry.ellipsoid import line_of_sight

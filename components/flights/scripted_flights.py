@@ -12,10 +12,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.flights.fleet import CELLS_AT_ONCE, Fleet, checked_times, empty_state, in_blocks
+from components.flights.fleet import (
+    CELLS_AT_ONCE,
+    Fleet,
+    PieceSearch,
+    checked_times,
+    empty_state,
+    in_blocks,
+)
 from components.flights.leg_motion import FORMULAS, KINDS, Segment
 from components.flights.legs import AnyLeg, LegBuilder, require
-from components.flights.sample_times import PieceSearch
 from components.geometry.angles import heading_from_deg, wrap_longitude_deg
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.geometry.state import TrajectoryState

@@ -9,10 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.closest_approach import Approaches, closest_approaches, end_of_look
+from components.flights.closest_approach import (
+    Approaches,
+    OwnTimes,
+    RegularTimes,
+    SampleTimes,
+    closest_approaches,
+    end_of_look,
+)
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.many_flights import fleet_of
-from components.flights.sample_times import OwnTimes, RegularTimes, SampleTimes
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
 from components.metrics.separation import (

@@ -12,7 +12,7 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
-from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
+from components.flights.closest_approach import OwnTimes, SampleTimes, SharedTimes
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv

@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
-from components.flights.sample_times import RegularTimes, SampleTimes
+from components.flights.closest_approach import RegularTimes, SampleTimes
+from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.starts import Starts
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource

@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights import legs
 from components.flights.attitude import Wind, ground_speed_mps
-from components.flights.sample_times import RegularTimes, SampleTimes
+from components.flights.closest_approach import RegularTimes, SampleTimes
+from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.flights.starts import Starts
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.flown_together import AllFlown
 from components.traffic.source import SourceParameters, TrafficSource

@@ -22,13 +22,13 @@ from components.flights.bounds import (
 )
 from components.flights.closest_approach import (
     Approaches,
+    SampleTimes,
     censored_approaches,
     closest_approaches,
     present_together_s,
 )
 from components.flights.culling import Culling, SteeredCulling
 from components.flights.fleet import Fleet
-from components.flights.sample_times import SampleTimes
 from components.geometry.state import TrajectoryState
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates

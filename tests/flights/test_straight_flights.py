@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_parameters
+from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.flights.starts import Starts
 
 latitudes = st.floats(-90, 90) | st.sampled_from([90.0, -90.0, 0.0, -0.0, 52.0])
 headings = st.floats(-720, 720) | st.sampled_from([0.0, 90.0, 180.0, 270.0, 360.0])

@@ -12,8 +12,8 @@ from wired import chain, first_look, rows, run, sensor
 
 from components.flights.attitude import Wind, ground_speed_mps, heading_and_airspeed
 from components.flights.legs import Climb, Straight, Turn
+from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.flights.starts import Starts
 from components.traffic.wind_effect import Crabbing
 from dsa_des.errors import SceneError
 
