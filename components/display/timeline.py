@@ -62,14 +62,18 @@ def draw_timeline(
     """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
-    close_up = find_close_up(scans, folder, duration_s)
-    shown = scans_between(folder, close_up.start_s, close_up.end_s, scans)
-    rows = max(1, len(detected.sensors))
-    share = min(0.42, 0.14 + 0.07 * rows)
+    title = figure_text(simulation.scene.title, 28)  # the legend is beside it
     with drawing(*_SIZE_IN, path) as figure:
+        if not scans:  # a scene without sensors has ranges only
+            whole = figure.add_axes((_LEFT, 0.1, _BELOW, 0.8))
+            _draw_ranges(whole, flights, detected, duration_s)
+            whole.set_title(f"{title}: no sensor scans", loc="left")
+            return path
+        close_up = find_close_up(scans, folder, duration_s)
+        shown = scans_between(folder, close_up.start_s, close_up.end_s, scans)
+        share = min(0.42, 0.14 + 0.07 * max(1, len(detected.sensors)))
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
         _draw_scans(above, scans, shown, detected.styles, close_up)
-        title = figure_text(simulation.scene.title, 28)  # the legend is beside it
         above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
