@@ -34,7 +34,7 @@ from components.sensor.parameters import CorrelationTime, ErrorParameters, Senso
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
@@ -122,12 +122,15 @@ class LaserParameters(SensorParameters):
         return said
 
 
-class LaserExtinction(Effect):
+EXTINCTION = Hook("extinction", float, "extinction by the air at the laser's wavelength, 1/m")
+
+
+class LaserExtinction(Effect[float]):
     """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
 
     lockstep = True
     name = "laser extinction"
-    acts_on = "extinction"
+    acts_on = EXTINCTION
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
@@ -202,7 +205,7 @@ class ScanningLaser(Sensor):
     lockstep = True
     Parameters = LaserParameters
     inputs = CUED_INPUTS
-    hooks = {"extinction": "extinction by the air at the laser's wavelength, 1/m"}
+    hooks = (EXTINCTION,)
     effects: ClassVar[tuple[Effect, ...]] = (LaserExtinction(), BeamSweep())
     also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
     ladders = (SHOTS,)
@@ -221,7 +224,7 @@ class ScanningLaser(Sensor):
     def setup(self) -> None:
         """Take what the scene's air does to a pulse, and refuse cues."""
         refuse_cues(self, "its pattern is fixed, with one threshold")
-        (self._extinction_per_m,) = self.built("extinction") or [0.0]
+        self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
 
     @property
     def _sweep(self) -> Sweep | None:

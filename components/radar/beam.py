@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, finite, positive, unflatten
 from components.geometry.angles import TWO_PI, wrap_pi
-from components.messages.detections import Detections
+from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.radar.resolution import azimuth_width_rad
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.message import per_row
 
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding
@@ -156,7 +156,7 @@ def _into_sweep(angle: FloatArray, width: float) -> FloatArray:
     return np.where(past_the_end, np.where(nearer_to_start, 0.0, width), angle)
 
 
-class BeamSweep(Effect):
+class BeamSweep(Effect[Reporting]):
     """A beam that sweeps once per scan lights each target at an instant of its own.
 
     Everything about a target is then that of this instant: whether it is in reach, its SNR, its
@@ -167,7 +167,7 @@ class BeamSweep(Effect):
     """
 
     name = "beam sweep"
-    acts_on = "report"
+    acts_on = REPORT
     lockstep = True
     neutral = False
     outside_the_proof = "it fills a column that is null without it"
@@ -181,7 +181,12 @@ class BeamSweep(Effect):
         return Sweep(block)
 
 
-class BeamShape(Effect):
+BEAM_SHAPE = Hook(
+    "beam shape", CellValues, "share of a target's echo that is left off the beam's axis"
+)
+
+
+class BeamShape(Effect[CellValues]):
     """What a target off the beam's axis loses: between beam positions, or on average in a sweep.
 
     The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
@@ -191,7 +196,7 @@ class BeamShape(Effect):
     """
 
     name = "beam shape"
-    acts_on = "beam shape"
+    acts_on = BEAM_SHAPE
     lockstep = True
     neutral = False
     outside_the_proof = "no target is amid every beam"

@@ -1,6 +1,6 @@
 """The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -13,36 +13,45 @@ from components.messages.detections import OwnOfEntries
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.beam import BeamSweep, Sweep
-from components.radar.detection.cfar import Averaging, CellAveraging
+from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
 from components.radar.detection.probability import required_snr
 from components.radar.doppler import (
+    DOPPLER,
     LASTS_S,
+    RANGE_RATE,
     DopplerFilter,
     DopplerProcessing,
     RangeRate,
+    RangeRates,
     folded_range_rate,
 )
-from components.radar.ground_clutter import BoundaryClutter, Echo, clutter_as_signal, terrain_of
+from components.radar.ground_clutter import (
+    CLUTTER,
+    BoundaryClutter,
+    Echo,
+    clutter_as_signal,
+    terrain_of,
+)
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
 from components.radar.rain import RainClutter, SidelobeClutter
-from components.radar.resolution import Merging, OneReportByCell
+from components.radar.resolution import ONE_REPORT, Merging, OneReportByCell
 from components.radar.timing import unambiguous_range_m
 from components.radar.weather import (
+    SNR,
     WEATHER_EFFECTS,
     BlindRange,
-    CellFactor,
     rain_warnings,
     weather_without_carrier,
 )
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect
+from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.message import Message
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
@@ -57,13 +66,7 @@ class Radar(Sensor):
     measures_range = True
     #: Of the carrier, m; None where it is not known.
     wavelength_m: float | None = None
-    hooks = {
-        "SNR": "(cells) -> factor of each cell's SNR",
-        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
-        "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
-        "one report by cell": "(cells, power) -> power of the echo that stands for its "
-        "resolution cell, 0 of the others",
-    }
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (SNR, DOPPLER, RANGE_RATE, ONE_REPORT)
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
     also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
@@ -78,16 +81,16 @@ class Radar(Sensor):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.snr_factors: list[CellFactor] = []
+        self.snr_factors: list[CellValues] = []
         self._merging: Merging | None = None
         self.doppler: DopplerProcessing | None = None
         self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
-        self.snr_factors = self.built("SNR")
-        (self.doppler,) = self.built("Doppler") or [None]
-        (self._merging,) = self.built("one report by cell") or [None]
+        self.snr_factors = self.built(SNR)
+        self.doppler = self.built_one(DOPPLER)
+        self._merging = self.built_one(ONE_REPORT)
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
@@ -106,7 +109,7 @@ class Radar(Sensor):
         reach = super().request(port)
         if not self.p.enabled:
             return reach
-        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
+        lasts_s = LASTS_S if self._rates or self.built(DOPPLER) else 0.0
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)
         return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
@@ -121,8 +124,8 @@ class Radar(Sensor):
         return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
-    def _rates(self) -> list[Callable[[Cells, IntArray], FloatArray]]:
-        return self.built("range rate")
+    def _rates(self) -> RangeRates | None:
+        return self.built_one(RANGE_RATE)
 
     @property
     def steps(self) -> dict[str, float]:
@@ -133,7 +136,7 @@ class Radar(Sensor):
 
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
-        return self._rates[0](cells, found) if self._rates else None
+        return None if self._rates is None else self._rates(cells, found)
 
     def _in_body(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
@@ -260,10 +263,7 @@ class RangeBoundary(Radar):
     Parameters = RangeBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    hooks = {
-        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
-        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
-    }
+    hooks = (CLUTTER, REFERENCE_CELLS)
     effects = (
         *WEATHER_EFFECTS,
         BlindRange(),
@@ -288,8 +288,8 @@ class RangeBoundary(Radar):
         """Take what the scene's effects do to the boundary."""
         super().setup()
         refuse_cues(self)
-        self._echoes = self.built("clutter")
-        (self._cfar,) = self.built("threshold from reference cells") or [None]
+        self._echoes = self.built(CLUTTER)
+        self._cfar = self.built_one(REFERENCE_CELLS)
 
     def warnings(self) -> list[str]:
         """Say that clutter counts as signal, where it does, and what it hears of the weather."""

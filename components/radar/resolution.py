@@ -17,7 +17,7 @@ from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells
 from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.errors import Disagreements
 
 
@@ -223,36 +223,6 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     )
 
 
-class OneReportByCell(Effect):
-    """Targets whose echoes fall into one resolution cell give one report.
-
-    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
-
-    It is that of the strongest echo, looked at with the sum of their powers (phases are random
-    against each other), and with that target's fluctuation and draws. So noise alone reports a
-    cell with the probability of false alarm, however many faint targets it holds.
-    """
-
-    lockstep = True
-    name = "resolution cells"
-    acts_on = "one report by cell"
-    neutral = False
-    outside_the_proof = "without it every target has a report of its own"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``resolution_cells``."""
-        p = block.p
-        if p.resolution_cells is None and p.errors != "grid":
-            if p.sizeless_steps:
-                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
-            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
-        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
-
-    def build(self, block: Any) -> Merging:
-        """Return what adds up the echoes of each cell."""
-        return Merging(block)
-
-
 class Merging:
     """Adds up echoes by resolution cell; called with cells and their echoes' powers."""
 
@@ -290,3 +260,40 @@ class Merging:
             summed[more] += power[order[first[more] + later]]
         total[order[first]] = summed
         return total
+
+
+ONE_REPORT = Hook(
+    "one report by cell",
+    Merging,
+    "power of the echo that stands for its resolution cell, 0 of the others",
+)
+
+
+class OneReportByCell(Effect[Merging]):
+    """Targets whose echoes fall into one resolution cell give one report.
+
+    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
+
+    It is that of the strongest echo, looked at with the sum of their powers (phases are random
+    against each other), and with that target's fluctuation and draws. So noise alone reports a
+    cell with the probability of false alarm, however many faint targets it holds.
+    """
+
+    lockstep = True
+    name = "resolution cells"
+    acts_on = ONE_REPORT
+    neutral = False
+    outside_the_proof = "without it every target has a report of its own"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``resolution_cells``."""
+        p = block.p
+        if p.resolution_cells is None and p.errors != "grid":
+            if p.sizeless_steps:
+                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
+            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
+        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
+
+    def build(self, block: Any) -> Merging:
+        """Return what adds up the echoes of each cell."""
+        return Merging(block)

@@ -8,13 +8,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.ladder import ExactDetection, method_reasons
+from components.radar.detection.ladder import PD_METHOD, ExactDetection, method_reasons
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
 from components.radar.measurement import noise_at_targets, signal_over_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
+    FADING,
+    FLUCTUATION,
     Fading,
     LastingFluctuation,
     ModelsOfCells,
@@ -25,7 +27,7 @@ from components.radar.rcs import (
 )
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather import WEATHER_EFFECTS
-from components.sensor.look import Cells, Look
+from components.sensor.look import CUE, Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
 from dsa_des.time.randomness import Stream
@@ -156,11 +158,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     Parameters = SwerlingParameters
     lockstep = True
-    hooks = {
-        "RCS": "which Swerling model each cell has",
-        "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",
-        "method of Pd": "name of the method that gives the probability of detection",
-    }
+    hooks = (FLUCTUATION, FADING, PD_METHOD)
     effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -176,10 +174,10 @@ class SwerlingRadar(LinkBudgetRadar):
     def setup(self) -> None:
         """Take the scene's effects; without fluctuation every target is steady."""
         super().setup()
-        (self._models,) = self.built("RCS") or [steady]
-        (self._fading,) = self.built("fading") or [None]
+        self._models = self.built_one(FLUCTUATION) or steady
+        self._fading = self.built_one(FADING)
         if self.p.detection == "exact":
-            (self._method,) = self.built("method of Pd") or ["table"]
+            self._method = self.built_one(PD_METHOD) or "table"
 
     def left_out(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
@@ -330,7 +328,7 @@ class SwerlingRadar(LinkBudgetRadar):
         None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
         moving-target filter.
         """
-        if self.built("cue"):
+        if self.built(CUE):
             return None
         proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
         if terrain_of(self) is not None or not proven:

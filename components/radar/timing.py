@@ -13,7 +13,7 @@ from components.geometry.angles import TWO_PI
 from components.geometry.field_of_view import sector_width_rad
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.resolution import ResolutionParameters
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 # A width that is a whole number of steps up to rounding has that many; likewise pulses in a dwell.
 _ROUNDING = 1e-9
@@ -313,7 +313,10 @@ def _rounded_down(value: float) -> str:
     return f"{math.floor(value / step) * step:.4g}"
 
 
-class TimeBudget(Effect):
+LOOK_ENERGY = Hook("energy of a look", LookEnergy, "what the time of a scan leaves for each beam")
+
+
+class TimeBudget(Effect[LookEnergy]):
     """Energy of a look from the time that a scan leaves for each beam.
 
     A radar's link budget then differs with its scan rate, so replicas that differ in it have
@@ -322,7 +325,7 @@ class TimeBudget(Effect):
 
     lockstep = True
     name = "time budget"
-    acts_on = "energy of a look"
+    acts_on = LOOK_ENERGY
     neutral = False
     outside_the_proof = "with it the link budget is that of another look"
 

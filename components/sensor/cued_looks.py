@@ -10,6 +10,7 @@ from components.estimation.measurement import axis_in_body
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
+from components.sensor.look import CUE, Cueing
 from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Input
@@ -22,12 +23,12 @@ _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
-class CuedLooks(Effect):
+class CuedLooks(Effect[Cueing]):
     """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
 
     lockstep = True
     name = "cues"
-    acts_on = "cue"
+    acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for a wire that brings cues."""
@@ -36,7 +37,7 @@ class CuedLooks(Effect):
             return Verdict(False, "no wire brings cues")
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
-    def build(self, block: Any) -> "ConesAhead":
+    def build(self, block: Any) -> Cueing:
         """Return what finds targets in cones."""
         return ConesAhead()
 
