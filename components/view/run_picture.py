@@ -91,6 +91,8 @@ def run_picture(folder: Path) -> RunPicture:
     for name in ("fused", "tracks"):
         if name in found and "azimuth_rad" in found[name]:
             table = found[name]
+            if name == "tracks":
+                picture.trackers = _trackers(table)
             picture.tables[name] = {
                 "time_s": table["time_s"],
                 "target": _codes(table["target"], targets),
@@ -100,7 +102,7 @@ def run_picture(folder: Path) -> RunPicture:
             }
     if "state_tracks" in found:
         table = found["state_tracks"]
-        picture.trackers = sorted(set(_text(table["block"]))) if "block" in table else []
+        picture.trackers = _trackers(table)
         picture.tables["tracks"] = _estimates(table, picture.trackers, own, plane)
     if "alerts" in found:
         table = found["alerts"]
@@ -168,9 +170,13 @@ def _codes(column: list[str | None], names: Any) -> AnyArray:
 
 def _sources(table: _RunColumns) -> dict[str, AnyArray]:
     """Return by number which block each row is of."""
-    if "block" not in table:
-        return {}
-    return {"source": _codes(table["block"], sorted(set(_text(table["block"]))))}
+    names = _trackers(table)
+    return {"source": _codes(table["block"], names)} if names else {}
+
+
+def _trackers(table: _RunColumns) -> list[str]:
+    """Return the names of the blocks of a table, in the order of their numbers on the page."""
+    return sorted(set(_text(table["block"]))) if "block" in table else []
 
 
 def _whole(column: Any) -> AnyArray:

@@ -10,8 +10,9 @@ from matplotlib.collections import PathCollection, QuadMesh
 from scipy.stats import chi2
 
 import dsa_des
+from components.display.consistency import draw_consistency, errors_squared
 from components.display.outcomes import distances
-from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
+from components.display.tracks import DrawnTracks, draw_tracks
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
 
@@ -98,6 +99,35 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
         assert word == f"{block}: {values.mean():.3g}, {share:.0f} % inside"
     assert [text.get_text()[:4] for text in innovations.get_legend().get_texts()] == [
         "hone", "sure"]  # fmt: skip
+
+
+@pytest.mark.parametrize("many", [40, 60])
+def test_of_many_tracks_their_median_is_drawn(tmp_path, monkeypatch, shown, many):
+    """Sixty lines would cover each other: at each time half of the tracks are below the middle."""
+    crowd, one = copy(shown), shown.tracks[0]
+    scales = np.geomspace(0.1, 10.0, many)
+    crowd.tracks = [
+        replace(
+            one,
+            number=number,
+            columns=one.columns | {name: one.columns[name] / k for name in COVARIANCE.values()},
+        )
+        for number, k in enumerate(scales.tolist())
+    ]
+    figure = drawn_figure(monkeypatch, draw_consistency, tmp_path / "x.png", crowd)
+    errors = figure.axes[0]
+    drawn = [line for line in errors.lines if len(line.get_xdata()) > 2]
+    if many == 40:
+        assert len(drawn) == many
+        return
+    (median,) = drawn
+    (spread,) = (band for band in errors.collections if len(band.get_paths()[0].vertices) > 20)
+    found, _ = errors_squared(one.columns, shown.targets.states(one.columns["state_s"]))
+    assert found.min() - 1e-9 < median.get_ydata().min() < median.get_ydata().max() < found.max()
+    top = spread.get_paths()[0].vertices[:, 1].max()
+    assert top / found.max() == pytest.approx(np.quantile(scales, 0.975), rel=0.3)
+    words = [text.get_text() for text in errors.get_legend().get_texts()]
+    assert words == ["95 % of 60 tracks", "median"]
 
 
 @pytest.mark.parametrize("many", [3, 100])
