@@ -26,8 +26,8 @@ class Gate(Component):
     lockstep = True
     rewindable = True
     verified = (
-        Verified("who is looked at, and why another is not", "pymap3d, and rotations by matrices; a "
-                 "banked ownship in the south", "1 m of the range, 0.1 deg of a field of view",
+        Verified("who is looked at, and why another is not", "pymap3d, and rotations by matrices: "
+                 "a banked ownship in the south", "1 m of the range, 0.1 deg of a field of view",
                  "tests/sensor/test_reach.py"),
     )  # fmt: skip
 

@@ -47,8 +47,8 @@ class Fusion(Component):
     windowed = True
     rewindable = True
     verified = (
-        Verified("where a fused row puts its target", "pymap3d, and rotations by matrices; a banked "
-                 "ownship in the south", "0.05 m",
+        Verified("where a fused row puts its target", "pymap3d, and rotations by matrices: a banked"
+                 " ownship in the south", "0.05 m",
                  "tests/fusion/test_fused_and_tracked_positions.py"),
     )  # fmt: skip
 

@@ -283,7 +283,8 @@ class Rows:
         _, place = np.unique(cluster, return_inverse=True)
         each = np.array([np.bincount(place, weights=part) for part in parts])
         value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
-        more = 2.0 * unseen_variance(np.bincount(place, weights=weight * below))
+        events = np.bincount(place, weights=weight * below).astype(float)
+        more = 2.0 * unseen_variance(events)
         joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
         # A ratio whose runs all agree has no such error; its interval tells another.
         alike = sum(

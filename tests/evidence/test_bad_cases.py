@@ -14,7 +14,7 @@ BAD = {
     "most = 2\n": ("", "requirements[0]: a requirement has one limit"),
     "most = 2": (
         "most = -2",
-        "requirements[0].most = -2.0: no value of well_clear_lost_risk_ratio lies there; allowed: 0",
+        "requirements[0].most = -2.0: no value of well_clear_lost_risk_ratio lies there; allowed:",
     ),
     "least = 0.01\nunit": (
         "least = 10\nunit",
