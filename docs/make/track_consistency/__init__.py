@@ -1,4 +1,4 @@
-"""``python -m docs.make.track_consistency``: are covariances of tracks honest?
+"""Are covariances of tracks honest? ``python -m docs.make.track_consistency`` measures it.
 
 Scenes with stated errors, a banked ownship on the southern hemisphere and many replicas; at some
 instants the mean normalised error squared (NEES) of the tracks' position and velocity, 6 where
