@@ -101,6 +101,21 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
         "hone", "sure"]  # fmt: skip
 
 
+def test_tracks_of_whatever_numbers_have_colours_of_their_own(shown):
+    """Numbers 2 and 8 once had the same of six colours."""
+    one = shown.tracks[0]
+    columns = {name: np.concatenate([values] * 2) for name, values in one.columns.items()}
+    columns["track"] = np.repeat([2, 8], len(one.columns["state_s"]))
+    columns["block"] = np.array(["tracker"] * len(columns["track"]))
+    origin = {
+        f"origin_{name}": np.full(len(columns["track"]), value)
+        for name, value in zip(("lat_deg", "lon_deg", "alt_m"), shown.origin, strict=True)
+    }
+    drawn = DrawnTracks(Simulation(dsa_des.load_scene("first_light")), columns | origin)
+    assert [track.number for track in drawn.tracks] == [2, 8]
+    assert len({track.colour for track in drawn.tracks}) == 2
+
+
 @pytest.mark.parametrize("many", [40, 60])
 def test_of_many_tracks_their_median_is_drawn(tmp_path, monkeypatch, shown, many):
     """Sixty lines would cover each other: at each time half of the tracks are below the middle."""
