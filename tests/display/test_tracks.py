@@ -19,12 +19,16 @@ from dsa_des.running.simulation import Simulation
 EKF = "blocks.tracker.type='tracking.ekf'"
 
 
-def told(tmp_path, *sets):
-    scene = dsa_des.load_scene(
+def near(*sets):
+    return dsa_des.load_scene(
         "first_light",
         sets=["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
               "blocks.traffic.intruders.0.north_m=3000", *sets],
     )  # fmt: skip
+
+
+def told(tmp_path, *sets):
+    scene = near(*sets)
     dsa_des.run(scene, out=tmp_path / "run")
     return DrawnTracks.read(Simulation(scene), tmp_path / "run")
 
@@ -111,7 +115,7 @@ def test_tracks_of_whatever_numbers_have_colours_of_their_own(shown):
         f"origin_{name}": np.full(len(columns["track"]), value)
         for name, value in zip(("lat_deg", "lon_deg", "alt_m"), shown.origin, strict=True)
     }
-    drawn = DrawnTracks(Simulation(dsa_des.load_scene("first_light")), columns | origin)
+    drawn = DrawnTracks(Simulation(near()), columns | origin)
     assert [track.number for track in drawn.tracks] == [2, 8]
     assert len({track.colour for track in drawn.tracks}) == 2
 
