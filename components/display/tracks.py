@@ -66,7 +66,9 @@ class DrawnTracks:
         self.targets = TargetsInFrame(targets, self.origin)
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
+        several = len(self.blocks) > 1
         for place, block in enumerate(self.blocks):
+            turn = place
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -74,8 +76,8 @@ class DrawnTracks:
                 near = distances(one, slice(None), self.targets.at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
-                turn = place if len(self.blocks) > 1 else number - 1
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
+                turn += not (false or several)
                 self.tracks.append(DrawnTrack(block, number, one, false, colour))
 
     @classmethod
