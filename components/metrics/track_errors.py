@@ -78,7 +78,7 @@ class ErrorsByRange(Metric):
             found.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
             found += [
                 Result(f"{name}.{r:g}", NUMBER, f"{what}, at {r:g} nmi: {share}",
-                       quantile=self.p.quantile)
+                       quantile=self.p.quantile, least=0.0)
                 for name, what in _ERRORS.items()
             ]  # fmt: skip
         return found
