@@ -50,7 +50,6 @@ class Limb(Effect[Hides]):
 
     name = "Earth's horizon"
     acts_on = HIDES
-    neutral = False
     outside_the_proof = "an Earth that hides nothing is none"
     lockstep = True
 
@@ -80,7 +79,6 @@ class Mountains(Effect[Hides]):
 
     name = "masking by the ground"
     acts_on = HIDES
-    neutral = False
     outside_the_proof = "without a raster there is no ground"
     lockstep = True
 
@@ -118,7 +116,6 @@ class Refraction(Effect[Bends]):
 
     name = "refraction"
     acts_on = BENDS
-    neutral = False
     outside_the_proof = "angles are formed anew, and their last bits differ"
     lockstep = True
 

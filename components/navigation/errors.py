@@ -219,7 +219,6 @@ def _errors_of(context: Context) -> list[str]:
 
 class _Navigation(Effect[Built]):
     name = "navigation"
-    neutral = False
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.geometry import sector_width_rad
 from components.optical.area_of_cells import check_silhouette, fitted_otherwise
 from components.optical.contrast import CONTRAST
 from components.optical.detection import (
@@ -173,8 +172,7 @@ class Camera(Sensor):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        width = sector_width_rad(*self.reach.azimuth_rad)
-        height = self.reach.elevation_rad[1] - self.reach.elevation_rad[0]
+        width, height = self.reach.width_rad
         self.pixel_azimuth_rad = width / parameters.azimuth_pixels
         self.pixel_elevation_rad = height / parameters.elevation_pixels
         # Reports come on the pixel grid unless the scene gives a coarser one.

@@ -104,7 +104,6 @@ class Background(Effect[CellValues]):
     lockstep = True
     name = "background and sun"
     acts_on = CONTRAST
-    neutral = False
     outside_the_proof = "no sun leaves every target's contrast exactly as it is"
 
     def verdict(self, block: Any) -> Verdict:

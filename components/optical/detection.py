@@ -23,7 +23,6 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry import sector_width_rad
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.radar.detection.output import false_alarm_count
@@ -206,7 +205,7 @@ class AddedFalseAlarms:
             azimuth_draw,
             elevation_draw,
             azimuth_start_rad=reach.azimuth_rad[0],
-            azimuth_width_rad=sector_width_rad(*reach.azimuth_rad),
+            azimuth_width_rad=reach.width_rad[0],
             lowest_elevation_rad=reach.elevation_rad[0],
             highest_elevation_rad=reach.elevation_rad[1],
         )

@@ -107,7 +107,6 @@ class Night(Effect[bool]):
     lockstep = True
     name = "night"
     acts_on = DARKNESS
-    neutral = False
     outside_the_proof = "a camera in the dark is off"
 
     def verdict(self, block: Any) -> Verdict:

@@ -213,7 +213,6 @@ class RangeRate(Effect[RangeRates]):
     lockstep = True
     name = "range rate"
     acts_on = RANGE_RATE
-    neutral = False
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -348,7 +347,6 @@ class DopplerFilter(Effect[DopplerProcessing]):
     lockstep = True
     name = "moving target filter"
     acts_on = DOPPLER
-    neutral = False
     outside_the_proof = "every filter takes something from a target"
 
     def verdict(self, block: Any) -> Verdict:

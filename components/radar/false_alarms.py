@@ -60,7 +60,6 @@ class FalseAlarms(Effect[Reporting]):
     lockstep = True
     name = "false alarms"
     acts_on = REPORT
-    neutral = False
     outside_the_proof = "a report without false alarms is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -174,7 +173,6 @@ class ClutterAlarms(Effect[Reporting]):
     lockstep = True
     name = "clutter false alarms"
     acts_on = REPORT
-    neutral = False
     outside_the_proof = "a report without the ground is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -377,8 +375,13 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     ]
 
 
-def unlikely_false_alarms(noise_key: str, pfa: float, cells: int, by_default: bool) -> list[str]:
+def unlikely_false_alarms(block: Any) -> list[str]:
     """Say how many false alarms a scan has where there are many, or practically none."""
+    if not (block.p.false_alarms and block.p.enabled):
+        return []
+    pfa, cells = block.crossing.false_alarm_probability, cells_of_radar(block).count
+    noise_key, own = block.noise_key(), "false_alarm_probability"
+    by_default = noise_key.startswith(own) and own not in block.p.model_fields_set
     comes_to = (
         f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"
     )

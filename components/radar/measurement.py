@@ -227,7 +227,6 @@ class MeasuredStrength(Effect[Strengthening]):
     lockstep = True
     name = "measured strength"
     acts_on = STRENGTH
-    neutral = False
     outside_the_proof = "a radar always measures strength"
 
     def verdict(self, block: Any) -> Verdict:
@@ -316,7 +315,6 @@ class OwnVelocity(Effect[Reporting]):
     lockstep = True
     name = "own velocity"
     acts_on = REPORT
-    neutral = False
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -334,7 +332,7 @@ class OwnVelocity(Effect[Reporting]):
             after, some = detections.ticks_after, counts > 0
             # At instants of their own, or once a scan.
             row = rows[some] if after is None else np.repeat(rows, counts)
-            state = (targets.tick if targets.state_tick is None else targets.state_tick)[row]
+            state = targets.picture_tick[row]
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = own_velocity(targets, row, time_s)
             if after is not None:

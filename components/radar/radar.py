@@ -9,10 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.geometry.attitude import body_to_ned, unit_vector
-from components.messages.detections import OwnOfEntries
-from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets, own_velocity
-from components.radar.beam import BeamSweep, Sweep
+from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
 from components.radar.detection.probability import required_snr
@@ -49,17 +47,15 @@ from components.radar.weather import (
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
-from components.sensor.sensor import Sensor
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
-from dsa_des.block.message import Message
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 #: Over ground, of the fastest aircraft that a radar listens for: a jet's at cruise.
 FASTEST_M_S = 250.0
 
 
-class Radar(Sensor):
+class Radar(SweepingSensor):
     """A sensor that measures range; subclasses decide what is detected."""
 
     mark = RADAR
@@ -69,7 +65,6 @@ class Radar(Sensor):
     hooks: ClassVar[tuple[Hook[Any], ...]] = (SNR, DOPPLER, RANGE_RATE, ONE_REPORT)
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
-    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -96,23 +91,12 @@ class Radar(Sensor):
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
 
-    def records(self) -> list[type[Message]]:
-        """Return what is recorded: where the beam sweeps, the ownship at each entry's instant."""
-        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
-
-    @property
-    def _sweep(self) -> Sweep | None:
-        return self.context.effects.get(BeamSweep.name)
-
     def request(self, port: str) -> Any:
-        """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
+        """Ask for the targets in our reach, and how they go on where rates are of interest."""
         reach = super().request(port)
-        if not self.p.enabled:
+        if not (self.p.enabled and (self._rates or self.built(DOPPLER))):
             return reach
-        lasts_s = LASTS_S if self._rates or self.built(DOPPLER) else 0.0
-        if self._sweep is None:
-            return replace(reach, lasts_s=lasts_s)
-        return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+        return replace(reach, lasts_s=LASTS_S + reach.lasts_s)
 
     def offer(self, port: str) -> Any:
         """Say beside what every sensor says whether range rates fold."""
@@ -168,8 +152,8 @@ class Radar(Sensor):
             assert self.wavelength_m is not None
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
         each, place = np.unique(row, return_inverse=True)
-        tick = (targets.tick if targets.state_tick is None else targets.state_tick)[each]
-        velocity = own_velocity(targets, each, tick / self.context.ticks_per_s)
+        time_s = targets.picture_tick[each] / self.context.ticks_per_s
+        velocity = own_velocity(targets, each, time_s)
         body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude
         if attitude is None or not np.isfinite(velocity).all():
@@ -178,14 +162,6 @@ class Radar(Sensor):
         towards = np.stack(body_to_ned(*body, *turned))
         nearer_m_s: FloatArray = (towards * velocity[:, place]).sum(axis=0)
         return off * FASTEST_M_S - nearer_m_s
-
-    def seen(
-        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
-    ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets at the instants at which the beam lights them."""
-        if self._sweep is None:
-            return targets, rows
-        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
 
 
 class RangeBoundaryParameters(RadarParameters):

@@ -318,7 +318,6 @@ class LastingFluctuation(Effect[Fading]):
     lockstep = True
     name = "lasting fluctuation"
     acts_on = FADING
-    neutral = False
     outside_the_proof = "without it every scan draws a fade of its own"
 
     def verdict(self, block: Any) -> Verdict:

@@ -10,9 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.arguments.checks import positive
-from components.geometry.angles import TWO_PI
-from components.geometry.field_of_view import sector_width_rad
-from components.messages.reach import Reach
 from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells
 from components.sensor.parameters import SensorParameters
@@ -179,11 +176,6 @@ class ResolutionParameters(SensorParameters):
         return self
 
 
-def azimuth_width_rad(reach: Reach) -> float:
-    """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
-    return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
-
-
 def cell_size(parameters: Any) -> tuple[float, float, float]:
     """Return the size of a resolution cell (rad, rad, m): its beam, or its grid's step, or 0."""
     widths = [
@@ -212,7 +204,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
         )
     return resolution_cells(
         azimuth_start_rad=block.reach.azimuth_rad[0],
-        azimuth_width_rad=azimuth_width_rad(block.reach),
+        azimuth_width_rad=block.reach.width_rad[0],
         lowest_elevation_rad=block.reach.elevation_rad[0],
         highest_elevation_rad=block.reach.elevation_rad[1],
         nearest_m=block.budget.nearest_m,
@@ -282,7 +274,6 @@ class OneReportByCell(Effect[Merging]):
     lockstep = True
     name = "resolution cells"
     acts_on = ONE_REPORT
-    neutral = False
     outside_the_proof = "without it every target has a report of its own"
 
     def verdict(self, block: Any) -> Verdict:

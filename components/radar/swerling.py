@@ -230,7 +230,7 @@ class SwerlingRadar(LinkBudgetRadar):
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
         pfa: Any = self.p.false_alarm_probability
-        if clutter is not None or self._cued_detector(cells) is not None:
+        if clutter is not None or (cells.cued is not None and self._cued_detector is not None):
             pfa = self._pd_of_cells(cells, np.zeros(len(cells)), clutter)
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
@@ -261,10 +261,11 @@ class SwerlingRadar(LinkBudgetRadar):
         """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
-    def _cued_detector(self, cells: Cells) -> tuple[int, float] | None:
-        """Return pulses and false alarm probability in cue cones; None where all is as usual."""
+    @property
+    def _cued_detector(self) -> tuple[int, float] | None:
+        """Pulses and false alarm probability in cue cones; None where all is as usual."""
         p = self.p
-        if cells.cued is None or not (p.cued_pulses or p.cued_false_alarm_probability):
+        if not (p.cued_pulses or p.cued_false_alarm_probability):
             return None
         return (
             p.cued_pulses or p.pulses_summed,
@@ -274,7 +275,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def _pd_of_cells(self, cells: Cells, snr: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability of detection of every cell."""
         pd = np.empty(len(cells))
-        cued = self._cued_detector(cells)
+        cued = None if cells.cued is None else self._cued_detector
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
             beside = None if clutter is None else clutter.of(chosen)
@@ -343,11 +344,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
-        p = self.p
-        if not (p.cued_pulses or p.cued_false_alarm_probability):
-            return None
-        pfa = p.cued_false_alarm_probability or p.false_alarm_probability
-        return Crossing.of(p.cued_pulses or p.pulses_summed, pfa)
+        return None if self._cued_detector is None else Crossing.of(*self._cued_detector)
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:

@@ -12,10 +12,10 @@ from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
-from components.radar.beam import BEAM_SHAPE, BeamShape, BeamSweep, beam_against_gain
+from components.radar.beam import BEAM_SHAPE, BeamShape, BeamSweep
 from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION, RCS
-from components.radar.detection.probability import detection_probability, required_snr
+from components.radar.detection.probability import required_snr
 from components.radar.detection.threshold import Crossing
 from components.radar.doppler import DopplerFilter
 from components.radar.false_alarms import (
@@ -33,7 +33,7 @@ from components.radar.ground_clutter import (
     clutter_as_signal,
     terrain_of,
 )
-from components.radar.link_budget import implausible
+from components.radar.link_budget import beam_against_gain, implausible
 from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
@@ -44,7 +44,7 @@ from components.radar.parameters import (
 from components.radar.radar import Radar
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
-from components.radar.resolution import OneReportByCell, cells_of_radar
+from components.radar.resolution import OneReportByCell
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
@@ -285,35 +285,13 @@ class LinkBudgetRadar(Radar):
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
             *cue_warnings(self),
-            *self._said_of_calibration(),
-            *self._said_of_false_alarms(),
+            *moved_threshold(self.p),
+            *unlikely_false_alarms(self),
             *clutter_as_signal(self.p, terrain_of(self)),
             *beam_against_gain(self.p),
             *rain_warnings(self),
             *gas_left_out(self),
         ]
-
-    def _said_of_calibration(self) -> list[str]:
-        p = self.p
-        if p.calibrate is None or p.calibrated_pfa == p.false_alarm_probability:
-            return []
-        model, pulses = f"swerling{p.calibrate.swerling}", p.stated_pulses_summed
-        snr = required_snr(
-            p.calibrate.pd, pulses=pulses, false_alarm_probability=p.calibrated_pfa, model=model
-        )
-        pd = detection_probability(
-            snr, pulses=pulses, false_alarm_probability=p.false_alarm_probability, model=model
-        )
-        return moved_threshold(p, float(pd))
-
-    def _said_of_false_alarms(self) -> list[str]:
-        if not (self.p.false_alarms and self.p.enabled):
-            return []
-        pfa, cells = self.crossing.false_alarm_probability, cells_of_radar(self).count
-        key = self.noise_key()
-        own = "false_alarm_probability"
-        by_default = key.startswith(own) and own not in self.p.model_fields_set
-        return unlikely_false_alarms(key, pfa, cells, by_default)
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use, and how the time of a scan is spent where it costs."""

@@ -259,7 +259,6 @@ class DeclarationByPlace(Effect[Reporting]):
     name = "declaration by place"
     acts_on = REPORT
     lockstep = True
-    neutral = False
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:

@@ -130,7 +130,6 @@ class Glint(Effect[Wander]):
     lockstep = True
     name = "glint"
     acts_on = APPARENT_PLACE
-    neutral = False
     outside_the_proof = "every target has an extent"
 
     def verdict(self, block: Any) -> Verdict:

@@ -192,8 +192,7 @@ class Cells:
                 "and moving_target_filter to 'none'"
             )
         row, column = np.divmod(self._flat[cells], self._width)
-        state = targets.tick if targets.state_tick is None else targets.state_tick
-        time_s = state[row] / self._ticks_per_s
+        time_s = targets.picture_tick[row] / self._ticks_per_s
         if hasattr(targets, "offset_s"):
             time_s = time_s + self.offset_s[cells]
         return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)

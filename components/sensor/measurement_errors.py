@@ -243,7 +243,6 @@ class MeasurementErrors(Effect[Erring]):
     lockstep = True
     name = "measurement errors"
     acts_on = MEASUREMENT
-    neutral = False
     outside_the_proof = "without it reports are the truth on a grid"
 
     def verdict(self, block: Any) -> Verdict:

@@ -161,7 +161,6 @@ class Mounting(Effect[BodyAxes]):
     lockstep = True
     name = "mounting"
     acts_on = AXES
-    neutral = False
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:

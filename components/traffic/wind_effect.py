@@ -75,7 +75,6 @@ class CrabAngles(Effect[Crabbing]):
 
     name = "wind"
     acts_on = ATTITUDE
-    neutral = False
     outside_the_proof = "angles are formed anew, and their last bits differ"
     lockstep = True
 

@@ -77,9 +77,10 @@ class Effect(Generic[Built]):
     name: ClassVar[str]
     #: The quantity it acts on, one of the hooks of its block, whose contract `build` keeps.
     acts_on: Hook[Built]
-    #: Whether it can be built when the scene does not call for it, without changing a bit.
+    #: Whether it can be built when the scene does not call for it, without changing a bit: not
+    #: where the next one says something.
     neutral: ClassVar[bool] = True
-    #: Of an effect that is not neutral: why nothing can be built that changes no bit.
+    #: Why nothing can be built that changes no bit.
     outside_the_proof: ClassVar[str] = ""
     #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
     #: of different replicas may come in one call. A subclass says it again for itself.
@@ -88,6 +89,8 @@ class Effect(Generic[Built]):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
+        if cls.outside_the_proof:
+            cls.neutral = False
 
     def verdict(self, block: Any) -> Verdict:
         """Say whether the scene calls for this effect in this block (a `Component`)."""

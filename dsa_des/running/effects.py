@@ -142,7 +142,6 @@ class SharedProcessor(Effect):
     """Messages that queue for a processor."""
 
     name = "shared processor"
-    neutral = False
     outside_the_proof = "work on a message takes a tick or more: no processor adds no time"
     key = "processor"
     everywhere = "every block"

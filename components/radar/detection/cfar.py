@@ -281,7 +281,6 @@ class CellAveraging(Effect[Averaging]):
     lockstep = True
     name = "CFAR"
     acts_on = REFERENCE_CELLS
-    neutral = False
     outside_the_proof = "no number of cells is as good as a threshold that is known"
 
     def verdict(self, block: Any) -> Verdict:

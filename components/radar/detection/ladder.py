@@ -153,7 +153,6 @@ class ExactDetection(Effect[str]):
     lockstep = True
     name = "exact Pd"
     acts_on = PD_METHOD
-    neutral = False
     outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:
