@@ -29,11 +29,10 @@ from components.encounters.model import (
     EncounterModel,
 )
 from components.encounters.sampling import SampledTracks, TrackSampler
-from components.flights.point_mass import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
+from components.flights.point_mass import DYNAMICS, FT_S_PER_KT, FlownTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 
-DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
 _SHARES = (0.01, 0.99)
 _SLOWEST_FIXED_WING_FT_S = 30.0
 _MOST_ATTEMPTS = 2000

@@ -98,21 +98,11 @@ class _Table:
 
 
 def read_measurements(path: Path, block: str | None = None) -> Measurements:
-    """Return the looks of a sensor.
+    """Return the looks of a sensor; ValueError says all that is wrong, with its line or row.
 
-    Parameters
-    ----------
-    path : Path
-        A ``.parquet`` or CSV file of detections; the folder of a run: then empty looks and the
-        ownship's pose are those of its ``scans.parquet``; or an ASTERIX file (``.ast``) of plots,
-        whose angles are from north and level.
-    block : str, optional
-        Whose rows are read, where the file has a column ``block`` or more than one radar.
-
-    Raises
-    ------
-    ValueError
-        With the file, and the line or row of everything that is wrong.
+    The file is ``.parquet`` or CSV; the folder of a run, whose ``scans.parquet`` then says empty
+    looks and the ownship's pose; or ASTERIX (``.ast``), whose angles are from north and level.
+    `block` says whose rows are read, where there are several.
     """
     if path.suffix == ".ast":
         return _of_asterix(path, block)
