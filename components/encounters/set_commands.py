@@ -81,16 +81,8 @@ _DRAWN = 12
 class Closest:
     """Closest approaches (of the nearest intruder); arrays over encounters.
 
-    Parameters
-    ----------
-    weight : (n,)
-    horizontal_m, vertical_m : (n,)
-        Apart, then; vertical is intruder above ownship.
-    time_s : (n,)
-    closing_mps : (n,)
-        Relative speed then.
-    course_deg : (n,)
-        The intruder's against the ownship's.
+    Vertical is intruder above ownship, closing the relative speed, the course that of the intruder
+    against the ownship's, all at that time.
     """
 
     weight: FloatArray

@@ -48,13 +48,7 @@ class TrackError(ValueError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What sampled tracks command, ready to be flown.
-
-    Parameters
-    ----------
-    altitude_ft, speed_ft_s : (tracks,)
-    acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
-    """
+    """What sampled tracks command, ready to be flown: (tracks,), and (seconds + 1, tracks)."""
 
     altitude_ft: FloatArray
     speed_ft_s: FloatArray

@@ -41,17 +41,9 @@ Rates = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class FlownTracks:
-    """Flights of many tracks; arrays (instants, tracks).
+    """Flights of many tracks, (instants, tracks), `step_s` apart from 0 on, from where they begin.
 
-    Parameters
-    ----------
-    step_s : float
-        Between two instants; the first is 0.
-    north_ft, east_ft, up_ft : array
-        From where the track begins; up is the altitude.
-    speed_ft_s, heading_rad, climb_ft_s : array
-        True airspeed, and heading clockwise from north.
-    pitch_rad, bank_rad : array
+    Up is the altitude, speed the true airspeed; headings are clockwise from north.
     """
 
     step_s: float

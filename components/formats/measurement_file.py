@@ -45,23 +45,11 @@ _FLAGS = {"true": 1.0, "false": 0.0, "1": 1.0, "0": 0.0}
 
 @dataclass(eq=False)
 class Measurements:
-    """Looks in the order of time, and what each detected.
+    """Looks in the order of time, and what each detected: entries of all looks end to end.
 
-    Parameters
-    ----------
-    time_s, arrival_s : (looks,) of float
-        When it was made, and when it came.
-    scan : (looks,) of int
-    offsets : (looks + 1,) of int
-        Entries ``offsets[i]:offsets[i + 1]`` belong to look i.
-    entries : dict of (entries,) of float
-        By column; NaN where a cell is empty. ``declared`` and ``cued`` are 0 or 1.
-    looks : dict of (looks,) of float
-        The ownship's pose and velocity, as far as the file says them.
-    target : tuple of str or None
-        Name of the target of each entry; None where the file says none.
-    where : tuple of str
-        Line or row of each entry, for messages.
+    Entries ``offsets[i]:offsets[i + 1]`` belong to look i, NaN where a cell is empty; ``declared``
+    and ``cued`` are 0 or 1. `looks` holds the ownship's pose and velocity, as far as the file says
+    them, `target` the names of targets, and `where` the line or row of each entry, for messages.
     """
 
     time_s: FloatArray
