@@ -246,9 +246,7 @@ class Transform(Component):
         for first in range(0, rows, step):
             block = slice(first, first + step)
             parts.append(self._seen(_block(own, block), _block(other, block), present[block]))
-        given = _given(other, present)
-        seen = {n: np.concatenate([part[n] for part in parts]) for n in parts[0] if n not in given}
-        return {**seen, **given}
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         seen = self._line_of_sight.from_ownship(own, other)
@@ -256,7 +254,14 @@ class Transform(Component):
             seen = bends(own, seen, self._line_of_sight.attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)
         _require_numbers(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
-        fields = {**seen._asdict(), "relative_heading_rad": heading, **_given(other, present)}
+        fields = {
+            **seen._asdict(),
+            "relative_heading_rad": heading,
+            "target_pitch_rad": other.pitch_rad,
+            "target_roll_rad": other.roll_rad,
+            "alt_m": other.alt_m,
+            "present": present,
+        }
         if self._hiding:
             fields["hidden"] = np.logical_or.reduce(
                 [hides(own, other, present) for hides in self._hiding]
@@ -278,16 +283,6 @@ class Transform(Component):
         for belief in self._beliefs:
             return belief(states)
         return {name: getattr(states, f"own_{name}") for name in _PLACE}
-
-
-def _given(other: Any, present: BoolArray) -> dict[str, AnyArray]:
-    """Return the fields of `RelativeTargets` that are as the traffic has them."""
-    return {
-        "target_pitch_rad": other.pitch_rad,
-        "target_roll_rad": other.roll_rad,
-        "alt_m": other.alt_m,
-        "present": present,
-    }
 
 
 def _block(state: Any, rows: slice) -> SimpleNamespace:

@@ -184,7 +184,7 @@ class Node:
 
     def _end_in(self, window: Window) -> int:
         """Return up to when it runs in a window."""
-        return window.end if window.ahead is None or not self.ahead else window.ahead
+        return window.ahead if self.ahead else window.end
 
     def _demanded(self, start: int, end: int) -> RunTicks:
         instants = [demand.between(start, end) for demand in self.demands]
