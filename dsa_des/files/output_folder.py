@@ -19,6 +19,7 @@ from dsa_des.files.output_names import (
     check_place,
     claim_folder,
     location_of,
+    make_folder,
     named,
     new_folder_name,
     reason_of,
@@ -240,7 +241,7 @@ def _make(folder: Path) -> bool:
             raise UsageError(f"--out {folder}: is there already; a new folder is needed")
         check_place(folder)
         new = not folder.exists()
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as error:
         raise UsageError(f"--out {folder}: cannot be written: {reason_of(error)}") from error
     return new

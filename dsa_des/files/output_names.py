@@ -57,6 +57,21 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, unless they are there.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made; what it says is fit for `reason_of`.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileNotFoundError:  # all above it is there: a file system that takes no folders
+        there = next(above for above in folder.absolute().parents if os.path.lexists(above))
+        raise FileNotFoundError(f"no folder can be made in {there}") from None
+
+
 def new_folder_name(parent: Path, stem: str) -> Path:
     """Return the first of ``parent/stem-001``, ``-002``, ... that does not exist."""
     number = 1
@@ -78,7 +93,7 @@ def claim_folder(parent: Path, stem: str) -> Path:
     while True:
         folder = new_folder_name(parent, stem)
         try:
-            parent.mkdir(parents=True, exist_ok=True)
+            make_folder(parent)
             folder.mkdir()
         except FileExistsError:
             if os.path.lexists(folder):  # another process was faster

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, write_file
+from dsa_des.files.output_names import make_folder, reason_of
 from dsa_des.results.record import StudyHead, StudyRecord
 from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
 
@@ -58,13 +59,13 @@ class StudyFolder:
             raise UsageError(f"--out {self.path}: is a file; a folder is needed")
         try:
             self._refuse_foreign()
-            self.parts.mkdir(parents=True, exist_ok=True)
+            make_folder(self.parts)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
             self._take_up(description, resume=resume)
         except OSError as error:
             self.close()
-            raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
+            raise UsageError(f"--out {self.path}: cannot be written: {reason_of(error)}") from error
         except BaseException:
             self.close()
             raise
