@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_names import make_folder, reason_of, why_no_name
+from dsa_des.files.output_names import reason_of, why_no_name
 from dsa_des.terminal.interruption import deferred
 
 #: Endings of the pictures that are drawn.
@@ -163,7 +163,7 @@ def temporary_beside(path: Path) -> Path:
 
 def _new_folder(target: Path) -> tuple[Path, int | None]:
     for _ in range(_TRIES):
-        make_folder(target.parent)
+        target.parent.mkdir(parents=True, exist_ok=True)
         try:
             folder = temporary_beside(target)
             folder.mkdir(0o700)

@@ -4,6 +4,7 @@ Everything about a name that can be known is found out before a run begins: a ru
 an hour must not fail because there is no place for it.
 """
 
+import errno
 import os
 import re
 import stat
@@ -57,19 +58,15 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, unless they are there.
+def why_not_written(error: OSError, place: Path) -> str:
+    """Return what an error of the system says of a place that was to be made or written into.
 
-    Raises
-    ------
-    OSError
-        If it cannot be made; what it says is fit for `reason_of`.
+    Some file systems (``/proc``) take no folder and call it missing: what is there is named.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileNotFoundError:  # all above it is there: a file system that takes no folders
-        there = next(above for above in folder.absolute().parents if os.path.lexists(above))
-        raise FileNotFoundError(f"no folder can be made in {there}") from None
+    if error.errno != errno.ENOENT or place.exists():
+        return reason_of(error)
+    there = next(parent for parent in place.absolute().parents if os.path.lexists(parent))
+    return f"no folder can be made in {there}"
 
 
 def new_folder_name(parent: Path, stem: str) -> Path:
@@ -93,14 +90,15 @@ def claim_folder(parent: Path, stem: str) -> Path:
     while True:
         folder = new_folder_name(parent, stem)
         try:
-            make_folder(parent)
+            parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir()
         except FileExistsError:
             if os.path.lexists(folder):  # another process was faster
                 continue
             raise UsageError(f"{parent}: is no folder") from None
         except OSError as error:
-            raise UsageError(f"{folder}: cannot be written: {reason_of(error)}") from error
+            why = why_not_written(error, folder)
+            raise UsageError(f"{folder}: cannot be written: {why}") from error
         return folder
 
 

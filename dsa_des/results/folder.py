@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, write_file
-from dsa_des.files.output_names import make_folder, reason_of
+from dsa_des.files.output_names import why_not_written
 from dsa_des.results.record import StudyHead, StudyRecord
 from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
 
@@ -59,13 +59,14 @@ class StudyFolder:
             raise UsageError(f"--out {self.path}: is a file; a folder is needed")
         try:
             self._refuse_foreign()
-            make_folder(self.parts)
+            self.parts.mkdir(parents=True, exist_ok=True)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
             self._take_up(description, resume=resume)
         except OSError as error:
             self.close()
-            raise UsageError(f"--out {self.path}: cannot be written: {reason_of(error)}") from error
+            why = why_not_written(error, self.path)
+            raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
         except BaseException:
             self.close()
             raise
