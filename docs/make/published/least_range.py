@@ -129,7 +129,7 @@ looks, so their staircase decides: of ranges as flown the ratios there are {exac
 
 ![Least range by azimuth; risk ratio over field of view and range](images/{figure})
 
-`dsa-des study configs/studies/field_and_range.toml` flies the same question as a requirement map:
+`dsa-des study field_and_range` flies the same question as a requirement map:
 the risk ratio of NMAC over field of view and range, turn by turn, with intervals.
 """
 
