@@ -7,6 +7,7 @@ import numpy as np
 from components.messages.reach import Decision, FarthestLook, Reach, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
 from dsa_des.block.component import Component, Input, Output
+from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 
@@ -24,6 +25,11 @@ class Gate(Component):
     windowed = True
     lockstep = True
     rewindable = True
+    verified = (
+        Verified("who is looked at, and why another is not", "pymap3d, and rotations by matrices: "
+                 "a banked ownship in the south", "1 m of the range, 0.1 deg of a field of view",
+                 "tests/sensor/test_reach.py"),
+    )  # fmt: skip
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that some sensor may look at."""

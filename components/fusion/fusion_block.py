@@ -18,7 +18,7 @@ from components.sensor.marks import FUSION
 from dsa_des.arrays.run_ticks import RunTicks, ranks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
-from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
 
@@ -46,6 +46,11 @@ class Fusion(Component):
     also_records = (FusedWithPose,)
     windowed = True
     rewindable = True
+    verified = (
+        Verified("where a fused row puts its target", "pymap3d, and rotations by matrices: a banked"
+                 " ownship in the south", "0.05 m",
+                 "tests/fusion/test_fused_and_tracked_positions.py"),
+    )  # fmt: skip
 
     def setup(self) -> None:
         """Rank the sensors."""

@@ -4,6 +4,7 @@ Everything about a name that can be known is found out before a run begins: a ru
 an hour must not fail because there is no place for it.
 """
 
+import errno
 import os
 import re
 import stat
@@ -55,6 +56,17 @@ def why_no_name(path: str | Path) -> str | None:
 def reason_of(error: OSError) -> str:
     """Return what an error of the system says, without the names that it may hold."""
     return os.strerror(error.errno) if error.errno else str(error)
+
+
+def why_not_written(error: OSError, place: Path) -> str:
+    """Return what an error of the system says of a place that was to be made or written into.
+
+    Some file systems (``/proc``) take no folder and call it missing: what is there is named.
+    """
+    if error.errno != errno.ENOENT or place.exists():
+        return reason_of(error)
+    there = next(parent for parent in place.absolute().parents if os.path.lexists(parent))
+    return f"no folder can be made in {there}"
 
 
 def new_folder_name(parent: Path, stem: str) -> Path:
