@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 
 import dsa_des
-from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, legend_below, panels
+from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, RED, legend_below, panels
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
-#: The study has 1,000; so many are some minutes on a core.
-SEEDS = 200
+SEEDS = 1000
 FOOT_M = 0.3048
 #: By the study's axis: what it is called, and its colour.
 SENSORS = {
     "radar": ("radar", BLUE),
     "active": ("active surveillance", ORANGE),
     "ads_b": ("ADS-B", GREEN),
+    "eo_ir": ("EO/IR", RED),
 }
 #: Column, what it is, its factor, and what perfect surveillance gives.
 SEEN = (
