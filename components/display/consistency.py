@@ -7,7 +7,7 @@ import numpy as np
 
 from components.display.outcomes import NEAR_M, distances
 from components.display.tracks import COLOURS, MOST_SPREADS, STATE, DrawnTracks
-from components.messages.state_tracks import COVARIANCE
+from components.messages.state_tracks import full_covariance
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 from dsa_des.results.statistics import chi_square_bounds
@@ -32,9 +32,7 @@ def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray,
     rows = np.arange(count)
     known = apart[nearest, rows] < NEAR_M
     error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
-    spread = np.empty((count, 6, 6))
-    for (i, j), name in COVARIANCE.items():
-        spread[:, i, j] = spread[:, j, i] = one[name]
+    spread = np.moveaxis(full_covariance(one, slice(None)), -1, 0).copy()
     found = np.full(count, np.nan)
     solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
     found[known] = (error.T[known] * solved).sum(axis=1)

@@ -11,6 +11,7 @@ import numpy as np
 
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
+from components.messages.columns import ORIGIN, POSITION
 from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
 from components.messages.steering import Manoeuvres
 from components.metrics.true_states import TargetsInFrame
@@ -27,8 +28,6 @@ TABLE = "state_tracks"
 NEAR_M = 300.0
 #: Instead of a target's name, for what is near none.
 NO_TARGET = "no target"
-_PLACE = ("north_m", "east_m", "down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
 #: Distances of tracks and targets that are worked out at once.
 _MOST_AT_ONCE = 200_000
@@ -175,7 +174,7 @@ class _Tracker:
         rows = rows[columns["has_range"][rows]]
         self._judged.update(np.unique(number[rows]).tolist())
         if self._targets is None and len(rows):
-            self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in _ORIGIN))
+            self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in ORIGIN))
         step = _MOST_AT_ONCE // max(1, len(self._targets.names) if self._targets else 1) + 1
         for start in range(0, len(rows), step):
             self._compare(columns, rows[start : start + step])
@@ -215,7 +214,7 @@ def _earlier(
     if not len(rows):
         return first
     rows = rows[columns["time_s"][rows] == columns["time_s"][rows].min()]
-    apart = [columns[name][rows] - columns[f"own_{name}"][rows] for name in _PLACE]
+    apart = [columns[name][rows] - columns[f"own_{name}"][rows] for name in POSITION]
     range_m = np.where(columns["has_range"][rows], np.sqrt(sum(d**2 for d in apart)), np.inf)
     here = float(columns["time_s"][rows[0]]), float(np.fmin.reduce(range_m))
     return here if first is None else min(first, here)
@@ -236,7 +235,7 @@ def _recorded_targets(simulation: "Simulation") -> Any:
 
 def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
     """Return how far rows of tracks are from targets (targets, 3, rows) at the same times, m."""
-    estimate = np.stack([columns[name][rows] for name in _PLACE])
+    estimate = np.stack([columns[name][rows] for name in POSITION])
     return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
 
 

@@ -37,7 +37,7 @@ Scans = dict[str, SensorScans]
 MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
-_LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.8  # beside the whole run are names of targets
+_LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.785  # beside the whole run are names of targets
 _MOST_NAMED = 8
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from components.display.outcomes import NEAR_M, TABLE, distances
 from components.display.symbols import DENSE, Labels, draw_density
+from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
@@ -23,11 +24,9 @@ if TYPE_CHECKING:
 #: Okabe and Ito's colours, as in all figures, in turn.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _FALSE, _TRUTH, _OWN = "#999999", "#000000", "#666666"
-STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _COLUMNS = (
     "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
-    *_ORIGIN, *COVARIANCE.values(),
+    *ORIGIN, *COVARIANCE.values(),
 )  # fmt: skip
 # Rows that are read of a table, at most; of a larger one, groups of rows spread over it.
 _MOST_ROWS = 1_000_000
@@ -58,7 +57,7 @@ class DrawnTracks:
     """Tracks of a table, with the true flights in their frame."""
 
     def __init__(self, simulation: "Simulation", columns: dict[str, Any]) -> None:
-        self.origin = tuple(float(columns[name][0]) for name in _ORIGIN)
+        self.origin = tuple(float(columns[name][0]) for name in ORIGIN)
         self.time_s = float(columns["state_s"].min()), float(columns["state_s"].max())
         sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
         self.own = sources[0].own if sources else None
@@ -66,7 +65,9 @@ class DrawnTracks:
         self.targets = TargetsInFrame(targets, self.origin)
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
+        several = len(self.blocks) > 1
         for place, block in enumerate(self.blocks):
+            turn = place
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -74,8 +75,8 @@ class DrawnTracks:
                 near = distances(one, slice(None), self.targets.at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
-                turn = place if len(self.blocks) > 1 else number - 1
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
+                turn += not (false or several)
                 self.tracks.append(DrawnTrack(block, number, one, false, colour))
 
     @classmethod

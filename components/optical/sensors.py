@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from components.optical.area_of_cells import area_of_cells
 from components.optical.camera import Camera, CameraParameters
 from components.optical.contrast import Background
-from components.optical.infrared_area import Plume
+from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
@@ -61,7 +61,7 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     if np.finfo(np.longdouble).eps >= np.finfo(np.float64).eps:
         raise Unavailable("not measured: this machine has no extended precision")
     camera: Any = block
-    if getattr(camera.p, "silhouette", "") != "convex_hull" or camera.built("area"):
+    if getattr(camera.p, "silhouette", "") != "convex_hull" or camera.built(AREA):
         raise Unavailable("nothing more exact is known")
 
     def values(cells: Cells) -> dict[str, FloatArray]:

@@ -15,7 +15,7 @@ from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.recorded_columns import nothing_in
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
@@ -76,26 +76,6 @@ class QuantityError:
 # A range that comes out below this, a millimetre, is no range.
 _NEAREST_M = 1e-3
 _QUARTER = 0.5 * math.pi
-
-
-class MeasurementErrors(Effect):
-    """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
-
-    lockstep = True
-    name = "measurement errors"
-    acts_on = "measurement"
-    neutral = False
-    outside_the_proof = "without it reports are the truth on a grid"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``errors``."""
-        if block.p.errors == "grid":
-            return Verdict(False, "errors is 'grid': values are rounded to the grid")
-        return Verdict(True, f"errors is '{block.p.errors}'")
-
-    def build(self, block: Any) -> "Erring":
-        """Return what measures with errors."""
-        return Erring(block)
 
 
 class Erring:
@@ -252,6 +232,28 @@ class Erring:
             nearest = self._steps["range"] or _NEAREST_M
             found["range"] = np.maximum(np.abs(found["range"]), nearest)
         return found
+
+
+MEASUREMENT = Hook("measurement", Erring, "what is measured, and its variances")
+
+
+class MeasurementErrors(Effect[Erring]):
+    """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
+
+    lockstep = True
+    name = "measurement errors"
+    acts_on = MEASUREMENT
+    outside_the_proof = "without it reports are the truth on a grid"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``errors``."""
+        if block.p.errors == "grid":
+            return Verdict(False, "errors is 'grid': values are rounded to the grid")
+        return Verdict(True, f"errors is '{block.p.errors}'")
+
+    def build(self, block: Any) -> Erring:
+        """Return what measures with errors."""
+        return Erring(block)
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:

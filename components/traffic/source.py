@@ -36,6 +36,7 @@ from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_together import FlownTogether, flown_by
 from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
+from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -68,7 +69,7 @@ class TrafficSource(SteeredOwnship):
     windowed = True
     rewindable = True
     clocked = "demand"
-    hooks = {"attitude": "turns the attitudes that follow from paths, of_own and of_targets"}
+    hooks = (ATTITUDE,)
 
     targets: Sequence[Trajectory]
     roster: Roster
@@ -110,7 +111,7 @@ class TrafficSource(SteeredOwnship):
         """Learn how far sensors look; what stays beyond it is not moved."""
         self._check_terrain(self.own.at)
         self._all_columns = np.arange(len(self.roster))
-        self._crabbing = self.built("attitude")
+        self._crabbing = self.built(ATTITUDE)
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
         self.flights_asked_for = look.lasts_s > 0.0

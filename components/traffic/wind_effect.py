@@ -14,33 +14,7 @@ from components.flights.steered_flight import SteeredFlight
 from components.geometry.angles import FloatArray
 from components.geometry.state import TrajectoryState
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.effect import Effect, Verdict
-
-
-class CrabAngles(Effect):
-    """Aircraft keep their tracks over the ground, and their noses turn into the wind.
-
-    What the scene or a file fixes of an attitude stays. Of flights from files the attitude is
-    derived with the wind when they are read.
-    """
-
-    name = "wind"
-    acts_on = "attitude"
-    neutral = False
-    outside_the_proof = "angles are formed anew, and their last bits differ"
-    lockstep = True
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] wind_mps``."""
-        weather = block.context.sections.get("weather")
-        wind_mps = 0.0 if weather is None else weather.wind_mps
-        return Verdict(wind_mps > 0.0, f"[weather] wind_mps is {wind_mps:g}")
-
-    def build(self, block: Any) -> Crabbing:
-        """Return what turns the noses."""
-        wind = scene_wind(block.context.sections["weather"])
-        assert wind is not None
-        return Crabbing(wind, block.targets)
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Crabbing:
@@ -87,6 +61,34 @@ class Crabbing:
             pitch_rad=np.where(keep[1], state.pitch_rad, pitch),
             roll_rad=np.where(keep[2], state.roll_rad, roll),
         )
+
+
+ATTITUDE = Hook("attitude", Crabbing, "turns the attitudes that follow from paths")
+
+
+class CrabAngles(Effect[Crabbing]):
+    """Aircraft keep their tracks over the ground, and their noses turn into the wind.
+
+    What the scene or a file fixes of an attitude stays. Of flights from files the attitude is
+    derived with the wind when they are read.
+    """
+
+    name = "wind"
+    acts_on = ATTITUDE
+    outside_the_proof = "angles are formed anew, and their last bits differ"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] wind_mps``."""
+        weather = block.context.sections.get("weather")
+        wind_mps = 0.0 if weather is None else weather.wind_mps
+        return Verdict(wind_mps > 0.0, f"[weather] wind_mps is {wind_mps:g}")
+
+    def build(self, block: Any) -> Crabbing:
+        """Return what turns the noses."""
+        wind = scene_wind(block.context.sections["weather"])
+        assert wind is not None
+        return Crabbing(wind, block.targets)
 
 
 def ground_speeds(flight: Any, time_s: FloatArray) -> FloatArray:

@@ -156,7 +156,7 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
         hook: ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
         for hook in hooks
     }
-    rows = [(f"  {hook}", how, acting[hook] or "-") for hook, how in sorted(hooks.items())]
+    rows = [(f"  {hook}", hook.sentence(), acting[hook] or "-") for hook in sorted(hooks)]
     _print_rows(console, ("  hook", "what it calls", "effects"), rows)
 
 

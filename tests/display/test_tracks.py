@@ -19,12 +19,16 @@ from dsa_des.running.simulation import Simulation
 EKF = "blocks.tracker.type='tracking.ekf'"
 
 
-def told(tmp_path, *sets):
-    scene = dsa_des.load_scene(
+def near(*sets):
+    return dsa_des.load_scene(
         "first_light",
         sets=["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
               "blocks.traffic.intruders.0.north_m=3000", *sets],
     )  # fmt: skip
+
+
+def told(tmp_path, *sets):
+    scene = near(*sets)
     dsa_des.run(scene, out=tmp_path / "run")
     return DrawnTracks.read(Simulation(scene), tmp_path / "run")
 
@@ -99,6 +103,21 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
         assert word == f"{block}: {values.mean():.3g}, {share:.0f} % inside"
     assert [text.get_text()[:4] for text in innovations.get_legend().get_texts()] == [
         "hone", "sure"]  # fmt: skip
+
+
+def test_tracks_of_whatever_numbers_have_colours_of_their_own(shown):
+    """Numbers 2 and 8 once had the same of six colours."""
+    one = shown.tracks[0]
+    columns = {name: np.concatenate([values] * 2) for name, values in one.columns.items()}
+    columns["track"] = np.repeat([2, 8], len(one.columns["state_s"]))
+    columns["block"] = np.array(["tracker"] * len(columns["track"]))
+    origin = {
+        f"origin_{name}": np.full(len(columns["track"]), value)
+        for name, value in zip(("lat_deg", "lon_deg", "alt_m"), shown.origin, strict=True)
+    }
+    drawn = DrawnTracks(Simulation(near()), columns | origin)
+    assert [track.number for track in drawn.tracks] == [2, 8]
+    assert len({track.colour for track in drawn.tracks}) == 2
 
 
 @pytest.mark.parametrize("many", [40, 60])
