@@ -38,8 +38,8 @@ def test_a_rate_gives_another_table():
 
 
 def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path):
-    files = eyes.sets_of_both(tmp_path, MODELS / "light_aircraft.txt", 12)
-    either = [eyes.flags_of(file, 12, 3, 1) for file in files]
+    files = eyes.sets_of_both(tmp_path, MODELS / "light_aircraft.txt", 5)
+    either = [eyes.flags_of(file, 5, 3, 1) for file in files]
     for name in ("nmac_nominal", "well_clear_lost_nominal", "encounter_weight"):
         assert either[0][name].tolist() == either[1][name].tolist(), name
     own, other = (read_set(file) for file in files)
