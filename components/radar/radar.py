@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry import body_to_ned, unit_vector
 from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging

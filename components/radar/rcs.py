@@ -19,7 +19,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.attitude import aspect_angles, unit_vector
+from components.geometry import aspect_angles, unit_vector
 from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
