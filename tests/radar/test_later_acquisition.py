@@ -64,9 +64,8 @@ def first_seen(table) -> dict[str, float]:
 
 
 @covers(
-    "acquisition", *(f"acquisition.{k}" for k in ("below_m_s", "range_km", "azimuth_deg", "share")),
-    of=(KIND,),
-)  # fmt: skip
+    *(f"acquisition.{k}" for k in ("below_m_s", "range_km", "azimuth_deg", "share")), of=(KIND,)
+)
 def test_targets_are_acquired_by_azimuth_and_speed_and_then_kept():
     table = wired.run(scene(TARGETS))["detections"]
     found = first_seen(table)
@@ -76,11 +75,11 @@ def test_targets_are_acquired_by_azimuth_and_speed_and_then_kept():
     plain = first_seen(wired.run(scene(TARGETS, acquisition=[]))["detections"])
     assert all(plain[name] > found[name] + 0.9 for name in ACQUIRED_KM)
     for name in ACQUIRED_KM:  # from then on at every scan
-        times = table.filter(wired_mask(table, name))["time_s"].to_pylist()
+        times = table.filter(is_of(table, name))["time_s"].to_pylist()
         assert np.diff(times).tolist() == [1.0] * (len(times) - 1)
 
 
-def wired_mask(table, name):
+def is_of(table, name):
     return [target == name for target in table["target"].to_pylist()]
 
 
