@@ -8,6 +8,7 @@ from wired import rows, run
 import dsa_des
 from components.alerting.m_of_n import MOfNAlerts, MOfNParameters
 from components.messages.alerts import AlertLevels
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.wake import Wake
 from dsa_des.errors import SceneError
 
@@ -96,7 +97,7 @@ def test_each_run_has_its_own_last_levels():
             numbers={}, deviations={}, relative={}, own_motion={}, roster=None,
         )  # fmt: skip
         held = {"alerts": (alerts, np.arange(len(tick)))}
-        found = block.run(Wake(tick, np.full(len(tick), -1), 1, held, {}, None, run))
+        found = block.run(Wake(RunTicks(run, tick), np.full(len(tick), -1), 1, held, {}))
         for number in (0, 1):
             shown[number] += found.level[run == number].tolist()
     alone = [

@@ -4,6 +4,7 @@ import numpy as np
 
 from components.foreign.fmu.own_pose import own_columns
 from components.messages.targets import TrafficStates
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.wake import Arrivals, Wake
 
 
@@ -20,11 +21,12 @@ def told(*ticks: int) -> Arrivals:
         tick=tick, **own, **others, present=nobody.astype(bool), roster=None,
         columns=np.zeros(0, dtype=np.int64),
     )  # fmt: skip
-    return Arrivals("traffic", tick, states)
+    return Arrivals("traffic", RunTicks(np.zeros_like(tick), tick), states)
 
 
 def seen(ticks: list[int], held: dict, *arrivals: Arrivals) -> tuple[list[float], dict]:
-    wake = Wake(np.array(ticks), np.full(len(ticks), -1), 1, {}, {"messages": list(arrivals)})
+    instants = RunTicks(np.zeros(len(ticks), dtype=np.int64), np.array(ticks))
+    wake = Wake(instants, np.full(len(ticks), -1), 1, {}, {"messages": list(arrivals)})
     found, after = own_columns(wake, "messages", held, moves=False)
     return found[0].tolist(), after
 
