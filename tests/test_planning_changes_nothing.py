@@ -38,7 +38,7 @@ ENDS_S = {
     "avoidance/looking_out.toml": 60,
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
-    "tracking/do365_sensors.toml": 20,
+    "tracking/do365_sensors.toml": 80,
     "operator/session.toml": 15,
     "optical/pictures.toml": 5,
     "published/degas.toml": 30,
