@@ -33,7 +33,7 @@ def evidence_command(
     check_workers(workers)
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
-    found = read_case(chosen_file(case), sets, encounters)
+    found = read_case(chosen_file(case, "case"), sets, encounters)
     target = named(out)
     check_place(target)
     if target.is_dir() and any(target.iterdir()) and not resume:

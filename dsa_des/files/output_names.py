@@ -97,7 +97,8 @@ def claim_folder(parent: Path, stem: str) -> Path:
                 continue
             raise UsageError(f"{parent}: is no folder") from None
         except OSError as error:
-            raise UsageError(f"{folder}: cannot be written: {reason_of(error)}") from error
+            why = why_not_written(error, folder)
+            raise UsageError(f"{folder}: cannot be written: {why}") from error
         return folder
 
 

@@ -177,6 +177,8 @@ class AxisRecord(StrictRecord):
     """An axis: its column, its values, and what each changes in the scene, as texts."""
 
     column: str
+    #: The column with the names of what it counts, as wires; empty where it counts nothing.
+    words: str = ""
     values: list[_Label]
     over: bool
     numeric: bool
