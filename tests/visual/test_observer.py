@@ -145,7 +145,7 @@ def test_nobody_is_sought_before_he_appears():
 
 def test_who_flies_away_is_seen_until_he_is_too_small():
     # 12 m² are under 4' from 3359 m on, (3359 - 2000) / 150 = 9.06 s after the start.
-    # Seen edge-on, its wings show nothing, but are large: how far is looked goes by the largest side.
+    # Edge-on its wings show nothing; but how far is looked goes by the largest side.
     body = {"front_m2": AREA_M2, "side_m2": 0.0, "horizontal_m2": 90.0}
     away = met("away", range_m=2000.0, heading_deg=217.0, speed_mps=210.0, eo=body)
     pilot = {"beta_per_sr_s": 1e9, "smallest_arcmin": 4.0}

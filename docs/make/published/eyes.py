@@ -302,9 +302,10 @@ of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do. We t
 N. Underhill, E. Maki, B. Gill and A. Weinert (*Estimating See and Be Seen Performance with an
 Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023), of which the abstract was at hand; it
 has no numbers.
-The model's block is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a pilot on
-the left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual range of
-20 nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 142 abeam, 430 from above).
+The model's block is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a
+pilot on the left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual
+range of 20 nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 142 abeam, 430 from
+above).
 Ours: encounters of two aircraft of MIT Lincoln Laboratory's uncorrelated model
 (`uncor_1200code_v1`, BSD-2, not part of the project), turns by DAIDALUS 5 s after an alert of whom
 the pilot has seen for 5 s (`configs/published/see_and_avoid.toml`;
