@@ -32,7 +32,7 @@ def play(cells: list[dict], folder: Path) -> list[tuple[str, str]]:
                 kinds = ("_repr_html_", "_repr_png_")
                 rich = [getattr(shown, kind)() for kind in kinds if hasattr(shown, kind)]
                 assert any(rich) or not rich
-                html = rich[0] if hasattr(shown, kinds[0]) else ""
+                html = (rich[0] or "") if hasattr(shown, kinds[0]) else ""
         printed.append((told.getvalue(), _SPEED.sub("", html)))
     return printed
 
