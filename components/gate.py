@@ -1,5 +1,6 @@
 """The simulation decision: which sensor needs to look at which target (thesis §3.4, errata 4b)."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -77,5 +78,5 @@ class Gate(Component):
                 seen = [values.take(rows, axis=0) for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
         # Behind another gate, that one's decisions were for the sensors there.
-        fields = {**vars(targets), "tick": wake.ticks, "decisions": decisions}
-        return GatedTargets(**fields)
+        values = {one.name: getattr(targets, one.name) for one in fields(targets)}
+        return GatedTargets(**{**values, "tick": wake.ticks, "decisions": decisions})

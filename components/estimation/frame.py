@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, times
-from components.geometry.angles import local_axes
-from components.geometry.attitude import ned_to_body_unchecked
-from components.geometry.ellipsoid import north_east_up
+from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
 from dsa_des.arrays.types import FloatArray, IntArray
 
 

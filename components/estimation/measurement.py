@@ -11,7 +11,7 @@ import numpy as np
 
 from components.estimation.batched import product, product_transposed, squared_length, times
 from components.estimation.frame import SensorPose, dot
-from components.geometry.angles import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the

@@ -114,22 +114,24 @@ class Fusion(Component):
         for name, seen in self._recent.items():
             if ended := int(np.searchsorted(seen.message.run, wake.first_run)):
                 rows = slice(ended, None)
-                self._recent[name] = Arrivals(name, seen.tick[rows], seen.message.take(rows))
+                self._recent[name] = Arrivals(
+                    name, seen.instants.take(rows), seen.message.take(rows)
+                )
         for name, new in arrivals.items():
             old = self._recent.get(name)
             if old is not None:
                 message = Detections.concatenate([old.message, new.message])
-                ticks = np.concatenate([old.tick, new.tick])
-                order = RunTicks(message.run, ticks).order()
+                instants = RunTicks.joined([old.instants, new.instants])
+                order = instants.order()
                 if order is not None:  # those of each run together
-                    ticks, message = ticks[order], message.take(order)
-                new = Arrivals(name, ticks, message)
+                    instants, message = instants.take(order), message.take(order)
+                new = Arrivals(name, instants, message)
             self._recent[name] = new
         latest = max(int(new.tick.max()) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
             young = np.flatnonzero(seen.tick >= latest - self.keep_ticks)
-            self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
+            self._recent[name] = Arrivals(name, seen.instants.take(young), seen.message.take(young))
         return dict(sorted(together.items()))
 
     def combine(

@@ -19,8 +19,7 @@ from components.flights.closest_approach import (
 )
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.many_flights import fleet_of
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, line_of_sight_ned
 from components.metrics.separation import (
     RelativeFlight,
     distances_m,

@@ -18,7 +18,7 @@ from components.flights.closest_approach import (
     regular_count,
     regular_times_s,
 )
-from components.geometry.ellipsoid import line_of_sight, north_east_up
+from components.geometry import line_of_sight, north_east_up
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, finite, positive, unflatten
-from components.geometry.angles import TWO_PI, wrap_pi
+from components.geometry import TWO_PI, wrap_pi
 from components.messages.detections import REPORT, Detections, OwnOfEntries, Reporting
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets

@@ -39,7 +39,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.ellipsoid import north_east_up
+from components.geometry import north_east_up
 from components.radar.ground_clutter import Echo, terrain_of
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray

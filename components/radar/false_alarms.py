@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import Vector
-from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry import Vector, body_to_ned, unit_vector
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import in_measured_order
 from components.messages.targets import RelativeTargets

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry import body_to_ned, unit_vector
 from components.messages.detections import REPORT, Detections, Reporting
 from components.sensor.look import DECLARATION, Cells, Judging, Look
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from components.geometry.angles import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.messages.reach import Reach
 from components.navigation.errors import navigation_noise

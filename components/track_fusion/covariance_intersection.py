@@ -198,7 +198,7 @@ class CovarianceIntersection(Component):
         newest[replica[ends]] = so_far[ends]
         self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
-        return Arrivals(new.source, new.tick[which], new.message.take(which))
+        return Arrivals(new.source, new.instants.take(which), new.message.take(which))
 
     def _records_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake

@@ -9,7 +9,7 @@ import numpy as np
 
 import dsa_des
 from components.estimation.motion import Motion
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic
 from docs.make.track_consistency.cases import OWNSHIP, Case
 from dsa_des.replicas.changed_scene import Replica, scene_of
 
