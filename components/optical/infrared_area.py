@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
 from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
-from components.sensor.look import Cells, CellValues
+from components.sensor.look import Cells, CellValues, turned_to_sight
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -139,10 +139,7 @@ class Plume(Effect[CellValues]):
                     continue
                 chosen = np.flatnonzero(engines == engine)
                 area[chosen] = plume_area(
-                    cells.relative_heading_rad[chosen],
-                    cells.target_pitch_rad[chosen],
-                    cells.target_roll_rad[chosen],
-                    cells.elevation_rad[chosen],
+                    *turned_to_sight(cells, chosen),
                     back_m2=back[chosen],
                     engine=engine,
                     plume_share_of_back=shares[engine],

@@ -15,7 +15,7 @@ from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.ladder_values import over_cells
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, turned_to_sight
 from components.sensor.marks import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import Sensor
@@ -68,14 +68,8 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         roster = cells.roster
         names = ["front_m2", "side_m2", "horizontal_m2"]
         names += ["back_m2"] if camera.areas == "ir" else []
-        angles = (
-            cells.relative_heading_rad,
-            cells.target_pitch_rad,
-            cells.target_roll_rad,
-            cells.elevation_rad,
-        )
         bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
-        wide = [array.astype(np.longdouble) for array in (*angles, *bodies)]
+        wide = [array.astype(np.longdouble) for array in (*turned_to_sight(cells), *bodies)]
         areas: Any = (*wide, None)[:8]
         exact = union_area(*areas)
         error = np.abs(camera.shown_area(cells).astype(np.longdouble) - exact)

@@ -44,11 +44,12 @@ from components.radar.weather import (
     rain_warnings,
     weather_without_carrier,
 )
+from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.effect import Effect, Hook
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 #: Over ground, of the fastest aircraft that a radar listens for: a jet's at cruise.
@@ -164,12 +165,35 @@ class Radar(SweepingSensor):
         return off * FASTEST_M_S - nearer_m_s
 
 
+class LaterAcquisition(Effect[CellValues]):
+    """Sees a target from where it is acquired on, as long as no scan misses it."""
+
+    lockstep = True
+    name = "acquisition"
+    acts_on = SNR
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``acquisition``."""
+        if not block.p.acquisition:
+            return Verdict(False, "acquisition is not given")
+        return Verdict(True, f"acquisition has {len(block.p.acquisition)} ranges")
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every cell's SNR: 0 of whom has not been acquired, else 1."""
+        return Acquired(block.p.acquisition)
+
+
 class RangeBoundaryParameters(RadarParameters):
     """Parameters of a range boundary radar."""
 
     range_km: float = Field(gt=0, description="Range inside which every target is detected, km.")
     minimum_range_m: float | None = Field(
         default=None, gt=0, description="Closer than this nothing is detected, m; none by default."
+    )
+    acquisition: tuple[AcquisitionRange, ...] = Field(
+        default=(),
+        description="Where targets are acquired that it then keeps, by their speed, slowest first; "
+        "by default anywhere within range_km.",
     )
     boundary_rcs_dbsm: float = Field(
         default=0.0,
@@ -203,6 +227,7 @@ class RangeBoundaryParameters(RadarParameters):
 
     @model_validator(mode="after")
     def _carrier(self) -> Self:
+        check_speeds(self.acquisition)
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
             if getattr(self, key) != off and self.frequency_hz is None:
                 raise ValueError(
@@ -243,6 +268,7 @@ class RangeBoundary(Radar):
     effects = (
         *WEATHER_EFFECTS,
         BlindRange(),
+        LaterAcquisition(),
         BoundaryClutter(),
         RainClutter(),
         SidelobeClutter(),
@@ -266,6 +292,13 @@ class RangeBoundary(Radar):
         refuse_cues(self)
         self._echoes = self.built(CLUTTER)
         self._cfar = self.built_one(REFERENCE_CELLS)
+
+    def request(self, port: str) -> Any:
+        """Ask how targets go on too, where their speed decides who is acquired."""
+        reach = super().request(port)
+        if not (self.p.enabled and len(self.p.acquisition) > 1):
+            return reach
+        return replace(reach, lasts_s=max(reach.lasts_s, 2.0 * STEP_S))
 
     def warnings(self) -> list[str]:
         """Say that clutter counts as signal, where it does, and what it hears of the weather."""

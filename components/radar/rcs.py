@@ -20,7 +20,7 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.geometry import aspect_angles, unit_vector
-from components.sensor.look import Cells, CellValues
+from components.sensor.look import Cells, CellValues, turned_to_sight
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -80,21 +80,21 @@ def scan_rcs(
     return total / pulses
 
 
+def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
+    """Return from where each cell's target is seen, in its body axes."""
+    # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
+    # heading.
+    *turned, elevation = turned_to_sight(cells)
+    return aspect_angles(np.zeros(len(cells)), elevation, *turned)
+
+
 def mean_rcs_m2(cells: Cells) -> FloatArray:
     """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
     tables, place = cells.roster.tables("rcs_table")
     if not tables:
         return rcs
-    # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
-    # heading.
-    azimuth, elevation = aspect_angles(
-        np.zeros(len(cells)),
-        cells.elevation_rad,
-        cells.relative_heading_rad,
-        cells.target_pitch_rad,
-        cells.target_roll_rad,
-    )
+    azimuth, elevation = _aspect_angles(cells)
     which = place[cells.craft]
     for index, table in enumerate(tables):
         chosen = np.flatnonzero(which == index)
@@ -383,12 +383,6 @@ class LastingFluctuation(Effect[Fading]):
 
 def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the unit vector from each target to the radar in the target's body axes."""
-    azimuth, elevation = aspect_angles(
-        np.zeros(len(cells)),
-        cells.elevation_rad,
-        cells.relative_heading_rad,
-        cells.target_pitch_rad,
-        cells.target_roll_rad,
-    )
+    azimuth, elevation = _aspect_angles(cells)
     x, y, z = unit_vector(azimuth[chosen], elevation[chosen])
     return x, y, z

@@ -236,6 +236,18 @@ class Cells:
         return stream.of_runs(self.run).uniform(keys, self.scan, draw)
 
 
+def turned_to_sight(
+    cells: Any, chosen: Any = slice(None)
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return heading against the line of sight, pitch, roll, and the line's elevation, of cells."""
+    return (
+        cells.relative_heading_rad[chosen],
+        cells.target_pitch_rad[chosen],
+        cells.target_roll_rad[chosen],
+        cells.elevation_rad[chosen],
+    )
+
+
 class CellValues(Protocol):
     """Gives one number for each cell: a factor, a cross-section, an area."""
 

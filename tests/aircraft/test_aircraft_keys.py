@@ -27,7 +27,6 @@ BASE: dict[str, Any] = {
 }  # fmt: skip
 OWN = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400.0, "heading_deg": 217.0}
 OTHER = {"name": "one", "east_m": -700.0, "north_m": -1500.0, "up_m": 300.0}
-PATH_DEG = 217.0
 PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 

@@ -19,8 +19,6 @@ from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
 
-ENDLESS = (0.0, np.inf)
-
 
 def brute_force(own, target, times):
     """Return time and range of the first smallest range, or None."""

@@ -81,7 +81,7 @@ def test_runs_of_a_family_count_as_one_of_all_their_weight() -> None:
 def test_differences_of_ratios_hold_what_they_share_once() -> None:
     """Two conditions on the same encounters, again and again: the paired interval holds 95 %."""
     random = np.random.default_rng(11)
-    held, widths, truth, rounds = 0, [], 0.3 - 0.5, 400
+    held, widths, truth, rounds = 0, [], 0.3 - 0.5, 200
     for _ in range(rounds):
         w = random.choice([1.0, 2.0], 1500)
         n = random.random(1500) < 0.2
@@ -136,7 +136,7 @@ def test_runs_that_all_agree_leave_open_what_one_more_of_either_would_do(left: f
 def test_few_runs_that_differ_are_held_by_the_interval(apart: float) -> None:
     """Of some 200 events, few or none of which go otherwise, in 1,000 encounters each time."""
     random = np.random.default_rng(29)
-    held, widths, rounds = 0, [], 500
+    held, widths, rounds = 0, [], 200
     for _ in range(rounds):
         n = random.random(1000) < 0.2
         u, changed = random.random(1000), random.random(1000) < apart
@@ -150,7 +150,7 @@ def test_few_runs_that_differ_are_held_by_the_interval(apart: float) -> None:
 @pytest.mark.parametrize("method", ["t", "bootstrap"])
 def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
     random = np.random.default_rng(23)
-    chance, left, new, kept, rounds = 0.3, 0.25, 0.01, 0, 300
+    chance, left, new, kept, rounds = 0.3, 0.25, 0.01, 0, 160
     truth = left + (1 - chance) / chance * new
     for _ in range(rounds):
         n = np.repeat(random.random(700) < chance, 3)
