@@ -157,8 +157,8 @@ class Stream:
         self.drew_for_all = True
         if self.shared:
             raise ValueError(
-                f"draws {self._purpose!r} of block {self._block!r} are of several runs: it must say "
-                "of which each is (`stream.of_runs(wake.run)`)"
+                f"draws {self._purpose!r} of block {self._block!r} are of several runs: say of "
+                "which each is (`stream.of_runs(wake.run)`)"
             )
 
     def uniform(self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0) -> FloatArray:
@@ -199,11 +199,15 @@ class Stream:
         return radius * np.cos(angle), radius * np.sin(angle), third
 
 
+#: Of which runs draws are is known: there is no choice among keys.
+_KNOWN: UInt64Array = np.empty(0, dtype=np.uint64)
+
+
 class _RunStream(Stream):
     """The draws of rows whose keys are known; their shape is that of targets or scans."""
 
     def __init__(self, keys: UInt64Array) -> None:
-        self._keys = keys[:0]
+        self._keys = _KNOWN
         self._key = (keys & _U_LOW, keys >> _U32)
 
 
