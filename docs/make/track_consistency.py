@@ -12,14 +12,14 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import cycle, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import dsa_des
-from components.estimation.motion import CoordinatedTurn, Motion
+from components.estimation.motion import ConstantVelocity, CoordinatedTurn, Motion
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_of
@@ -121,6 +121,10 @@ class Case:
     #: The model that flights are drawn from, ten in a scene.
     drawn: Motion | None = None
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
+    #: What the drawn ones are, in turn, how many there are in a scene, and the step of the file.
+    aircraft: list[dict[str, Any]] = field(default_factory=list)
+    flights: int = 10
+    step_s: float = 0.1
     #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
     #: How near a track must be to be a target's: coarse bearings err by more than that of others.
@@ -177,15 +181,17 @@ def _closing() -> list[dict[str, Any]]:
 
 
 ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "range_km": 40.0}
-ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0]}
-#: Far enough apart for bearings of 9 degrees.
+ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0],
+          "far_every": 1}  # fmt: skip
+#: Of the navigation of aircraft: categories of position and velocity, in turn.
 _EQUIPPED = [
-    {**STRAIGHT, "name": f"equipped{i}", "east_m": east, "north_m": north, "heading_deg": heading,
-     "mode_s": True, "ads_b": {"nacp": 8 + i, "nacv": 1 + i}}
-    for i, (east, north, heading) in enumerate(
-        ((-4000.0, -3000.0, 100.0), (3000.0, -9000.0, 330.0), (-8000.0, 2500.0, 200.0))
-    )
-]  # fmt: skip
+    {"mode_s": True, "ads_b": {"nacp": nacp, "nacv": nacv}}
+    for nacp, nacv in ((8, 1), (9, 2), (10, 3), (7, 2), (11, 4), (9, 1))
+]
+_CLIMBING = {**STRAIGHT, "climb_mps": 4.0, **_EQUIPPED[0]}
+#: Of drawn flights: 60 m/s in any direction, and level at first.
+_AS_DRAWN = {"start_speed_m_s": 42.4, "start_climb_m_s": 3.0}
+_CALM, _GUSTY = ConstantVelocity(0.25), ConstantVelocity(4.0)
 
 _BIASES = {"azimuth_bias_deg": 1.0, "elevation_bias_deg": 1.0, "range_bias_m": 40.0,
            "scan_rate_hz": 5}  # fmt: skip
@@ -226,16 +232,25 @@ CASES = {
     "lasting": Case("a radar with errors that last 5 s, ekf", _EKF,
                     sensors={"radar": {**RADAR, **_LASTING}}),
     "near": Case("passes at 240 m, ekf", _EKF, [NEAR]),
-    "ads_b": Case("ADS-B of NACp 8, 9 and 10 at 1 Hz, ekf", {"type": "tracking.ekf"},
-                  _EQUIPPED, sensors={"ads_b": ADS_B}),
-    "active": Case("active surveillance of Mode S at 1 Hz, ukf", {"type": "tracking.ukf"},
-                   _EQUIPPED[:1], sensors={"active": ACTIVE}, within_m=3000.0),
+    "ads_b": Case("ADS-B of NACp 7 to 11 at 1 Hz, drawn flights, ekf",
+                  {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.25, **_AS_DRAWN}, [],
+                  _CALM, sensors={"ads_b": ADS_B}, aircraft=_EQUIPPED, step_s=0.025),
+    "ads_b_imm": Case("the same, imm",
+                      {"type": "tracking.imm", "acceleration_intensity_m2_s3": 0.25, **_AS_DRAWN},
+                      [], _CALM, sensors={"ads_b": ADS_B}, aircraft=_EQUIPPED, step_s=0.025),
+    "active": Case("active surveillance of Mode S at 1 Hz, drawn flights, ukf",
+                   {"type": "tracking.ukf", **_AS_DRAWN}, [], _GUSTY, sensors={"active": ACTIVE},
+                   within_m=3000.0, aircraft=_EQUIPPED),
+    "active_ekf": Case("the same, ekf", {"type": "tracking.ekf", **_AS_DRAWN}, [], _GUSTY,
+                       sensors={"active": ACTIVE}, within_m=3000.0, aircraft=_EQUIPPED),
+    "both": Case("ADS-B of NACp 8 and active surveillance, ukf",
+                 {"type": "tracking.ukf", **STILL, "alpha": 0.3}, [_CLIMBING],
+                 sensors={"ads_b": ADS_B, "active": ACTIVE}, within_m=3000.0),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip
 
 _DURATION_S = 37
 INSTANTS_S = np.arange(12.0, 37.0, 4.0)
-_FLIGHTS = 10
 _AHEAD_S = 5.0
 #: A NEES of an honest track is above this once in 10^10.
 _LOST_ABOVE = 60.0
@@ -257,20 +272,22 @@ def scene_of_case(case: Case, traffic: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def drawn_flights(path: Path, model: Motion, number: int) -> None:
+def drawn_flights(
+    path: Path, model: Motion, number: int, flights: int = 10, step_s: float = 0.1
+) -> None:
     """Write a CSV file with the ownship and flights drawn from a motion model, all around it."""
-    step_s, rng = 0.1, np.random.default_rng(number)
+    rng = np.random.default_rng(number)
     own = np.radians(OWNSHIP["heading_deg"])
     course = np.array([np.cos(own), np.sin(own)]) * OWNSHIP["speed_mps"]
-    around = (np.arange(_FLIGHTS) + rng.uniform()) * 2.0 * np.pi / _FLIGHTS
-    heading = rng.uniform(0.0, 2.0 * np.pi, _FLIGHTS)
-    state = np.zeros((model.size, _FLIGHTS))
+    around = (np.arange(flights) + rng.uniform()) * 2.0 * np.pi / flights
+    heading = rng.uniform(0.0, 2.0 * np.pi, flights)
+    state = np.zeros((model.size, flights))
     state[:2] = 5000.0 * np.stack([np.cos(around), np.sin(around)])
-    state[2] = -rng.uniform(100.0, 500.0, _FLIGHTS)
+    state[2] = -rng.uniform(100.0, 500.0, flights)
     state[3:5] = 60.0 * np.stack([np.cos(heading), np.sin(heading)])
     if model.size > 6:
-        state[6] = 3.0 * _DEGREE * rng.choice([-1.0, 1.0], _FLIGHTS)
-    step = np.full(_FLIGHTS, step_s)
+        state[6] = 3.0 * _DEGREE * rng.choice([-1.0, 1.0], flights)
+    step = np.full(flights, step_s)
     root = np.linalg.cholesky(model.noise(step)[:, :, 0] + 1e-20 * np.eye(model.size))
     rows = ["time_s,id,lat_deg,lon_deg,alt_m,yaw_deg,pitch_deg,roll_deg"]
     for k in range(int((_DURATION_S + 1) / step_s)):
@@ -281,11 +298,11 @@ def drawn_flights(path: Path, model: Motion, number: int) -> None:
             reference_lon_deg=OWNSHIP["lon_deg"], reference_alt_m=OWNSHIP["alt_m"],
         )  # fmt: skip
         turned = [tuple(OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll"))]
-        turned += [(0.0, 0.0, 0.0)] * _FLIGHTS
+        turned += [(0.0, 0.0, 0.0)] * flights
         rows += [
-            f"{t:.1f},{'own' if i == 0 else f't{i}'},{lat[i]:.14g},{lon[i]:.14g},{alt[i]:.12g},"
+            f"{t:.3f},{'own' if i == 0 else f't{i}'},{lat[i]:.14g},{lon[i]:.14g},{alt[i]:.12g},"
             + ",".join(f"{angle:g}" for angle in turned[i])
-            for i in range(1 + _FLIGHTS)
+            for i in range(1 + flights)
         ]
         state = model.move(state, step) + root @ rng.normal(size=state.shape)
     path.write_text("\n".join(rows) + "\n")
@@ -298,11 +315,13 @@ def _scenes(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
         scene = dsa_des.load_scene(scene_of_case(case, traffic))
         yield [scene_of(scene, Replica(1 + i, {})) for i in range(replicas)]
         return
-    for number in range(-(-replicas // _FLIGHTS)):
+    for number in range(-(-replicas // case.flights)):
         path = folder / f"flights{number}.csv"
-        drawn_flights(path, case.drawn, number)
-        traffic = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
-        scene = dsa_des.load_scene(scene_of_case(case, traffic))
+        drawn_flights(path, case.drawn, number, case.flights, case.step_s)
+        read: dict[str, Any] = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
+        for i, craft in zip(range(1, 1 + case.flights), cycle(case.aircraft), strict=False):
+            read.setdefault("aircraft", {})[f"t{i}"] = craft
+        scene = dsa_des.load_scene(scene_of_case(case, read))
         yield [scene_of(scene, Replica(1 + number, {}))]
 
 
