@@ -42,8 +42,8 @@ def lasting_errors(position_errors: str) -> dict[str, LastingError]:
 
 #: The altimeter of an aircraft, which speaks through its broadcasts and its replies.
 ALTIMETER = ToldError(HEIGHT, "height_deviation", math.inf)
-#: The rounding of its altitude: new in every report of one that climbs.
-ROUNDING = ToldError(HEIGHT, "rounding_deviation", 0.0)
+#: What is new in each height: its rounding, of one that climbs, and how far it was carried on.
+ROUNDING = ToldError(HEIGHT, "rounding_deviation", 0.0, of_aircraft=False)
 
 
 def told_errors(position_errors: str) -> tuple[ToldError, ...]:
@@ -119,7 +119,7 @@ class StatedByAircraft:
         return found | {
             "place_deviation": place,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
-            "rounding_deviation": nothing + np.sqrt(rounding_m2),
+            "rounding_deviation": np.sqrt(rounding_m2 + np.where(known, climb * age_s**2, 0.0)),
             "speed_deviation": np.sqrt(self.speed_m2_s2), "bearing_deviation": nothing,
             "delay_deviation": nothing, "range_deviation": nothing,
             "age_s": np.where(known, age_s, 0.0),

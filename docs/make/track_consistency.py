@@ -121,10 +121,9 @@ class Case:
     #: The model that flights are drawn from, ten in a scene.
     drawn: Motion | None = None
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
-    #: What the drawn ones are, in turn, how many there are in a scene, and the step of the file.
+    #: What the drawn ones are, in turn, and how many there are in a scene.
     aircraft: list[dict[str, Any]] = field(default_factory=list)
     flights: int = 10
-    step_s: float = 0.1
     #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
     #: How near a track must be to be a target's: coarse bearings err by more than that of others.
@@ -188,10 +187,19 @@ _EQUIPPED = [
     {"mode_s": True, "ads_b": {"nacp": nacp, "nacv": nacv}}
     for nacp, nacv in ((8, 1), (9, 2), (10, 3), (7, 2), (11, 4), (9, 1))
 ]
-_CLIMBING = {**STRAIGHT, "climb_mps": 4.0, **_EQUIPPED[0]}
+_THREE = [
+    {**STRAIGHT, "name": f"equipped{i}", "east_m": east, "north_m": north, "heading_deg": heading,
+     "climb_mps": climb, **_EQUIPPED[i]}
+    for i, (east, north, heading, climb) in enumerate(
+        (
+            (-4000.0, -3000.0, 100.0, 4.0),
+            (3000.0, -9000.0, 330.0, -3.0),
+            (-8000.0, 2500.0, 200.0, 6.0),
+        )
+    )
+]  # fmt: skip
 #: Of drawn flights: 60 m/s in any direction, and level at first.
 _AS_DRAWN = {"start_speed_m_s": 42.4, "start_climb_m_s": 3.0}
-_CALM, _GUSTY = ConstantVelocity(0.25), ConstantVelocity(4.0)
 
 _BIASES = {"azimuth_bias_deg": 1.0, "elevation_bias_deg": 1.0, "range_bias_m": 40.0,
            "scan_rate_hz": 5}  # fmt: skip
@@ -232,20 +240,21 @@ CASES = {
     "lasting": Case("a radar with errors that last 5 s, ekf", _EKF,
                     sensors={"radar": {**RADAR, **_LASTING}}),
     "near": Case("passes at 240 m, ekf", _EKF, [NEAR]),
-    "ads_b": Case("ADS-B of NACp 7 to 11 at 1 Hz, drawn flights, ekf",
-                  {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.25, **_AS_DRAWN}, [],
-                  _CALM, sensors={"ads_b": ADS_B}, aircraft=_EQUIPPED, step_s=0.025),
-    "ads_b_imm": Case("the same, imm",
-                      {"type": "tracking.imm", "acceleration_intensity_m2_s3": 0.25, **_AS_DRAWN},
-                      [], _CALM, sensors={"ads_b": ADS_B}, aircraft=_EQUIPPED, step_s=0.025),
+    "ads_b": Case("ADS-B of NACp 8, 9 and 10 at 1 Hz, nothing rounded, ekf", _EKF, _THREE,
+                  sensors={"ads_b": {**ADS_B, "compact": False}}),
+    "ads_b_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, _THREE,
+                      sensors={"ads_b": {**ADS_B, "compact": False}}),
+    "ads_b_compact": Case("the same as messages round it, ekf", _EKF, _THREE,
+                          sensors={"ads_b": ADS_B}),
     "active": Case("active surveillance of Mode S at 1 Hz, drawn flights, ukf",
-                   {"type": "tracking.ukf", **_AS_DRAWN}, [], _GUSTY, sensors={"active": ACTIVE},
-                   within_m=3000.0, aircraft=_EQUIPPED),
-    "active_ekf": Case("the same, ekf", {"type": "tracking.ekf", **_AS_DRAWN}, [], _GUSTY,
-                       sensors={"active": ACTIVE}, within_m=3000.0, aircraft=_EQUIPPED),
+                   {"type": "tracking.ukf", **_AS_DRAWN}, [], ConstantVelocity(4.0),
+                   sensors={"active": ACTIVE}, within_m=3000.0, aircraft=_EQUIPPED),
+    "active_ekf": Case("the same, ekf", {"type": "tracking.ekf", **_AS_DRAWN}, [],
+                       ConstantVelocity(4.0), sensors={"active": ACTIVE}, within_m=3000.0,
+                       aircraft=_EQUIPPED),
     "both": Case("ADS-B of NACp 8 and active surveillance, ukf",
-                 {"type": "tracking.ukf", **STILL, "alpha": 0.3}, [_CLIMBING],
-                 sensors={"ads_b": ADS_B, "active": ACTIVE}, within_m=3000.0),
+                 {"type": "tracking.ukf", **STILL, "alpha": 0.3}, _THREE[:1],
+                 sensors={"active": ACTIVE, "ads_b": ADS_B}, within_m=3000.0),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip
 
@@ -272,11 +281,9 @@ def scene_of_case(case: Case, traffic: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def drawn_flights(
-    path: Path, model: Motion, number: int, flights: int = 10, step_s: float = 0.1
-) -> None:
+def drawn_flights(path: Path, model: Motion, number: int, flights: int) -> None:
     """Write a CSV file with the ownship and flights drawn from a motion model, all around it."""
-    rng = np.random.default_rng(number)
+    step_s, rng = 0.1, np.random.default_rng(number)
     own = np.radians(OWNSHIP["heading_deg"])
     course = np.array([np.cos(own), np.sin(own)]) * OWNSHIP["speed_mps"]
     around = (np.arange(flights) + rng.uniform()) * 2.0 * np.pi / flights
@@ -300,7 +307,7 @@ def drawn_flights(
         turned = [tuple(OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll"))]
         turned += [(0.0, 0.0, 0.0)] * flights
         rows += [
-            f"{t:.3f},{'own' if i == 0 else f't{i}'},{lat[i]:.14g},{lon[i]:.14g},{alt[i]:.12g},"
+            f"{t:.1f},{'own' if i == 0 else f't{i}'},{lat[i]:.14g},{lon[i]:.14g},{alt[i]:.12g},"
             + ",".join(f"{angle:g}" for angle in turned[i])
             for i in range(1 + flights)
         ]
@@ -317,7 +324,7 @@ def _scenes(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
         return
     for number in range(-(-replicas // case.flights)):
         path = folder / f"flights{number}.csv"
-        drawn_flights(path, case.drawn, number, case.flights, case.step_s)
+        drawn_flights(path, case.drawn, number, case.flights)
         read: dict[str, Any] = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
         for i, craft in zip(range(1, 1 + case.flights), cycle(case.aircraft), strict=False):
             read.setdefault("aircraft", {})[f"t{i}"] = craft
