@@ -1,5 +1,6 @@
 """The simulation decision: which sensor needs to look at which target (thesis §3.4, errata 4b)."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from components.messages.reach import Decision, FarthestLook, Reach, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
 from dsa_des.block.component import Component, Input, Output
+from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 
@@ -24,6 +26,11 @@ class Gate(Component):
     windowed = True
     lockstep = True
     rewindable = True
+    verified = (
+        Verified("who is looked at, and why another is not", "pymap3d, and rotations by matrices: "
+                 "a banked ownship in the south", "1 m of the range, 0.1 deg of a field of view",
+                 "tests/sensor/test_reach.py"),
+    )  # fmt: skip
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that some sensor may look at."""
@@ -71,5 +78,5 @@ class Gate(Component):
                 seen = [values.take(rows, axis=0) for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
         # Behind another gate, that one's decisions were for the sensors there.
-        fields = {**vars(targets), "tick": wake.ticks, "decisions": decisions}
-        return GatedTargets(**fields)
+        values = {one.name: getattr(targets, one.name) for one in fields(targets)}
+        return GatedTargets(**{**values, "tick": wake.ticks, "decisions": decisions})

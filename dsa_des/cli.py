@@ -265,7 +265,7 @@ def compare(**options: Any) -> None:
 
 
 @main.command()
-@click.argument("case", metavar="CASE")
+@click.argument("case", metavar="CASE", shell_complete=completing("cases"))
 @click.option("--out", required=True, metavar="PACK", help="Folder of the pack.")
 @set_option
 @click.option(

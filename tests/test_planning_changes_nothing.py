@@ -38,9 +38,12 @@ ENDS_S = {
     "avoidance/looking_out.toml": 60,
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
-    "tracking/do365_sensors.toml": 20,
+    "tracking/do365_sensors.toml": 80,
     "operator/session.toml": 15,
-    "optical/pictures.toml": 10,
+    "optical/pictures.toml": 5,
+    "published/degas.toml": 30,
+    "published/degas_radar.toml": 60,
+    "published/see_and_avoid.toml": 30,
     "systems/afrl_tracked.toml": 25,
     "tracking/architectures.toml": 10,
     "tracking/cueing.toml": 20,
@@ -223,10 +226,10 @@ class PathCells:
         return self._own
 
 
-def test_what_a_tolerance_leaves_out_stays_inside_it_over_200_scenes() -> None:
+def test_what_a_tolerance_leaves_out_stays_inside_it_over_80_scenes() -> None:
     rng = np.random.default_rng(20)
     dropped = tables = 0
-    for _ in range(200):
+    for _ in range(80):
         weather = Weather(
             gas=bool(rng.random() < 0.3),
             rain_rate_mm_h=float(10.0 ** rng.uniform(-5, 1)) if rng.random() < 0.7 else 0.0,
@@ -259,5 +262,5 @@ def test_what_a_tolerance_leaves_out_stays_inside_it_over_200_scenes() -> None:
         ]  # fmt: skip
         tables += rough._method == "table"
         assert np.max(np.abs(pd[0] - pd[1])) <= allowed
-    assert dropped > 30, "the tolerances must have left something out"
-    assert tables > 50, "and replaced the exact Pd by the table"
+    assert dropped > 12, "the tolerances must have left something out"
+    assert tables > 20, "and replaced the exact Pd by the table"

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
-from components.geometry.angles import past
+from components.geometry import past
 from dsa_des.block.parameters import refuse_extremes
 from dsa_des.files.input_files import InputFileError, read_input_text
 

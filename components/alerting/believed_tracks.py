@@ -10,12 +10,12 @@ from components.alerting.believed_positions import BelievedFlights
 from components.alerting.own_poses import OwnPoses
 from components.estimation.frame import ned_axes
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
+from components.messages.columns import STATE
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
 
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
 # A track farther than this from every target belongs to none, for whoever evaluates, m.
@@ -37,7 +37,7 @@ class _Estimates(NamedTuple):
         return cls(
             tracks.track,
             tracks.state_s,
-            np.stack([getattr(tracks, name) for name in _STATE]),
+            np.stack([getattr(tracks, name) for name in STATE]),
             np.stack([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
             np.stack([tracks.origin_lat_deg, tracks.origin_lon_deg, tracks.origin_alt_m]),
         )

@@ -72,7 +72,7 @@ def _fixed_work() -> int:
 def _states(traffic: Any, time_s: float) -> tuple[Any, Any, Any, Any]:
     """Return what a host hands in at a time, from the scene's own traffic."""
     time_of = np.array([time_s])
-    states = [traffic.own.at(time_of), traffic.fleet.at(time_of)]
+    states = [traffic.own.at(time_of), traffic.targets.at(time_of)]
     lla = [np.stack([np.radians(s.lat_deg), np.radians(s.lon_deg), s.alt_m], -1) for s in states]
     att = [np.stack([s.yaw_rad, s.pitch_rad, s.roll_rad], -1) for s in states]
     return lla[0][0], att[0][0], lla[1][0], att[1][0]

@@ -17,11 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import (
-    ECCENTRICITY_SQUARED,
-    FLATTENING,
-    SEMI_MAJOR_AXIS_M,
-)
+from components.geometry import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
 from components.radar.detection.threshold import detection_threshold
 from dsa_des.running.simulation import Simulation
 

@@ -4,15 +4,17 @@ They take the recorded rows as `components.display.summary` does.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
+from components.messages.columns import ORIGIN, POSITION
 from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
 from components.messages.steering import Manoeuvres
+from components.messages.targets import TrafficStates
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -27,8 +29,8 @@ TABLE = "state_tracks"
 NEAR_M = 300.0
 #: Instead of a target's name, for what is near none.
 NO_TARGET = "no target"
-_PLACE = ("north_m", "east_m", "down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+#: Instead of a tracker's name, for alerts of what truly is.
+TRUTH = "the truth"
 _HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
 #: Distances of tracks and targets that are worked out at once.
 _MOST_AT_ONCE = 200_000
@@ -40,7 +42,7 @@ def outcome_observers(simulation: "Simulation") -> list[Observer]:
     if names := senders(simulation, StateTracks):
         found.append(TrackSummary(names, _recorded_targets(simulation)))
     if names := senders(simulation, AlertLevels):
-        found.append(AlertSummary(names))
+        found.append(AlertSummary(_sources(simulation, names)))
     if names := senders(simulation, Manoeuvres):
         found.append(ManoeuvreSummary(names))
     return found
@@ -80,12 +82,16 @@ class TrackSummary:
 
 
 class AlertSummary:
-    """Keeps from when to when each level of an alerter was on, and for which targets."""
+    """Keeps from when to when each level of an alerter was on, and for which targets.
+
+    `sources` are the blocks that tell each alerter of targets.
+    """
 
     tables: ClassVar[frozenset[str]] = frozenset({AlertLevels.entry_table or ""})
 
-    def __init__(self, alerters: Iterable[str]) -> None:
-        self._entries: dict[str, dict[int, dict[str, list[float]]]] = {n: {} for n in alerters}
+    def __init__(self, sources: Mapping[str, Sequence[str]]) -> None:
+        self._sources = {name: list(of) for name, of in sources.items()}
+        self._entries: dict[str, dict[int, dict[str, list[float]]]] = {n: {} for n in sources}
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``alerts``, in order of time."""
@@ -106,13 +112,15 @@ class AlertSummary:
         """Return the section ``alerts``: alerter → level → when, and of which targets.
 
         ``first_s`` and ``last_s`` are the first and the last instant at which any target had that
-        level, ``targets`` the same by target; what is far from all targets is `NO_TARGET`.
+        level, ``targets`` the same by target; what is far from all targets is `NO_TARGET`. The
+        section ``alerts_of`` says whose tracks each alerter goes by, or that it goes by the truth.
         """
         return {
+            "alerts_of": self._sources,
             "alerts": {
                 name: {str(level): _spans(levels[level]) for level in sorted(levels)}
                 for name, levels in self._entries.items()
-            }
+            },
         }
 
 
@@ -175,7 +183,7 @@ class _Tracker:
         rows = rows[columns["has_range"][rows]]
         self._judged.update(np.unique(number[rows]).tolist())
         if self._targets is None and len(rows):
-            self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in _ORIGIN))
+            self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in ORIGIN))
         step = _MOST_AT_ONCE // max(1, len(self._targets.names) if self._targets else 1) + 1
         for start in range(0, len(rows), step):
             self._compare(columns, rows[start : start + step])
@@ -215,7 +223,7 @@ def _earlier(
     if not len(rows):
         return first
     rows = rows[columns["time_s"][rows] == columns["time_s"][rows].min()]
-    apart = [columns[name][rows] - columns[f"own_{name}"][rows] for name in _PLACE]
+    apart = [columns[name][rows] - columns[f"own_{name}"][rows] for name in POSITION]
     range_m = np.where(columns["has_range"][rows], np.sqrt(sum(d**2 for d in apart)), np.inf)
     here = float(columns["time_s"][rows[0]]), float(np.fmin.reduce(range_m))
     return here if first is None else min(first, here)
@@ -236,8 +244,18 @@ def _recorded_targets(simulation: "Simulation") -> Any:
 
 def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
     """Return how far rows of tracks are from targets (targets, 3, rows) at the same times, m."""
-    estimate = np.stack([columns[name][rows] for name in _PLACE])
+    estimate = np.stack([columns[name][rows] for name in POSITION])
     return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
+
+
+def _sources(simulation: "Simulation", names: Iterable[str]) -> dict[str, list[str]]:
+    """Return which blocks tell each of some blocks of targets; `TRUTH` where only traffic does."""
+    traffic = set(senders(simulation, TrafficStates))
+    found = {}
+    for name in names:
+        of = sorted({wire.source for wire in simulation.scene.wires if wire.target == name})
+        found[name] = [source for source in of if source not in traffic] or [TRUTH]
+    return found
 
 
 def senders(simulation: "Simulation", message: type) -> list[str]:

@@ -271,7 +271,7 @@ def _legend(
 
     handles = [
         Line2D([], [], color=_OWN, linewidth=2.0, label="ownship"),
-        Line2D([], [], color=_TARGET, linewidth=5.0 if dense else 1.0,
+        Line2D([], [], color=_TARGET, linewidth=5.0 if dense else 1.0, solid_capstyle="butt",
                label="targets (darker: more)" if dense else "target"),
         Line2D([], [], linestyle="none", marker="o", markersize=5, color="#333333", label="start"),
         Line2D([], [], linestyle=":", marker="x", linewidth=0.7, color="#000000",

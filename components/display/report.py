@@ -86,12 +86,13 @@ class DetectAndSenseReport:
             ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
             ``tracks.png`` and ``consistency.png`` where a tracker confirmed tracks with a range.
         """
+        from components.display.consistency import draw_consistency
         from components.display.flights import Flights
         from components.display.plan import draw_plan
         from components.display.recorded_rows import Detected
         from components.display.symbols import styles_of
         from components.display.timeline import draw_timeline
-        from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks
+        from components.display.tracks import DrawnTracks, draw_tracks
 
         flights = Flights.of(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))

@@ -138,6 +138,8 @@ def outcome_lines(summary: dict[str, Any]) -> list[str]:
         for sensor, entry in late.items()
     ]
     for name, levels in summary.get("alerts", {}).items():
+        of = summary.get("alerts_of", {}).get(name)
+        name = f"{name} (by {' and '.join(of)})" if of else name
         lines += [
             f"{name}: level {level} {_span_text(entry)} ({_whom_text(entry['targets'])})"
             for level, entry in levels.items()

@@ -37,7 +37,7 @@ Scans = dict[str, SensorScans]
 MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
-_LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.8  # beside the whole run are names of targets
+_LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.785  # beside the whole run are names of targets
 _MOST_NAMED = 8
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
@@ -62,14 +62,18 @@ def draw_timeline(
     """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
-    close_up = find_close_up(scans, folder, duration_s)
-    shown = scans_between(folder, close_up.start_s, close_up.end_s, scans)
-    rows = max(1, len(detected.sensors))
-    share = min(0.42, 0.14 + 0.07 * rows)
+    title = figure_text(simulation.scene.title, 28)  # the legend is beside it
     with drawing(*_SIZE_IN, path) as figure:
+        if not scans:  # a scene without sensors has ranges only
+            whole = figure.add_axes((_LEFT, 0.1, _BELOW, 0.8))
+            _draw_ranges(whole, flights, detected, duration_s)
+            whole.set_title(f"{title}: no sensor scans", loc="left")
+            return path
+        close_up = find_close_up(scans, folder, duration_s)
+        shown = scans_between(folder, close_up.start_s, close_up.end_s, scans)
+        share = min(0.42, 0.14 + 0.07 * max(1, len(detected.sensors)))
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
         _draw_scans(above, scans, shown, detected.styles, close_up)
-        title = figure_text(simulation.scene.title, 28)  # the legend is beside it
         above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
@@ -89,15 +93,15 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     length_s = duration_s
     if periods:
         length_s = min(4.2 * max(periods), MOST_SCANS_SHOWN * min(periods), duration_s)
-    anchor_s, what = 0.0, "scans at the start"
+    anchor_s, what = 0.0, "at the start of the run"
     first = [one.first_hit_s for one in scans.values() if one.first_hit_s is not None]
     if first:
-        anchor_s, what = min(first), "scans around the first detection"
+        anchor_s, what = min(first), "around the first detection"
     together = _first_joined(folder, len(scans))
     if together is not None:
         anchor_s, number = together
         word = {2: "two", 3: "three", 4: "four"}.get(number, str(number))
-        what = f"scans around the first fusion of {word} sensors"
+        what = f"around the first fusion of {word} sensors"
     start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
     end_s = start_s + length_s
     return CloseUp(start_s, end_s, what, _joined(folder, start_s, end_s))
@@ -220,7 +224,16 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     axes.set_xlim(0.0, max(duration_s, 1e-9))
     if len(lines) >= DENSE:
         draw_density(axes, lines)
-        handles.append(Line2D([], [], color="#999999", lw=5.0, label="targets (darker: more)"))
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="#999999",
+                lw=5.0,
+                solid_capstyle="butt",
+                label="targets (darker: more)",
+            )
+        )
     elif lines:
         width = 0.5 if len(lines) > 20 else 1.0
         axes.add_collection(

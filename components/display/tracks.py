@@ -1,4 +1,4 @@
-"""``tracks.png`` and ``consistency.png``: estimated tracks over the true flights, and their errors.
+"""``tracks.png``: estimated tracks over the true flights.
 
 Tracks are those that were confirmed and have a range.
 """
@@ -11,12 +11,12 @@ import numpy as np
 
 from components.display.outcomes import NEAR_M, TABLE, distances
 from components.display.symbols import DENSE, Labels, draw_density
+from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
-from dsa_des.results.statistics import chi_square_bounds
+from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import drawing, figure_text, tight
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 #: Okabe and Ito's colours, as in all figures, in turn.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _FALSE, _TRUTH, _OWN = "#999999", "#000000", "#666666"
-STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _COLUMNS = (
     "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
-    *_ORIGIN, *COVARIANCE.values(),
+    *ORIGIN, *COVARIANCE.values(),
 )  # fmt: skip
 # Rows that are read of a table, at most; of a larger one, groups of rows spread over it.
 _MOST_ROWS = 1_000_000
@@ -38,13 +36,9 @@ _MOST_POINTS, _ELLIPSES = 400, 8
 #: More names and numbers than this cannot be told apart.
 _MOST_NAMED = 12
 #: Of more tracks than this, no ellipses and bands are drawn, which would cover each other.
-_MOST_SPREADS = 40
+MOST_SPREADS = 40
 #: A target that moves less is a dot on the plan.
 _STILL_M = 10.0
-_MOST_ERRORS = 2000
-_LOWEST, _HIGHEST = 0.02, 1000.0
-#: Stretches of time over which innovations are averaged.
-_STRETCHES = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +57,7 @@ class DrawnTracks:
     """Tracks of a table, with the true flights in their frame."""
 
     def __init__(self, simulation: "Simulation", columns: dict[str, Any]) -> None:
-        self.origin = tuple(float(columns[name][0]) for name in _ORIGIN)
+        self.origin = tuple(float(columns[name][0]) for name in ORIGIN)
         self.time_s = float(columns["state_s"].min()), float(columns["state_s"].max())
         sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
         self.own = sources[0].own if sources else None
@@ -71,7 +65,9 @@ class DrawnTracks:
         self.targets = TargetsInFrame(targets, self.origin)
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
+        several = len(self.blocks) > 1
         for place, block in enumerate(self.blocks):
+            turn = place
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -79,8 +75,8 @@ class DrawnTracks:
                 near = distances(one, slice(None), self.targets.at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
-                turn = place if len(self.blocks) > 1 else number - 1
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
+                turn += not (false or several)
                 self.tracks.append(DrawnTrack(block, number, one, false, colour))
 
     @classmethod
@@ -89,29 +85,6 @@ class DrawnTracks:
         source = folder / f"{TABLE}.parquet"
         columns = _read(source) if source.exists() else None
         return None if columns is None else cls(simulation, columns)
-
-
-def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return normalised errors squared of a track to the nearest target, and where it has one.
-
-    States (targets, 6, rows) are those of the targets at the same times.
-    """
-    count = len(one["state_s"])
-    if len(states) == 0:
-        return np.full(count, np.nan), np.zeros(count, dtype=bool)
-    apart = distances(one, slice(None), states[:, :3])
-    apart = np.where(np.isnan(apart), np.inf, apart)
-    nearest: IntArray = apart.argmin(axis=0)
-    rows = np.arange(count)
-    known = apart[nearest, rows] < NEAR_M
-    error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
-    spread = np.empty((count, 6, 6))
-    for (i, j), name in COVARIANCE.items():
-        spread[:, i, j] = spread[:, j, i] = one[name]
-    found = np.full(count, np.nan)
-    solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
-    found[known] = (error.T[known] * solved).sum(axis=1)
-    return found, known
 
 
 def _read(source: Path) -> dict[str, Any] | None:
@@ -146,7 +119,7 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
             _flight(plan, height, grid, position, drawn.origin[2], style)
             if np.nanmax(np.ptp(position, axis=1), initial=0.0) < _STILL_M:
                 plan.scatter(position[1, :1] / 1e3, position[0, :1] / 1e3, s=6, color=_TRUTH)
-        spreads = len(drawn.tracks) <= _MOST_SPREADS
+        spreads = len(drawn.tracks) <= MOST_SPREADS
         for one in drawn.tracks:
             _draw_one(plan, height, one, drawn.origin[2], spreads)
         plan.set_aspect("equal", adjustable="datalim")
@@ -230,7 +203,7 @@ def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
             for place, block in enumerate(blocks)
         ),
     ]
-    if many <= _MOST_SPREADS:
+    if many <= MOST_SPREADS:
         shade = _FALSE if blocks[1:] else COLOURS[0]
         entries.append(Patch(facecolor=shade, alpha=0.3, label="95 %"))
     if false:
@@ -263,111 +236,3 @@ def _names(
         return
     for one, line in zip(drawn.tracks, lines[len(positions) + 1 :], strict=True):
         labels.add(f"{one.number}", float(line[0][0]), float(line[0][1]), one.colour, "bold")
-
-
-def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
-    """Draw normalised errors squared of tracks, and of what they expected of detections.
-
-    A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
-    drawn where no track is near a target.
-    """
-    shown: list[tuple[Any, FloatArray, FloatArray]] = []
-    for track in drawn.tracks:
-        count = len(track.columns["state_s"])
-        one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
-        found, known = errors_squared(one, drawn.targets.states(one["state_s"]))
-        if known.any():
-            shown.append((track, one["state_s"], found))
-    if not shown:
-        return None
-    of_block = {
-        block: np.concatenate([values[~np.isnan(values)] for _, _, values in told])
-        for block in drawn.blocks
-        if (told := [one for one in shown if one[0].block == block])
-    }
-    low, high = chi_square_bounds(6)
-    said = {
-        block: f"{every.mean():.3g}, {_percent((every >= low) & (every <= high))} inside"
-        for block, every in of_block.items()
-    }
-    with drawing(9.0, 6.4, path) as figure:
-        errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        labelled: set[str] = set()
-        for track, time_s, values in shown:
-            label = f"track {track.number}"
-            if len(drawn.blocks) > 1:
-                words = f"{figure_text(track.block, 16)}: {said[track.block]}"
-                label = "" if track.block in labelled else words
-                labelled.add(track.block)
-            errors.plot(time_s, values, color=track.colour, linewidth=0.9, label=label or None)
-        errors.axhspan(low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0)
-        errors.axhline(6.0, color="#666666", linewidth=0.8, zorder=0)
-        # Trackers are not pooled: each has its own mean, in the legend.
-        pooled = "" if len(drawn.blocks) > 1 else f": mean {next(iter(said.values()))}"
-        errors.set_title(
-            f"Error squared by its covariance (NEES){pooled} (honest: 6, 95 %)", loc="left"
-        )
-        if len(shown) <= 6 or len(drawn.blocks) > 1:
-            errors.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-        _draw_innovations(innovations, drawn)
-        errors.set_yscale("log")
-        bottom, top = errors.get_ylim()
-        errors.set_ylim(max(bottom, _LOWEST), min(max(top, 20.0), _HIGHEST))
-        plain_log_ticks(errors.yaxis)
-        innovations.set_ylim(bottom=0.0)
-        innovations.set_xlabel("time (s)")
-        tight(figure)
-    return path
-
-
-def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
-    for place, block in enumerate(drawn.blocks):
-        held = [one.columns for one in drawn.tracks if one.block == block]
-        label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
-        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[place % len(COLOURS)], label)
-    if drawn.blocks[1:]:
-        axes.set_title(
-            "Innovation squared by its covariance (NIS) per quantity, stretches inside "
-            "(honest: 1, 95 %)", loc="left",
-        )  # fmt: skip
-    if axes.get_legend_handles_labels()[1]:
-        axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-
-
-def _draw_innovations_of(
-    axes: Any,
-    held: list[dict[str, Any]],
-    span_s: tuple[float, float],
-    colour: str,
-    tracker: str,
-) -> None:
-    time_s, nis, freedom = (
-        np.concatenate([columns[name] for columns in held])
-        for name in ("state_s", "nis", "nis_freedom")
-    )
-    mine = freedom > 0
-    time_s, nis, freedom = time_s[mine], nis[mine], freedom[mine]
-    if len(nis) == 0:
-        axes.set_title("Innovation squared (NIS): this tracker tells none", loc="left")
-        return
-    edges = np.linspace(span_s[0], span_s[1] + 1e-9, _STRETCHES + 1)
-    total, many = (np.histogram(time_s, edges, weights=values)[0] for values in (nis, freedom))
-    middle = 0.5 * (edges[1:] + edges[:-1])[many > 0]
-    total, many = total[many > 0], many[many > 0]
-    low, high = np.array([chi_square_bounds(n) for n in many.tolist()]).T / many
-    axes.fill_between(middle, low, high, color=colour if tracker else "#999999",
-                      alpha=0.15 if tracker else 0.3, linewidth=0, zorder=0,
-                      label=None if tracker else "95 %")  # fmt: skip
-    inside = (total / many >= low) & (total / many <= high)
-    said = f"{nis.sum() / freedom.sum():.3g}, {_percent(inside)}"
-    axes.plot(middle, total / many, color=colour, marker=".", linewidth=0.9,
-              label=f"{tracker}: {said}" if tracker else "mean per quantity")  # fmt: skip
-    axes.set_title(
-        f"Innovation squared by its covariance (NIS) per quantity: {said} of stretches inside "
-        "(honest: 1, 95 %)", loc="left",
-    )  # fmt: skip
-
-
-def _percent(inside: BoolArray) -> str:
-    return f"{100.0 * np.mean(inside):.0f} %"

@@ -23,7 +23,8 @@ from components.encounters.pair_densities import (
     vertical_density,
 )
 from components.encounters.pairing import PairSampler, set_of_pairs
-from components.flights.sampled_flight import CELLS_AT_ONCE, SampledTrajectory
+from components.flights.fleet import CELLS_AT_ONCE
+from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
 from components.formats.set_file import read_set

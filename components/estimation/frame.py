@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, times
-from components.geometry.angles import local_axes
-from components.geometry.attitude import ned_to_body_unchecked
-from components.geometry.ellipsoid import north_east_up
+from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -49,7 +47,7 @@ def pose_in_frame(
     turned = np.empty((3, 3, np.size(lat)))
     for j in range(3):
         # Axis j of the frame, along the axes of the aircraft's own horizon.
-        n, e, d = (_dot(axis, here[j]) for axis in there)
+        n, e, d = (dot(axis, here[j]) for axis in there)
         turned[:, j] = np.array(ned_to_body_unchecked(n, e, d, *attitude_rad))
     moves = None
     if velocity_m_s is not None:
@@ -68,7 +66,7 @@ def vectors_in_frame(
 def _along_others(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
     """Return vectors along new axes, of those along old ones, both told in the Earth's axes."""
     in_space = sum(v * axis for v, axis in zip(vector, old, strict=True))
-    return np.array([_dot(in_space, axis) for axis in new])
+    return np.array([dot(in_space, axis) for axis in new])
 
 
 def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
@@ -77,7 +75,7 @@ def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
     return [north, east, -up]
 
 
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+def dot(one: FloatArray, other: FloatArray) -> FloatArray:
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, squared_length, times
-from components.estimation.frame import SensorPose
-from components.geometry.angles import wrap_pi_unchecked
+from components.estimation.frame import SensorPose, dot
+from components.geometry import wrap_pi_unchecked
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the
@@ -52,7 +52,7 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
         seen[2] = distance
     if kind.has_range_rate:
         closing = _closing(state, pose)
-        seen[2 + kind.has_range] = _along(away, closing) / np.maximum(distance, _NEAREST_M)
+        seen[2 + kind.has_range] = dot(away, closing) / np.maximum(distance, _NEAREST_M)
     if kind.has_velocity:
         seen[-3:] = state[3:6]
     return seen
@@ -92,7 +92,7 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
         jacobian[2, :3] = unit
     if kind.has_range_rate:
         closing = _closing(state, pose)
-        rate = _along(away, closing) / distance
+        rate = dot(away, closing) / distance
         row = 2 + kind.has_range
         seen[row] = rate
         jacobian[row, :3] = (closing - rate * unit) / distance
@@ -164,10 +164,6 @@ def _closing(state: FloatArray, pose: SensorPose) -> FloatArray:
     if pose.velocity_m_s is None:
         raise ValueError("a range rate needs the velocity of the sensor")
     return state[3:6] - pose.velocity_m_s
-
-
-def _along(one: FloatArray, other: FloatArray) -> FloatArray:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def half_angle_rad(

@@ -23,6 +23,7 @@ from components.estimation.batched import (
     symmetric,
     times,
 )
+from components.estimation.frame import dot
 from dsa_des.arrays.types import FloatArray
 
 # Tracks are kept between these.
@@ -141,7 +142,7 @@ def _polar(
     away, velocity = state[:3] - sensor_m, state[3:6]
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     axes = _axes(away / distance)
-    by_range = np.stack([_dot(axis, velocity) for axis in axes]) / distance
+    by_range = np.stack([dot(axis, velocity) for axis in axes]) / distance
     return axes, distance, by_range, _to_polar(axes, distance, velocity)
 
 
@@ -194,7 +195,7 @@ def _to_polar(axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
     inverse = 1.0 / distance
     found[0, :3], found[1, :3] = across * inverse, third * inverse
     found[2, :3] = -line * (inverse * inverse)
-    along, side, up = (_dot(axis, velocity) for axis in axes)
+    along, side, up = (dot(axis, velocity) for axis in axes)
     found[3, :3] = along * found[2, :3] + inverse * (side * found[0, :3] + up * found[1, :3])
     found[4, :3] = side * found[2, :3] - inverse * along * found[0, :3]
     found[5, :3] = up * found[2, :3] - inverse * along * found[1, :3]
@@ -232,10 +233,6 @@ def _from_polar(
     for i, axis in enumerate(axes):
         found[3:, 3 + i] = distance * axis
     return found
-
-
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def _cross(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -19,11 +19,10 @@ from components.formats.asterix_records import (
     write_records,
 )
 from components.geometry import local_axes
+from components.messages.columns import ORIGIN, VELOCITY
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.errors import UsageError
 
-_MOVES = ("north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 #: Largest range rate that a plot holds.
 _FASTEST_M_S = 511.0
 #: Standard deviations that a track says of itself, and the variances in north, east and down.
@@ -174,9 +173,9 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     rows, places = estimated_places(run)
     if len(rows) == 0:
         return
-    origin = [run.numbers("state_tracks", name)[rows] for name in _ORIGIN]
+    origin = [run.numbers("state_tracks", name)[rows] for name in ORIGIN]
     # Velocities are along the axes of the frame's origin; the track's own have turned a little.
-    moves = [run.numbers("state_tracks", name)[rows] for name in _MOVES]
+    moves = [run.numbers("state_tracks", name)[rows] for name in VELOCITY]
     east, north, up = local_axes(origin[0], origin[1])
     earth = [
         moves[0] * n + moves[1] * e - moves[2] * u for n, e, u in zip(north, east, up, strict=True)

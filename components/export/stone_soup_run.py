@@ -17,6 +17,7 @@ from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.estimation.frame import pose_in_frame
 from components.geometry import local_axes, north_east_up
+from components.messages.columns import ORIGIN
 from components.stone_soup.objects import (
     POSITION,
     VELOCITY,
@@ -35,7 +36,6 @@ _VARIANCES = (
 )  # fmt: skip
 _MOVES = ("own_velocity_north_m_s", "own_velocity_east_m_s", "own_velocity_down_m_s")
 _POSE = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
 
 #: Latitude and longitude (deg) and height above the ellipsoid (m).
@@ -174,7 +174,7 @@ def _poses(
 def _origin(run: RecordedTables, pose: FloatArray) -> Origin:
     tracks = run.tables.get("state_tracks")
     if tracks is not None and tracks.num_rows:
-        lat, lon, alt = (float(tracks[name][0].as_py()) for name in _ORIGIN)
+        lat, lon, alt = (float(tracks[name][0].as_py()) for name in ORIGIN)
     else:
         lat, lon, alt = pose[:3, 0].tolist()
     return lat, lon, alt

@@ -4,14 +4,13 @@ import numpy as np
 
 from components.display.picture import offset_positions, sights
 from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.messages.columns import ORIGIN, POSITION
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import UsageError
 
 #: What a pose is made of, as recorded with what was measured.
 POSE = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
         "own_roll_rad")  # fmt: skip
-_STATE = ("north_m", "east_m", "down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
 def estimated_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
@@ -21,9 +20,9 @@ def estimated_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     """
     if "state_tracks" not in run.tables:
         return np.empty(0, dtype=np.int64), np.empty((3, 0))
-    ned = np.stack([run.numbers("state_tracks", name) for name in _STATE])
+    ned = np.stack([run.numbers("state_tracks", name) for name in POSITION])
     rows = np.flatnonzero(np.isfinite(ned).all(axis=0))
-    origin = [run.numbers("state_tracks", name)[rows] for name in _ORIGIN]
+    origin = [run.numbers("state_tracks", name)[rows] for name in ORIGIN]
     return rows, offset_positions(ned[:, rows], origin)
 
 

@@ -5,40 +5,21 @@ sample saw it. What holds at the samples, widened by that, holds all the time.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from components.flights.fleet import Fleet
 from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.angles import wrap_by_sines
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M, line_of_sight
 from components.geometry.state import TrajectoryState
 from components.messages.reach import REACH_MARGIN
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray
-
-
-def max_speeds_mps(flights: Sequence[Any]) -> FloatArray:
-    """Return the largest speed of each flight along its path, shape (flights,)."""
-    if isinstance(flights, StraightFlights):
-        return flights.max_speeds_mps
-    return np.array([flight.max_speed_mps for flight in flights], dtype=np.float64)
-
-
-def intervals_present_s(flights: Sequence[Any]) -> FloatArray:
-    """Return the first and the last time at which each flight may be there, shape (flights, 2).
-
-    A flight that does not say it may be there at any time from 0 on.
-    """
-    if isinstance(flights, StraightFlights):
-        return flights.intervals_present_s
-    always = (0.0, math.inf)
-    there = [f.interval_present() if hasattr(f, "interval_present") else always for f in flights]
-    return np.array(there, dtype=np.float64).reshape(-1, 2)
-
 
 Interval = tuple[float, float]
 #: States of a flight at times (n,).
@@ -78,17 +59,15 @@ class TrafficEnvelope:
     roll_rad: float
 
 
-def traffic_envelope(
-    own: Any, targets: Any, fleet: Any, duration_s: float, reach_m: float
-) -> TrafficEnvelope:
+def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) -> TrafficEnvelope:
     """Bound a run's lines of sight up to a reach."""
-    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
+    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(fleet)))
     intervals = max(1, math.ceil(count))
     half_s = 0.5 * duration_s / intervals
     times = (np.arange(intervals) + 0.5) * (2.0 * half_s)
     own_state, states = own.at(times), fleet.at(times)
     own_moves = _moves_m(own.max_speed_mps, half_s)
-    moves = _moves_m(max_speeds_mps(targets), half_s)
+    moves = _moves_m(fleet.max_speeds_mps, half_s)
     _, elevation, range_m = line_of_sight(
         own_state.lat_deg[:, np.newaxis],
         own_state.lon_deg[:, np.newaxis],

@@ -8,14 +8,126 @@ What is found is what looking at every time would find, to the bit.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from components.flights.bounds import intervals_present_s
-from components.flights.sample_times import SampleTimes
+from components.flights.fleet import PieceSearch
 from components.geometry.ellipsoid import line_of_sight
 from dsa_des.arrays.types import FloatArray, IntArray
+
+# -- the times at which distances are compared; none are ever laid out in full: a flight of a month
+# on a grid of tenths of a second has 26 million of them.
+
+_DIGITS = 9
+
+
+def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
+    """Return the times of some places of a regular grid that starts at 0, s.
+
+    They are rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
+    """
+    return np.round(number * step_s, _DIGITS)
+
+
+def regular_count(step_s: float, duration_s: float) -> int:
+    """Return how many places a regular grid over a duration has."""
+    return int(duration_s / step_s) + 1
+
+
+class SampleTimes(Protocol):
+    """Times in order, for each of many targets."""
+
+    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+        """Return the time (n,) of each target's sample of a number, s."""
+
+    def between(
+        self, target: IntArray, first_s: FloatArray, last_s: FloatArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the first and the last sample in [first_s, last_s], all (n,).
+
+        Where there is none, the last is below the first.
+        """
+
+
+@dataclass(frozen=True)
+class RegularTimes:
+    """Every target's times are one grid: 0, step, 2 step, ...
+
+    Parameters
+    ----------
+    step_s : float
+    duration_s : float
+        The last time does not lie after it by more than rounding.
+    """
+
+    step_s: float
+    duration_s: float
+
+    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+        """Return the time of each sample."""
+        return regular_times_s(self.step_s, number)
+
+    def between(
+        self, target: IntArray, first_s: FloatArray, last_s: FloatArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the first and the last sample in each interval."""
+        end = regular_count(self.step_s, self.duration_s) - 1
+        guess = np.minimum(np.maximum(first_s, 0.0), self.duration_s) / self.step_s
+        first = np.maximum(guess.astype(np.int64) - 1, 0)
+        for _ in range(3):  # the division and the rounding are wrong by less than a step each
+            first += self.at(target, first) < first_s
+        guess = np.minimum(np.maximum(last_s, -self.step_s), self.duration_s) / self.step_s
+        last = np.minimum(np.floor(guess).astype(np.int64) + 1, end)
+        for _ in range(3):
+            last -= self.at(target, last) > last_s
+        return first, last
+
+
+@dataclass(frozen=True, eq=False)
+class SharedTimes:
+    """Every target has the same times.
+
+    Parameters
+    ----------
+    times_s : (samples,)
+        Ascending.
+    """
+
+    times_s: FloatArray
+
+    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+        """Return the time of each sample."""
+        return self.times_s[number]
+
+    def between(
+        self, target: IntArray, first_s: FloatArray, last_s: FloatArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the first and the last sample in each interval."""
+        first = np.searchsorted(self.times_s, first_s, side="left")
+        return first, np.searchsorted(self.times_s, last_s, side="right") - 1
+
+
+class OwnTimes:
+    """Every target has times of its own."""
+
+    def __init__(self, times_s: Sequence[FloatArray]) -> None:
+        self._find = PieceSearch.of(times_s)
+
+    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+        """Return the time of each sample."""
+        return self._find.starts_s[self._find.first[target] + number]
+
+    def between(
+        self, target: IntArray, first_s: FloatArray, last_s: FloatArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the first and the last sample in each interval."""
+        times_s, start = self._find.starts_s, self._find.first[target]
+        first, last = self._find(target, first_s), self._find(target, last_s)
+        first += times_s[first] < first_s
+        last -= times_s[last] > last_s
+        return first - start, last - start
+
 
 # As in `near_intervals`: speeds of turns and long legs hold to 2e-4, positions to under a metre.
 _SPEED_MARGIN = 1.001
@@ -118,7 +230,7 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
 
 def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
-    present_s = np.array(present_together_s(source.own, source.targets, end_s))
+    present_s = np.array(present_together_s(source.own, source.targets.intervals_present_s, end_s))
     looked_s = np.array(_looked_at_s(source, *present_s))
     return [
         end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
@@ -136,14 +248,13 @@ def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_
 
 
 def present_together_s(
-    own: Any, targets: Sequence[Any], end_s: float
+    own: Any, intervals_s: FloatArray, end_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last time (targets,) of a run at which both may be there, s."""
-    first, last = intervals_present_s([own])[0].tolist()
-    intervals = intervals_present_s(targets)
+    first, last = own.interval_present()
     return (
-        np.maximum(intervals[:, 0], max(first, 0.0)),
-        np.minimum(intervals[:, 1], min(last, end_s)),
+        np.maximum(intervals_s[:, 0], max(first, 0.0)),
+        np.minimum(intervals_s[:, 1], min(last, end_s)),
     )
 
 

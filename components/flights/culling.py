@@ -6,14 +6,14 @@ target cannot close in by more than their two largest speeds allow. What a row h
 its own epoch and so does not depend on the window that it is in.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from components.flights.bounds import intervals_present_s, max_speeds_mps
+from components.flights.fleet import Fleet
 from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -172,19 +172,18 @@ class Culling:
     def __init__(
         self,
         own: Any,
-        targets: Sequence[Any],
-        fleet: Any,
+        fleet: Fleet,
         reach_m: float,
         end_s: float,
         lasts_s: float = 0.0,
     ) -> None:
         self._fleet, self.lasts_s = fleet, lasts_s
         self.reach_m = reach_m
-        there = intervals_present_s(targets)
+        there = fleet.intervals_present_s
         first, last = own.interval_present()
         self.intervals: NearIntervals = near_intervals(
             partial(range_between, own.at, fleet.each),
-            closing_speed_mps=max_speeds_mps(targets) + own.max_speed_mps,
+            closing_speed_mps=fleet.max_speeds_mps + own.max_speed_mps,
             present_s=(np.maximum(there[:, 0], first), np.minimum(there[:, 1], last)),
             reach_m=reach_m,
             end_s=end_s + lasts_s,
@@ -249,11 +248,9 @@ def within_of(closing_mps: FloatArray, reach_m: float, epoch_s: Any) -> FloatArr
 class SteeredCulling:
     """The targets near an ownship that is steered, by epochs of time."""
 
-    def __init__(
-        self, own_speed_mps: float, targets: Sequence[Any], fleet: Any, reach_m: float
-    ) -> None:
+    def __init__(self, own_speed_mps: float, fleet: Fleet, reach_m: float) -> None:
         self.reach_m, self._fleet = reach_m, fleet
-        self._speeds_mps, self._own_mps = max_speeds_mps(targets), own_speed_mps
+        self._speeds_mps, self._own_mps = fleet.max_speeds_mps, own_speed_mps
         closing = closing_speeds_mps(self._speeds_mps, own_speed_mps)
         self.epoch_s = float(epochs_of(closing[np.newaxis], reach_m)[0])
         #: Ranges at the start of an epoch by its number, for one path of the ownship.
@@ -261,8 +258,8 @@ class SteeredCulling:
         self._own: Any = None
         #: Where all targets are at the starts of some epochs, from the first of them on.
         self._placed: tuple[int, Any] | None = None
-        self._most_epochs = max(1, _CELLS_AT_ONCE // max(1, len(targets)))
-        self._last: tuple[IntArray, Any] = np.arange(len(targets)), fleet
+        self._most_epochs = max(1, _CELLS_AT_ONCE // max(1, len(fleet)))
+        self._last: tuple[IntArray, Any] = np.arange(len(fleet)), fleet
 
     def cut(self, own: Any, time_s: FloatArray) -> tuple[Any, IntArray, Any, BoolArray]:
         """Return the ownship's states, the targets that may be in reach, their fleet, and when."""

@@ -181,10 +181,4 @@ def hold_state(
 
 
 FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
-
-
-def segment_state(segment: Segment, elapsed: FloatArray) -> tuple[FloatArray, ...]:
-    """Evaluate one segment at times since its start."""
-    state = FORMULAS[segment.kind](segment.parameters[:, np.newaxis], elapsed)
-    pitch, roll = (np.full_like(elapsed, a) for a in (segment.pitch_rad, segment.roll_rad))
-    return (*state, pitch, roll)
+KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold")

@@ -11,7 +11,7 @@ from geographiclib.geodesic import Geodesic
 
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
-from components.flights.leg_motion import Kind, Segment, segment_state, turn_parameters
+from components.flights.leg_motion import FORMULAS, Kind, Segment, turn_parameters
 from components.geometry.angles import FloatArray, heading_from_deg
 from components.geometry.ellipsoid import enu_to_geodetic
 
@@ -346,6 +346,7 @@ class LegBuilder:
             self.time += duration
             # The clock's own difference, so that the next leg starts exactly where this one is.
             elapsed = np.array([self.time - segment.start_s])
-            lat, lon, alt, yaw = (float(v[0]) for v in segment_state(segment, elapsed)[:4])
+            state = FORMULAS[kind](table[:, np.newaxis], elapsed)
+            lat, lon, alt, yaw = (float(v[0]) for v in state)
             self.position, self.heading = (lat, lon, alt), yaw
         return duration

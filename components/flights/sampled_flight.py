@@ -1,25 +1,28 @@
-"""A flight known from samples: cubics between them, and nothing beyond them."""
+"""Flights known from samples: cubics between them, and nothing beyond them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from components.flights.attitude import attitude_from_path, fit_path
-from components.geometry.angles import (
-    FloatArray,
-    Vector,
-    local_axes,
-    normal_to_degrees,
-    wrap_difference_rad,
-    wrap_heading_rad,
-    wrap_longitude_deg,
+from components.flights.fleet import (
+    CELLS_AT_ONCE,
+    Fleet,
+    PieceSearch,
+    checked_times,
+    empty_state,
+    in_blocks,
 )
-from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight, radii_of_curvature
+from components.flights.sampled_segments import evaluate_segments, fit_segments, locate
+from components.geometry.angles import FloatArray, Vector, wrap_heading_rad, wrap_longitude_deg
+from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
+from dsa_des.arrays.types import IntArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""
@@ -69,133 +72,6 @@ def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, Flo
 def all_within_limits(columns: Mapping[str, FloatArray]) -> bool:
     """Tell whether no value of any column, of any shape, is one that `checked_samples` refuses."""
     return all(bool((np.abs(array) <= _LIMITS[name][0]).all()) for name, array in columns.items())
-
-
-RAD_PER_DEG = np.pi / 180.0
-
-MOST_ACCELERATION_MPS2 = 20.0
-MISFIT_MPS = 0.5
-MISFIT_MPS2 = 1.0
-"""Measured velocities bend the path of a segment of duration dt only if the mean of the two lies
-within 0.5 m/s + 1 m/s²·dt of the segment's mean velocity (at constant acceleration they are
-equal) and the two differ by less than 20 m/s²·dt + 1 m/s. Real files hold worse, and a wrong
-velocity would bend a path that a straight line leaves good."""
-
-# Rows of the coefficient table: four cubics (normal x, y, z and altitude) and the attitude.
-_ALT, _LAT, _LON, _YAW, _YAW_RATE, _TURN_WITH_LON = 12, 16, 17, 18, 19, 20
-_PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 21, 22, 23, 24
-_ROWS = 25
-
-
-def fit_segments(
-    time_s: FloatArray,
-    place: tuple[FloatArray, FloatArray, FloatArray],
-    attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
-    velocity_enu_mps: Vector | None = None,
-) -> FloatArray:
-    """Tabulate each segment's polynomials, (25, n), or (25, n, aircraft) at the same times.
-
-    The last sample is a segment of its own; place is latitude, longitude (deg) and altitude (m).
-    """
-    lat_deg, lon_deg, alt_m = place
-    yaw_rad, pitch_rad, roll_rad = attitude_rad
-    table = np.zeros((_ROWS, *lat_deg.shape))
-    _, _, normal = local_axes(lat_deg, lon_deg)
-    start = (*normal, alt_m)
-    table[_LAT], table[_LON] = lat_deg, lon_deg
-    table[_YAW], table[_PITCH], table[_ROLL] = attitude_rad
-    duration = np.diff(time_s).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
-    tangents = None
-    if velocity_enu_mps is not None:
-        tangents = _tangents(lat_deg, lon_deg, alt_m, velocity_enu_mps)
-    bent = None if tangents is None else _bent_segments(start, tangents, duration)
-    for row, value in enumerate(start):
-        table[4 * row] = value
-        slope = np.diff(value, axis=0) / duration
-        table[4 * row + 1, :-1] = slope
-        if tangents is not None and bent is not None:
-            m0, m1 = tangents[row][:-1], tangents[row][1:]
-            table[4 * row + 1, :-1] = np.where(bent, m0, slope)
-            second = (3.0 * slope - 2.0 * m0 - m1) / duration
-            third = (m0 + m1 - 2.0 * slope) / (duration * duration)
-            table[4 * row + 2, :-1] = np.where(bent, second, 0.0)
-            table[4 * row + 3, :-1] = np.where(bent, third, 0.0)
-    # Near a pole yaw turns with longitude, by a whole turn for a whole turn, so that it is
-    # yaw minus longitude (plus, in the south) that changes slowly and can be interpolated.
-    turn = np.where(np.abs(lat_deg) > 60.0, np.sign(lat_deg), 0.0)
-    lon_change = wrap_longitude_deg(np.diff(lon_deg, axis=0)) * RAD_PER_DEG
-    yaw_change = wrap_difference_rad(np.diff(yaw_rad, axis=0) - turn[:-1] * lon_change)
-    table[_YAW_RATE, :-1] = yaw_change / duration
-    table[_TURN_WITH_LON] = turn * RAD_PER_DEG
-    table[_PITCH_RATE, :-1] = np.diff(pitch_rad, axis=0) / duration
-    table[_ROLL_RATE, :-1] = wrap_difference_rad(np.diff(roll_rad, axis=0)) / duration
-    return table
-
-
-def _tangents(
-    lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray, velocity_enu_mps: Vector
-) -> tuple[FloatArray, ...]:
-    """Rates of change of the normal's components and of altitude, from the velocity."""
-    east, north, _ = local_axes(lat_deg, lon_deg)
-    meridian, prime_vertical = radii_of_curvature(lat_deg)
-    v_east, v_north, v_up = velocity_enu_mps
-    turn_east = v_east / (prime_vertical + alt_m)
-    turn_north = v_north / (meridian + alt_m)
-    rates = (turn_east * e + turn_north * n for e, n in zip(east, north, strict=True))
-    return (*rates, v_up)
-
-
-def _bent_segments(
-    start: tuple[FloatArray, ...], tangents: tuple[FloatArray, ...], duration: FloatArray
-) -> npt.NDArray[np.bool_]:
-    """Tell which segments' end velocities are plausible beside their mean velocity."""
-    misfit, change = np.zeros_like(duration), np.zeros_like(duration)
-    for row, (value, tangent) in enumerate(zip(start, tangents, strict=True)):
-        to_metres = 1.0 if row == 3 else SEMI_MAJOR_AXIS_M
-        mean = 0.5 * (tangent[1:] + tangent[:-1])
-        misfit = misfit + (to_metres * (np.diff(value, axis=0) / duration - mean)) ** 2
-        change = change + (to_metres * np.diff(tangent, axis=0)) ** 2
-    fits = misfit <= (MISFIT_MPS + MISFIT_MPS2 * duration) ** 2
-    return fits & (change <= (MOST_ACCELERATION_MPS2 * duration + 1.0) ** 2)
-
-
-def locate(
-    sample_times: FloatArray, times: FloatArray
-) -> tuple[npt.NDArray[np.intp], FloatArray, npt.NDArray[np.bool_]]:
-    """Return each time's segment, the time elapsed in it (s), and whether it is within the samples.
-
-    Times outside are moved to the nearest sample.
-    """
-    present = (times >= sample_times[0]) & (times <= sample_times[-1])
-    inside = np.where(times > sample_times[0], times, sample_times[0])
-    inside = np.where(inside < sample_times[-1], inside, sample_times[-1])
-    segment = np.searchsorted(sample_times, inside, side="right") - 1
-    return segment, inside - sample_times[segment], present
-
-
-def evaluate_segments(
-    table: FloatArray, elapsed: FloatArray, present: npt.NDArray[np.bool_]
-) -> TrajectoryState:
-    """Evaluate gathered segments, element by element."""
-    x, y, z, alt = (
-        ((table[r + 3] * elapsed + table[r + 2]) * elapsed + table[r + 1]) * elapsed + table[r]
-        for r in (0, 4, 8, _ALT)
-    )
-    lat, lon = normal_to_degrees(x, y, z)
-    at_sample = elapsed == 0.0
-    lat = np.where(at_sample, table[_LAT], lat)
-    lon = np.where(at_sample, table[_LON], lon)
-    yaw = table[_YAW] + table[_YAW_RATE] * elapsed
-    yaw += table[_TURN_WITH_LON] * wrap_longitude_deg(lon - table[_LON])
-    pitch = table[_PITCH] + table[_PITCH_RATE] * elapsed
-    roll = table[_ROLL] + table[_ROLL_RATE] * elapsed
-    return TrajectoryState(lat, lon, alt, wrap_heading_rad(yaw), pitch, roll, present)
-
-
-__all__ = ["SampledTrajectory", "TrajectoryState", "evaluate_segments", "locate"]
-
-CELLS_AT_ONCE = 8192
-"""Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
 
 
 class SampledTrajectory:
@@ -388,6 +264,67 @@ class SampledTrajectory:
             return mean
         east, north, up = self.velocity_enu_mps
         return 1.5 * mean + float(np.max(np.sqrt(east**2 + north**2 + up**2)))
+
+
+class SampledFleet(Fleet):
+    """Sampled flights; those with the same sample times are looked up once for all of them."""
+
+    def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
+        self._flights = list(trajectories)
+        by_bytes: dict[bytes, list[int]] = {}
+        for i, flight in enumerate(self._flights):
+            by_bytes.setdefault(flight.sample_times_s.tobytes(), []).append(i)
+        self._bases = [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
+        tables = [np.zeros((25, 0)), *(flight.coefficients for flight in self._flights)]
+        self._table = np.ascontiguousarray(np.concatenate(tables, axis=1))
+
+    def __len__(self) -> int:
+        return len(self._flights)
+
+    def __getitem__(self, place: int) -> SampledTrajectory:  # type: ignore[override]
+        return self._flights[place]
+
+    @cached_property
+    def _find(self) -> PieceSearch:
+        return PieceSearch.of([flight.sample_times_s for flight in self._flights])
+
+    def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
+        """Give every aircraft's state at some times."""
+        times, count = checked_times(time_s), len(self)
+        state = empty_state(len(times), count)
+        rows = max(1, CELLS_AT_ONCE // max(1, count))
+        for first in range(0, len(times), rows) if count else ():
+            block = slice(first, first + rows)
+            t = times[block]
+            shape = (len(t), count)
+            index, elapsed = np.empty(shape, dtype=np.intp), np.empty(shape)
+            present = np.empty(shape, dtype=bool)
+            for base, columns in self._bases:
+                segment, since, there = locate(base, t)
+                index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
+                elapsed[:, columns] = since[:, np.newaxis]
+                present[:, columns] = there[:, np.newaxis]
+            values = evaluate_segments(
+                self._table[:, index.reshape(-1)], elapsed.reshape(-1), present.reshape(-1)
+            ).reshaped(shape)
+            for out, value in zip(state.arrays(), values.arrays(), strict=True):
+                out[block] = value
+        return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        return in_blocks(self._state, aircraft, time_s)
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        samples, first, last = self._find.starts_s, self._find.first, self._find.last
+        start, end = samples[first[aircraft]], samples[last[aircraft]]
+        inside = np.where(time_s > start, time_s, start)
+        inside = np.where(inside < end, inside, end)
+        segment = self._find(aircraft, inside)
+        present = (time_s >= start) & (time_s <= end)
+        return evaluate_segments(
+            self._table.take(segment, axis=1), inside - samples[segment], present
+        )
 
 
 def _mean_speed_bound(

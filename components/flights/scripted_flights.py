@@ -1,27 +1,38 @@
-"""Scripted flights: one from a start and legs, or many that only ever fly straight on."""
+"""Flights by scripts: a start and legs, of one aircraft or of many."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
-from math import atan2, cos, inf, isnan, radians
-from typing import overload
+from functools import cached_property
+from math import inf, isfinite, isnan, radians
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from components.flights.geodesic_motion import geodesic_parameter_table
-from components.flights.leg_motion import Segment, segment_state
+from components.flights.fleet import (
+    CELLS_AT_ONCE,
+    Fleet,
+    PieceSearch,
+    checked_times,
+    empty_state,
+    in_blocks,
+)
+from components.flights.leg_motion import FORMULAS, KINDS, Segment
 from components.flights.legs import AnyLeg, LegBuilder, require
-from components.flights.sampled_flight import CELLS_AT_ONCE, TrajectoryState
-from components.geometry.angles import FloatArray, heading_from_deg, wrap_longitude_deg
+from components.geometry.angles import heading_from_deg, wrap_longitude_deg
 from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry.state import TrajectoryState
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
 """Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
 MOST_ALT_M = 1e6
 """No flight starts farther above or below the ellipsoid."""
+
+_STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
 
 
 class ScriptedTrajectory:
@@ -29,7 +40,7 @@ class ScriptedTrajectory:
 
     Nothing is integrated, so there is no drift. Straight legs follow the geodesic of the WGS-84
     ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed
-    is measured at the flight's own altitude. Turns are circles (see `turn_motion`).
+    is measured at the flight's own altitude. Turns are circles (see `turn_parameters`).
 
     Parameters
     ----------
@@ -80,36 +91,22 @@ class ScriptedTrajectory:
         end_time_s: float | None = None,
     ) -> None:
         given = {
-            "lat_deg": lat_deg,
-            "lon_deg": lon_deg,
-            "alt_m": alt_m,
-            "heading_deg": heading_deg,
-            "speed_mps": speed_mps,
-            "climb_mps": climb_mps,
-            "yaw_deg": yaw_deg,
-            "pitch_deg": pitch_deg,
-            "roll_deg": roll_deg,
-            "start_time_s": start_time_s,
-        }
+            "lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m, "heading_deg": heading_deg,
+            "speed_mps": speed_mps, "climb_mps": climb_mps, "yaw_deg": yaw_deg,
+            "pitch_deg": pitch_deg, "roll_deg": roll_deg, "start_time_s": start_time_s,
+        }  # fmt: skip
         for key, value in given.items():
             if value is not None:
-                require(math.isfinite(value), f"{name}: {key}", value, "be finite")
+                require(isfinite(value), f"{name}: {key}", value, "be finite")
         require(abs(lat_deg) <= 90.0, f"{name}: lat_deg", lat_deg, "lie in [-90, 90] degrees")
         require(abs(alt_m) <= MOST_ALT_M, f"{name}: alt_m", alt_m, "lie within ±1e6 metres")
         require(speed_mps >= 0.0, f"{name}: speed_mps", speed_mps, "be 0 or more")
-        end = math.inf if end_time_s is None else float(end_time_s)
+        end = inf if end_time_s is None else float(end_time_s)
         require(end >= start_time_s, f"{name}: end_time_s", end, f"be {start_time_s} or more")
-        self.name = name
-        self.start_time_s, self.end_time_s = float(start_time_s), end
-        self.evaluated_until_s = min(end, self.start_time_s + LONGEST_FLIGHT_S)
-        self.fixed_attitude_rad = tuple(
-            None if angle is None else math.radians(angle)
-            for angle in (None if yaw_deg is None else yaw_deg % 360.0, pitch_deg, roll_deg)
-        )
         if not -180.0 <= lon_deg < 180.0:
             lon_deg = float(wrap_longitude_deg(np.array([lon_deg]))[0])
         start = (float(lat_deg), float(lon_deg), float(alt_m))
-        self.segments: list[Segment] = LegBuilder(
+        segments = LegBuilder(
             name=name,
             start=start,
             heading_rad=heading_from_deg(heading_deg),
@@ -117,27 +114,9 @@ class ScriptedTrajectory:
             climb_mps=float(climb_mps),
             reference=start if reference is None else reference,
         ).build(legs)
-        self._segment_starts_s = np.array([segment.start_s for segment in self.segments])
-
-    @classmethod
-    def of_segments(
-        cls,
-        name: str,
-        segments: list[Segment],
-        *,
-        fixed_attitude_rad: tuple[float | None, float | None, float | None],
-        start_time_s: float,
-        end_time_s: float,
-    ) -> ScriptedTrajectory:
-        """Return a flight whose segments are known already."""
-        flight = cls.__new__(cls)
-        flight.name = name
-        flight.start_time_s, flight.end_time_s = start_time_s, end_time_s
-        flight.evaluated_until_s = min(end_time_s, start_time_s + LONGEST_FLIGHT_S)
-        flight.fixed_attitude_rad = fixed_attitude_rad
-        flight.segments = segments
-        flight._segment_starts_s = np.array([segment.start_s for segment in segments])
-        return flight
+        angles = (None if yaw_deg is None else yaw_deg % 360.0, pitch_deg, roll_deg)
+        fixed = tuple(None if angle is None else radians(angle) for angle in angles)
+        self._set(name, segments, fixed, float(start_time_s), end)
 
     @classmethod
     def from_offset(
@@ -148,226 +127,280 @@ class ScriptedTrajectory:
         north_m: float,
         up_m: float,
         reference: tuple[float, float, float],
-        **others: object,
+        **others: Any,
     ) -> ScriptedTrajectory:
-        """Start at an offset from a reference point, usually the ownship's start.
+        """Start at an offset in a reference point's tangent frame, usually the ownship's start.
 
-        Parameters
-        ----------
-        name : str
-            The aircraft's name.
-        east_m, north_m, up_m : float
-            Metres in the reference point's tangent frame, so that the slant range at the start
-            is exactly the offset's length. The altitude of a point with up 0 exceeds the
-            reference's by 7.8 m at 10 km, 0.2 m at 1.6 km.
-        reference : tuple of three float
-            Latitude and longitude in degrees, altitude in metres.
-        **others
-            As for `ScriptedTrajectory`.
-
-        Returns
-        -------
-        ScriptedTrajectory
+        The slant range at the start is exactly the offset's length; the altitude of a point with
+        up 0 exceeds the reference's by 7.8 m at 10 km. `others` are as for `ScriptedTrajectory`.
         """
+        lat_deg, lon_deg, alt_m = reference
         lat, lon, alt = enu_to_geodetic(
-            east_m,
-            north_m,
-            up_m,
-            reference_lat_deg=reference[0],
-            reference_lon_deg=reference[1],
-            reference_alt_m=reference[2],
-        )
-        return cls(
-            name,
-            lat_deg=float(lat),
-            lon_deg=float(lon),
-            alt_m=float(alt),
-            reference=reference,
-            **others,  # type: ignore[arg-type]
-        )
+            east_m, north_m, up_m,
+            reference_lat_deg=lat_deg, reference_lon_deg=lon_deg, reference_alt_m=alt_m,
+        )  # fmt: skip
+        place: Any = {"lat_deg": float(lat), "lon_deg": float(lon), "alt_m": float(alt)}
+        return cls(name, **place, reference=reference, **others)
+
+    @classmethod
+    def of_segments(
+        cls,
+        name: str,
+        segments: list[Segment],
+        fixed_attitude_rad: tuple[float | None, ...],
+        start_time_s: float,
+        end_time_s: float,
+    ) -> ScriptedTrajectory:
+        """Return a flight whose segments are known already."""
+        flight = cls.__new__(cls)
+        flight._set(name, segments, fixed_attitude_rad, start_time_s, end_time_s)
+        return flight
+
+    def _set(
+        self,
+        name: str,
+        segments: list[Segment],
+        fixed_attitude_rad: tuple[float | None, ...],
+        start_time_s: float,
+        end_time_s: float,
+    ) -> None:
+        self.name, self.segments, self.fixed_attitude_rad = name, segments, fixed_attitude_rad
+        self.start_time_s, self.end_time_s = start_time_s, end_time_s
+
+    @cached_property
+    def as_fleet(self) -> ScriptedFleet:
+        """The flight as a fleet of one."""
+        return ScriptedFleet([self])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
-        flat = np.ascontiguousarray(times).reshape(-1)
-        if len(flat) > CELLS_AT_ONCE:
-            cuts = range(CELLS_AT_ONCE, len(flat), CELLS_AT_ONCE)
-            parts = [self.at(part).arrays() for part in np.split(flat, cuts)]
-            whole = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
-            return TrajectoryState(*whole).reshaped(times.shape)
-        present = (flat >= self.start_time_s) & (flat <= self.end_time_s)
-        elapsed = np.maximum(flat, self.start_time_s)
-        np.minimum(elapsed, self.evaluated_until_s, out=elapsed)
-        elapsed -= self.start_time_s
-        if len(self.segments) == 1:
-            columns = segment_state(self.segments[0], elapsed)
-        else:
-            index = np.searchsorted(self._segment_starts_s, elapsed, side="right") - 1
-            columns = tuple(np.empty_like(flat) for _ in range(6))
-            # Counting is many times faster than np.unique, which hashes.
-            for k in np.flatnonzero(np.bincount(index)):
-                chosen = index == k
-                segment = self.segments[k]
-                state = segment_state(segment, elapsed[chosen] - segment.start_s)
-                for column, values in zip(columns, state, strict=True):
-                    column[chosen] = values
-        lat, lon, alt, *attitude = columns
-        yaw, pitch, roll = (
-            derived if fixed is None else np.full_like(flat, fixed)
-            for derived, fixed in zip(attitude, self.fixed_attitude_rad, strict=True)
-        )
-        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present).reshaped(times.shape)
+        return self.as_fleet.at(times.reshape(-1)).reshaped(times.shape)
 
     @property
     def max_speed_mps(self) -> float:
         """Largest speed along the path at any time."""
-        return max((segment.speed_mps for segment in self.segments), default=0.0)
+        return max(segment.speed_mps for segment in self.segments)
 
     def interval_present(self) -> tuple[float, float]:
         """Return the first and last times the aircraft is there; the last may be infinite."""
         return self.start_time_s, self.end_time_s
 
 
-@dataclass(eq=False)
-class Starts:
-    """Where and how straight flights start, as columns; units of `ScriptedTrajectory`.
+class ScriptedFleet(Fleet):
+    """Scripted flights: columns over flights, and over all their legs laid end to end."""
 
-    Parameters
-    ----------
-    names : sequence of str
-    lat_deg, lon_deg, alt_m, heading_deg, speed_mps : (flights,)
-    climb_mps, start_time_s : (flights,), optional
-        0 by default.
-    end_time_s : (flights,), optional
-        Infinite by default.
-    fixed_deg : (3, flights), optional
-        Fixed yaw, pitch and roll; NaN, the default, where they follow from the motion.
-    """
+    def __init__(self, flights: Sequence[ScriptedTrajectory]) -> None:
+        segments = [segment for flight in flights for segment in flight.segments]
+        kinds = np.array([KINDS.index(s.kind) for s in segments], dtype=np.int64)
+        fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]
+        legs = [(s.start_s, s.pitch_rad, s.roll_rad, s.speed_mps) for s in segments]
+        self._set(
+            [flight.name for flight in flights],
+            np.array([(f.start_time_s, f.end_time_s) for f in flights]).reshape(-1, 2).T.copy(),
+            np.array(fixed).reshape(-1, 3).T.copy(),
+            np.array([len(flight.segments) for flight in flights], dtype=np.int64),
+            np.array(legs).reshape(-1, 4).T.copy(),
+            kinds,
+            {
+                kind: np.stack([segments[i].parameters for i in np.flatnonzero(kinds == kind)], -1)
+                for kind in np.bincount(kinds).nonzero()[0].tolist()  # np.unique imports np.ma
+            },
+        )
 
-    names: Sequence[str]
-    lat_deg: FloatArray
-    lon_deg: FloatArray
-    alt_m: FloatArray
-    heading_deg: FloatArray
-    speed_mps: FloatArray
-    climb_mps: FloatArray | None = None
-    start_time_s: FloatArray | None = None
-    end_time_s: FloatArray | None = None
-    fixed_deg: FloatArray | None = None
+    def _set(
+        self,
+        names: Sequence[str],
+        between_s: FloatArray,
+        fixed_rad: FloatArray,
+        counts: IntArray,
+        legs: FloatArray,
+        kinds: IntArray,
+        tables: dict[int, FloatArray],
+    ) -> None:
+        """Take times there (2, flights), numbers of legs, and of legs start, pitch, roll, speed.
+
+        Fixed angles (3, flights) are NaN where the motion gives them; the table of each kind of
+        legs holds those of that kind, in their order.
+        """
+        self._names, self._between_s, self._fixed_rad = names, between_s, fixed_rad
+        self._until_s = np.minimum(between_s[1], between_s[0] + LONGEST_FLIGHT_S)
+        self._counts, self._legs, self._kind, self._tables = counts, legs, kinds, tables
+        self._find = PieceSearch(legs[0], counts)
+        self._slot = np.empty(len(kinds), dtype=np.int64)
+        for kind in tables:
+            members = np.flatnonzero(kinds == kind)
+            self._slot[members] = np.arange(len(members))
+        #: Which of all flights are those of this fleet: subsets share all else.
+        self._columns: IntArray = np.arange(len(names))
+
+    @classmethod
+    def of_columns(cls, *columns: Any) -> ScriptedFleet:
+        """Return flights whose columns are known already; see `_set`."""
+        found = cls.__new__(cls)
+        found._set(*columns)
+        return found
+
+    @classmethod
+    def joined(cls, one: ScriptedFleet, other: ScriptedFleet) -> ScriptedFleet:
+        """Return the flights of two fleets that are no subsets, `other` after `one`."""
+        both = (one, other)
+        names = ("_between_s", "_fixed_rad", "_counts", "_legs", "_kind")
+        columns = [np.concatenate([getattr(f, name) for f in both], axis=-1) for name in names]
+        tables = {
+            kind: np.concatenate([f._tables[kind] for f in both if kind in f._tables], axis=-1)
+            for kind in one._tables | other._tables
+        }
+        return cls.of_columns([*one._names, *other._names], *columns, tables)
+
+    def subset(self, columns: IntArray) -> ScriptedFleet:
+        """Return the fleet of some flights, without preparing them anew."""
+        fleet = copy(self)
+        fleet.__dict__.pop("_parts", None)
+        fleet._columns = self._columns[columns]
+        return fleet
 
     def __len__(self) -> int:
-        return len(self.names)
+        return len(self._columns)
 
-    def column(self, name: str, default: float) -> FloatArray:
-        """Return a column, of the default where it is left out."""
-        given = getattr(self, name)
-        return np.full(len(self), default) if given is None else given
+    def __getitem__(self, place: int) -> ScriptedTrajectory:  # type: ignore[override]
+        number = int(self._columns[place])
+        first, last = int(self._find.first[number]), int(self._find.last[number])
+        legs = enumerate(self._legs[:, first : last + 1].T.tolist(), first)
+        segments = []
+        for leg, (start_s, *others) in legs:
+            kind = int(self._kind[leg])
+            table = self._tables[kind][:, self._slot[leg]].copy()
+            segments.append(Segment(KINDS[kind], start_s, table, *others))
+        fixed = tuple(None if isnan(a) else a for a in self._fixed_rad[:, number].tolist())
+        between_s = self._between_s[:, number].tolist()
+        return ScriptedTrajectory.of_segments(self._names[number], segments, fixed, *between_s)
 
-    def flight(self, number: int) -> ScriptedTrajectory:
-        """Return one of the flights, made by itself."""
-        fixed = (np.nan,) * 3 if self.fixed_deg is None else self.fixed_deg[:, number].tolist()
-        yaw, pitch, roll = (None if isnan(angle) else angle for angle in fixed)
-        end_s = float(self.column("end_time_s", inf)[number])
-        return ScriptedTrajectory(
-            self.names[number],
-            lat_deg=float(self.lat_deg[number]),
-            lon_deg=float(self.lon_deg[number]),
-            alt_m=float(self.alt_m[number]),
-            heading_deg=float(self.heading_deg[number]),
-            speed_mps=float(self.speed_mps[number]),
-            climb_mps=float(self.column("climb_mps", 0.0)[number]),
-            yaw_deg=yaw,
-            pitch_deg=pitch,
-            roll_deg=roll,
-            start_time_s=float(self.column("start_time_s", 0.0)[number]),
-            end_time_s=None if end_s == inf else end_s,
-        )
-
-
-class StraightFlights(Sequence[ScriptedTrajectory]):
-    """Flights without legs; an item is made when it is asked for."""
-
-    def __init__(self, starts: Starts) -> None:
-        self.names = starts.names
-        #: First and last time at which each is there, shape (flights,).
-        self.start_s = starts.column("start_time_s", 0.0)
-        self.end_s = starts.column("end_time_s", inf)
-        self.until_s = np.minimum(self.end_s, self.start_s + LONGEST_FLIGHT_S)
-        lon = starts.lon_deg
-        lon = np.where((lon >= -180.0) & (lon < 180.0), lon, wrap_longitude_deg(lon))
-        speeds, climbs = starts.speed_mps.tolist(), starts.column("climb_mps", 0.0).tolist()
-        pitches = list(map(atan2, climbs, speeds))
-        #: The table of `geodesic_state`, shape (rows, flights).
-        self.table: FloatArray = geodesic_parameter_table(
-            starts.lat_deg,
-            lon,
-            starts.alt_m,
-            [heading_from_deg(heading) for heading in starts.heading_deg.tolist()],
-            speeds,
-            climbs,
-        )
-        #: The attitude that follows from the motion, shape (flights,).
-        self.pitch_rad = np.array(pitches, dtype=np.float64)
-        #: Fixed yaw, pitch and roll, NaN where the motion gives them, shape (3, flights).
-        self.fixed_rad = np.full((3, len(starts)), np.nan)
-        if starts.fixed_deg is not None:
-            yaw, pitch, roll = starts.fixed_deg.tolist()
-            self.fixed_rad[0] = [heading_from_deg(angle) for angle in yaw]
-            self.fixed_rad[1:] = [list(map(radians, pitch)), list(map(radians, roll))]
-        #: Largest speed of each along its path, shape (flights,).
-        self.max_speeds_mps = starts.speed_mps / np.array(list(map(cos, pitches)))
+    @property
+    def max_speeds_mps(self) -> FloatArray:
+        """Largest speed of each along its path, shape (flights,)."""
+        if not len(self._names):
+            return np.empty(0)
+        return np.asarray(np.maximum.reduceat(self._legs[3], self._find.first)[self._columns])
 
     @property
     def intervals_present_s(self) -> FloatArray:
         """First and last time at which each is there, shape (flights, 2)."""
-        return np.stack((self.start_s, self.end_s), axis=1)
+        return self._between_s[:, self._columns].T
 
-    def __len__(self) -> int:
-        return len(self.names)
+    @property
+    def fixed_rad(self) -> FloatArray:
+        """Fixed yaw, pitch and roll of each, NaN where the motion gives them, (3, flights)."""
+        return self._fixed_rad[:, self._columns]
 
-    @overload
-    def __getitem__(self, place: int) -> ScriptedTrajectory: ...
-    @overload
-    def __getitem__(self, place: slice) -> list[ScriptedTrajectory]: ...
+    def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
+        """Give every aircraft's state at some times."""
+        times = checked_times(time_s)
+        state = empty_state(len(times), len(self))
+        groups, others = self._parts
+        for group in groups:
+            group.fill(state, times)
+        if len(others):
+            shape = len(times), len(others)
+            aircraft = np.broadcast_to(others, shape).reshape(-1)
+            several = self.each(aircraft, np.repeat(times, len(others))).reshaped(shape)
+            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
+                out[:, others] = columns
+        return state
 
-    def __getitem__(self, place: int | slice) -> ScriptedTrajectory | list[ScriptedTrajectory]:
-        if isinstance(place, slice):
-            return [self[i] for i in range(*place.indices(len(self)))]
-        number = range(len(self))[place]
-        segment = Segment(
-            "geodesic", 0.0, self.table[:, number].copy(), float(self.pitch_rad[number]), 0.0,
-            float(self.max_speeds_mps[number]),
-        )  # fmt: skip
-        fixed = [None if np.isnan(a) else a for a in self.fixed_rad[:, number].tolist()]
-        return ScriptedTrajectory.of_segments(
-            self.names[number],
-            [segment],
-            fixed_attitude_rad=(fixed[0], fixed[1], fixed[2]),
-            start_time_s=float(self.start_s[number]),
-            end_time_s=float(self.end_s[number]),
-        )
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        return in_blocks(self._state, self._columns[aircraft], time_s)
 
-    def __iter__(self) -> Iterator[ScriptedTrajectory]:
-        return (self[number] for number in range(len(self)))
+    def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the leg that each of all flights is on at a time, and since when, s."""
+        start_s, until_s = self._between_s[0][aircraft], self._until_s[aircraft]
+        elapsed = np.where(time_s > start_s, time_s, start_s)
+        elapsed = np.where(elapsed < until_s, elapsed, until_s) - start_s
+        leg = self._find(aircraft, elapsed)
+        elapsed -= self._find.starts_s[leg]
+        return leg, elapsed
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        leg, elapsed = self._legs_at(aircraft, time_s)
+        lat, lon, alt, yaw = (np.empty(len(aircraft)) for _ in range(4))
+        for kind, formula in enumerate(FORMULAS.values()):
+            if kind not in self._tables:
+                continue
+            chosen: slice | IntArray = slice(None)
+            if len(self._tables) > 1:
+                chosen = np.flatnonzero(self._kind[leg] == kind)
+            table = self._tables[kind].take(self._slot[leg[chosen]], axis=1)
+            values = formula(table, np.ascontiguousarray(elapsed[chosen]))
+            for out, value in zip((lat, lon, alt, yaw), values, strict=True):
+                out[chosen] = value
+        derived = (yaw, self._legs[1][leg], self._legs[2][leg])
+        attitude = [
+            np.where(np.isnan(given[aircraft]), angle, given[aircraft])
+            for given, angle in zip(self._fixed_rad, derived, strict=True)
+        ]
+        first_s, last_s = self._between_s
+        present = (time_s >= first_s[aircraft]) & (time_s <= last_s[aircraft])
+        return TrajectoryState(lat, lon, alt, attitude[0], attitude[1], attitude[2], present)
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return single aircraft's speeds over ground (n,), each at a time (n,) of its own."""
+        leg, _ = self._legs_at(self._columns[aircraft], time_s)
+        level = self._legs[3][leg] * np.cos(self._legs[1][leg])
+        return np.where(self._kind[leg] == _HOLD, 0.0, level)
+
+    @cached_property
+    def _parts(self) -> tuple[list[_Group], IntArray]:
+        """Flights of one leg each, straight or held, by formula; and the others' places."""
+        flights = self._columns
+        leg = self._find.first[flights]
+        kinds = np.where(self._counts[flights] == 1, self._kind[leg], -1)
+        groups = []
+        for kind in (_STRAIGHT, _HOLD):
+            members = np.flatnonzero(kinds == kind)
+            if not len(members):
+                continue
+            of, legs = flights[members], leg[members]
+            fixed = self._fixed_rad[:, of]
+            derived = np.stack((np.full(len(of), np.nan), *self._legs[1:3, legs]))
+            groups.append(
+                _Group(
+                    FORMULAS[KINDS[kind]],
+                    slice(None) if len(members) == len(flights) else members,
+                    self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
+                    (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
+                    np.where(np.isnan(fixed), derived, fixed),
+                    ~np.isnan(fixed[0]),
+                )
+            )
+        return groups, np.flatnonzero((kinds != _STRAIGHT) & (kinds != _HOLD))
 
 
-def flights_of(starts: Starts) -> Sequence[ScriptedTrajectory]:
-    """Return flights without legs, together where that can be, else each by itself."""
-    if are_plain(starts):
-        return StraightFlights(starts)
-    return [starts.flight(number) for number in range(len(starts))]
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Flights of one leg each that share a formula: one array expression."""
 
+    formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
+    columns: slice | IntArray
+    table: FloatArray
+    times_s: tuple[FloatArray, FloatArray, FloatArray]
+    attitude: FloatArray
+    yaw_is_fixed: BoolArray
 
-def are_plain(starts: Starts) -> bool:
-    """Return whether all flights move, and have no value that `ScriptedTrajectory` refuses."""
-    start_s = starts.column("start_time_s", 0.0)
-    others = (starts.lon_deg, starts.heading_deg, starts.column("climb_mps", 0.0), start_s)
-    fixed = starts.fixed_deg
-    return bool(
-        np.all(np.isfinite(starts.speed_mps) & (starts.speed_mps > 0.0))
-        and np.all(np.abs(starts.lat_deg) <= 90.0)
-        and np.all(np.abs(starts.alt_m) <= MOST_ALT_M)
-        and np.all(starts.column("end_time_s", inf) >= start_s)
-        and all(np.isfinite(column).all() for column in others)
-        and (fixed is None or not np.isinf(fixed).any())
-    )
+    def fill(self, state: TrajectoryState, times: FloatArray) -> None:
+        """Write the group's columns of the state."""
+        start_s, end_s, until_s = self.times_s
+        rows = max(1, CELLS_AT_ONCE // len(start_s))
+        fixed_yaw, pitch, roll = self.attitude
+        for first in range(0, len(times), rows):
+            block = slice(first, first + rows)
+            t = times[block, np.newaxis]
+            inside = np.maximum(t, start_s)
+            np.minimum(inside, until_s, out=inside)
+            inside -= start_s
+            lat, lon, alt, yaw = self.formula(self.table, inside)
+            if self.yaw_is_fixed.any():
+                yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
+            values = (lat, lon, alt, yaw, pitch, roll, (t >= start_s) & (t <= end_s))
+            for out, value in zip(state.arrays(), values, strict=True):
+                out[block, self.columns] = value

@@ -1,4 +1,4 @@
-"""Flights that are steered while they are flown, and flights of any kind asked together."""
+"""A flight that is steered while it is flown."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
+from components.flights.fleet import in_rows
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
@@ -29,6 +30,9 @@ class Trajectory(Protocol):
     @property
     def max_speed_mps(self) -> float:
         """Largest speed along its path."""
+
+    def interval_present(self) -> tuple[float, float]:
+        """Return the first and the last time at which it is there."""
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return its state at some times."""
@@ -74,6 +78,10 @@ class SteeredFlight:
         """Largest speed along the path as it is now."""
         return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
 
+    def interval_present(self) -> tuple[float, float]:
+        """Return from when to when it is there: from 0 on, as what is flown has no end."""
+        return 0.0, math.inf
+
     def fastest_by(self, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre that has begun by each of some times, or 0."""
         speeds = [0.0, *(flight.max_speed_mps for _, flight in self.parts)]
@@ -105,10 +113,7 @@ class SteeredFlight:
             return state
         chosen = [np.flatnonzero(part == number) for number in flown]
         states = [flights[k].at(flat[rows]) for k, rows in zip(flown, chosen, strict=True)]
-        # In order of time, rows of one flight follow those of another; others are put in place.
-        order = np.argsort(np.concatenate(chosen), kind="stable")
-        columns = zip(*(state.arrays() for state in states), strict=True)
-        return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
+        return in_rows(chosen, states).reshaped(times.shape)
 
 
 class Turning(NamedTuple):

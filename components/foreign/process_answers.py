@@ -8,7 +8,7 @@ import numpy as np
 from components.aircraft.aircraft import Roster
 from components.estimation.measurement import direction
 from components.foreign.reported_look import reported_looks
-from components.messages.columns import FrameOrigin, PositionAndVelocity
+from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import CONFIRMED, COVARIANCE, EXTRAS, STATUSES, StateTracks
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
@@ -17,9 +17,6 @@ from dsa_des.block.message import Message
 from dsa_des.errors import did_you_mean
 
 _LINE = ("azimuth_rad", "elevation_rad", "range_m")
-_STATE = tuple(PositionAndVelocity.__dataclass_fields__)
-_ORIGIN = tuple(FrameOrigin.__dataclass_fields__)
-_OWN = ("own_north_m", "own_east_m", "own_down_m")
 _DIRECTION = (
     "azimuth_rad", "elevation_rad", "azimuth_variance_rad2", "elevation_variance_rad2"
 )  # fmt: skip
@@ -28,7 +25,7 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "manoeuvres": ("turn_rad", "rate_rad_s"),
     "detections": _LINE[:2],
     "tracks": ("target", *_LINE),
-    "state_tracks": ("track", *_STATE, *COVARIANCE.values(), *_ORIGIN, *_OWN),
+    "state_tracks": ("track", *STATE, *COVARIANCE.values(), *ORIGIN, *OWN_POSITION),
 }
 _TEXTS = ("target", "track_status", "block", "contributors", "updated_by")
 
@@ -96,10 +93,10 @@ def _state_tracks(
 ) -> StateTracks:
     """Return tracks with states; what they do not say of direction follows from the state."""
     count, now_s = table.num_rows, float(tick[0]) / ticks_per_s
-    state = np.stack([numbers[name] for name in _STATE])
+    state = np.stack([numbers[name] for name in STATE])
     covariance = {place: numbers[name] for place, name in COVARIANCE.items()}
     ranged: BoolArray = np.asarray(np.isfinite(state).all(axis=0))
-    for name in (*_ORIGIN, *_OWN):
+    for name in (*ORIGIN, *OWN_POSITION):
         if not np.isfinite(numbers[name]).all():
             raise ValueError(f"column {name!r}: finite numbers are needed")
     for (i, j), name in COVARIANCE.items():
@@ -107,7 +104,7 @@ def _state_tracks(
         if (bad & ranged).any():
             what = "a variance of at least 0" if i == j else "a finite number"
             raise ValueError(f"column {name!r}: {what} is needed where there is a state")
-    own = np.stack([numbers[name] for name in _OWN])
+    own = np.stack([numbers[name] for name in OWN_POSITION])
     with np.errstate(invalid="ignore"):
         line = direction(state[:3] - own, covariance)
         seen: dict[str, Any] = dict(zip(_DIRECTION, line, strict=True))
@@ -125,7 +122,7 @@ def _state_tracks(
         state_s=numbers.get("state_s", np.full(count, now_s)),
         updated_s=numbers.get("updated_s", np.full(count, now_s)),
         contributors=one, updated_by=one, sensors=(block,), **seen,
-        **cast("dict[str, Any]", {name: numbers[name] for name in (*_STATE, *_ORIGIN, *_OWN)}),
+        **cast("dict[str, Any]", {n: numbers[n] for n in (*STATE, *ORIGIN, *OWN_POSITION)}),
         covariance={name: numbers[name] for name in COVARIANCE.values()},
         extras={name: numbers[name] for name in EXTRAS if name in numbers},
         nis=np.full(count, np.nan), nis_freedom=np.zeros(count, dtype=np.int64),

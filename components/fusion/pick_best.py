@@ -129,14 +129,15 @@ class PickBest(Fusion):
         true = {name: true_entries(new.message) for name, new in reported.items()}
         all_true = all(true[name] is new.message for name, new in reported.items())
         if not all_true:
-            arrivals = {n: Arrivals(n, new.tick, true[n]) for n, new in reported.items()}
+            arrivals = {n: Arrivals(n, new.instants, true[n]) for n, new in reported.items()}
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake, width) for new in arrivals.values()]
         # A sensor reports in an order that tells nothing of the targets.
-        in_order = [np.sort(key) for key in keys] if len(wake) > 1 else []
+        in_order = [np.sort(key, kind="stable") for key in keys] if len(wake) > 1 else []
         union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)
-        row, target = np.divmod(union, width)
+        row = union // width
+        target = union - row * width
         if self.gate_ticks:
             arrivals = self.with_recent(arrivals, wake)
             entries = {

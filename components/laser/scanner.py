@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -18,25 +17,20 @@ from components.laser.link import (
     target_share,
     wire_share,
 )
-from components.messages.detections import OwnOfEntries
-from components.messages.reach import farthest_look
-from components.messages.targets import RelativeTargets
 from components.optical.area_of_cells import area_of_cells
 from components.optical.detection import detection_probability, deviations_exceeded
 from components.optical.weather_effects import obscuration
-from components.radar.beam import BeamSweep, Sweep
+from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
-from components.sensor.sensor import Sensor
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Component
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
-from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 
 _PD = Quantity("detection_probability", "Pd")
@@ -122,12 +116,15 @@ class LaserParameters(SensorParameters):
         return said
 
 
-class LaserExtinction(Effect):
+EXTINCTION = Hook("extinction", float, "extinction by the air at the laser's wavelength, 1/m")
+
+
+class LaserExtinction(Effect[float]):
     """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
 
     lockstep = True
     name = "laser extinction"
-    acts_on = "extinction"
+    acts_on = EXTINCTION
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
@@ -185,7 +182,7 @@ SHOTS = Ladder(
 )
 
 
-class ScanningLaser(Sensor):
+class ScanningLaser(SweepingSensor):
     """A laser that scans a narrow field and ranges by time of flight.
 
     Echoes follow the laser range equation (`components.laser.link`) for a target larger than the
@@ -202,9 +199,8 @@ class ScanningLaser(Sensor):
     lockstep = True
     Parameters = LaserParameters
     inputs = CUED_INPUTS
-    hooks = {"extinction": "extinction by the air at the laser's wavelength, 1/m"}
+    hooks = (EXTINCTION,)
     effects: ClassVar[tuple[Effect, ...]] = (LaserExtinction(), BeamSweep())
-    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
     ladders = (SHOTS,)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -221,30 +217,7 @@ class ScanningLaser(Sensor):
     def setup(self) -> None:
         """Take what the scene's air does to a pulse, and refuse cues."""
         refuse_cues(self, "its pattern is fixed, with one threshold")
-        (self._extinction_per_m,) = self.built("extinction") or [0.0]
-
-    @property
-    def _sweep(self) -> Sweep | None:
-        return self.context.effects.get(BeamSweep.name)
-
-    def records(self) -> list[type[Message]]:
-        """Return what is recorded: where columns sweep, the ownship at each entry's instant."""
-        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
-
-    def request(self, port: str) -> Any:
-        """Ask for the targets in our reach; a sweep decides for itself when that is."""
-        reach = super().request(port)
-        if self._sweep is None or not self.p.enabled:
-            return reach
-        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
-
-    def seen(
-        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
-    ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets at the instants at which their columns are shot."""
-        if self._sweep is None:
-            return targets, rows
-        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+        self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
 
     def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
         """Return each cell's amplitude over noise in one shot, and the mean shots of a scan."""

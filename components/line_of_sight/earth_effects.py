@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,14 +16,27 @@ from components.terrain.rays import (
     miss_bound_m,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 _PLACE = ("lat_deg", "lon_deg", "alt_m")
 
-#: (own, other, present) -> whether each target is hidden.
-Hides = Callable[[Any, Any, BoolArray], BoolArray]
-#: (own, seen, attitude model) -> seen, along bent rays.
-Bends = Callable[[Any, SeenFromOwnship, str], SeenFromOwnship]
+
+class Hides(Protocol):
+    """Tells which targets something stands before."""
+
+    def __call__(self, own: Any, other: Any, present: BoolArray, /) -> BoolArray:
+        """Return which of the targets that are `present` are hidden, from states of both."""
+
+
+class Bends(Protocol):
+    """Bends rays."""
+
+    def __call__(self, own: Any, seen: SeenFromOwnship, attitude: str, /) -> SeenFromOwnship:
+        """Return lines of sight along bent rays, by a model of the `attitude`."""
+
+
+HIDES = Hook("hides", Hides, "which targets something stands before")
+BENDS = Hook("bends", Bends, "seen: lines of sight along bent rays")
 
 
 def terrain_section(block: Any) -> Terrain:
@@ -32,12 +45,11 @@ def terrain_section(block: Any) -> Terrain:
     return Terrain() if terrain is None else terrain
 
 
-class Limb(Effect):
+class Limb(Effect[Hides]):
     """The Earth's limb hides what lies behind it."""
 
     name = "Earth's horizon"
-    acts_on = "hides"
-    neutral = False
+    acts_on = HIDES
     outside_the_proof = "an Earth that hides nothing is none"
     lockstep = True
 
@@ -62,12 +74,11 @@ class Limb(Effect):
         return hides
 
 
-class Mountains(Effect):
+class Mountains(Effect[Hides]):
     """The ground of an elevation raster hides what lies behind it."""
 
     name = "masking by the ground"
-    acts_on = "hides"
-    neutral = False
+    acts_on = HIDES
     outside_the_proof = "without a raster there is no ground"
     lockstep = True
 
@@ -100,12 +111,11 @@ class Mountains(Effect):
         return hides
 
 
-class Refraction(Effect):
+class Refraction(Effect[Bends]):
     """The air bends rays, and targets appear above where they are."""
 
     name = "refraction"
-    acts_on = "bends"
-    neutral = False
+    acts_on = BENDS
     outside_the_proof = "angles are formed anew, and their last bits differ"
     lockstep = True
 

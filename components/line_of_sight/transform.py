@@ -1,7 +1,6 @@
 """The ladders of the coordinate transform: the Earth's shape, the attitude, and bent rays."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
@@ -10,11 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import LineOfSight, unit_vectors, wrap_pi_unchecked
-from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
+from components.line_of_sight.earth_effects import BENDS, EARTH_EFFECTS, HIDES
 from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, true_reach_m
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
-from components.navigation.errors import NavigationErrors
+from components.navigation.errors import OWNSHIP, NavigationErrors
 from components.sensor.ladder_values import (
     angle_apart_mrad,
     over_roster,
@@ -179,11 +178,7 @@ class Transform(Component):
     windowed = True
     lockstep = True
     rewindable = True
-    hooks = {
-        "ownship": "(states) -> what the ownship believes of itself, by name",
-        "hides": "(own, other, present) -> which targets something stands before",
-        "bends": "(own, seen, attitude) -> seen: lines of sight along bent rays",
-    }
+    hooks = (OWNSHIP, HIDES, BENDS)
     effects = (NavigationErrors(), *EARTH_EFFECTS)
     ladders = (EARTH, ATTITUDE, REFRACTION)
     #: The type's own model of the Earth.
@@ -195,11 +190,9 @@ class Transform(Component):
 
     def setup(self) -> None:
         """Take what the ownship believes of itself, and the models to compute with."""
-        self._beliefs: list[Callable[[TrafficStates], dict[str, FloatArray]]] = self.built(
-            "ownship"
-        )
-        self._hiding: list[Hides] = self.built("hides")
-        self._bending: list[Bends] = self.built("bends")
+        self._beliefs = self.built(OWNSHIP)
+        self._hiding = self.built(HIDES)
+        self._bending = self.built(BENDS)
         self.rung = pick_rung(self)
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 

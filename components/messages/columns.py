@@ -84,6 +84,11 @@ class FrameOrigin:
     origin_alt_m: FloatArray = column("m", WGS84, "its height above the ellipsoid")
 
 
+#: The fields of these two, and those of the ownship's place in the same frame (`StateTracks`).
+STATE, ORIGIN = (tuple(g.__dataclass_fields__) for g in (PositionAndVelocity, FrameOrigin))
+POSITION, VELOCITY = STATE[:3], STATE[3:]
+OWN_POSITION = ("own_north_m", "own_east_m", "own_down_m")
+
 #: The ownship's pose as it believes it to be: fields of `Detections`, columns of ``scans``.
 POSE = {
     "own_lat_deg": Column("deg", WGS84, "where the ownship believes to be then: latitude"),

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from components.messages.columns import (
 )
 from components.messages.looks import look_columns
 from components.messages.reach import Reach
+from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.effect import Hook
 from dsa_des.block.message import (
     PER_ROW,
     Column,
@@ -340,3 +342,15 @@ class OwnOfEntries(Message):
             for name, one in (POSE | OWN_VELOCITY).items()
         }
     }
+
+
+class Reporting(Protocol):
+    """Adds to what a sensor reports, or changes it."""
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray, /
+    ) -> Detections:
+        """Return what is sent; `rows` is the row of `targets` at each scan."""
+
+
+REPORT = Hook("report", Reporting, "detections: what is sent")

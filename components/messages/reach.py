@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry import FieldOfView
+from components.geometry import TWO_PI, FieldOfView, sector_width_rad
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 ReasonArray = npt.NDArray[np.uint8]
@@ -58,6 +58,12 @@ class Reach:
     range_slack: float = math.inf
     exact_because: str = ""
     lasts_s: float = 0.0
+
+    @property
+    def width_rad(self) -> tuple[float, float]:
+        """Width of the field of view in azimuth, (0, 2 pi], and in elevation."""
+        low, high = self.elevation_rad
+        return min(sector_width_rad(*self.azimuth_rad), TWO_PI), high - low
 
     @property
     def steepest_rad(self) -> float:

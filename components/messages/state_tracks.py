@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
+
+import numpy as np
 
 from components.messages.columns import FRAME, FrameOrigin, PositionAndVelocity
 from components.messages.contributors import combination_text, contributor_names
@@ -20,6 +22,18 @@ COVARIANCE = {
     for i in range(6)
     for j in range(i, 6)
 }
+
+
+def full_covariance(columns: Mapping[str, Any], rows: Any, size: int = 6) -> FloatArray:
+    """Return the covariances of some rows as matrices, (size, size, rows), from `COVARIANCE`."""
+    return np.stack(
+        [
+            np.stack([columns[COVARIANCE[min(i, j), max(i, j)]][rows] for j in range(size)])
+            for i in range(size)
+        ]
+    )
+
+
 _COVARIANCE = {
     name: Column(
         _UNITS[(i > 2) + (j > 2)][0],

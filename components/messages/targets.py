@@ -292,6 +292,11 @@ class RelativeTargets(Message):
 
     joins_static = frozenset({"columns"})
 
+    @property
+    def picture_tick(self) -> IntArray:
+        """When the aircraft were where each row has them."""
+        return self.tick if self.state_tick is None else self.state_tick
+
     def check(self) -> None:
         """Refuse arrays without a column for each of the targets, too."""
         super().check()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.many_flights import ManyFlights, OwnFlights
+from components.flights.many_flights import SteeredFleet, fleet_of
 from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import RelativeFlight, separations, traffic_block
@@ -23,12 +23,12 @@ Steering = Sequence[tuple[float, Manoeuvre]]
 
 def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[SteeredFlight]:
     """Return what ownships fly, each steered by at least one manoeuvre."""
-    flights = OwnFlights(ManyFlights(own), len(own))
+    flights = SteeredFleet(fleet_of(own))
     for turn in range(max(map(len, steering), default=0)):
         now = [number for number, one in enumerate(steering) if len(one) > turn]
         times_s = np.array([steering[number][turn][0] for number in now])
         flights.steer(np.array(now), times_s, [steering[number][turn][1] for number in now])
-    return [SteeredFlight(flight, flights.parts_of(number)) for number, flight in enumerate(own)]
+    return list(flights)
 
 
 class RecordedManoeuvres:

@@ -9,12 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.closest_approach import Approaches, closest_approaches, end_of_look
-from components.flights.many_flights import ManyFlights
-from components.flights.sample_times import OwnTimes, RegularTimes, SampleTimes
-from components.flights.sampled_flight import CELLS_AT_ONCE
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.state import TrajectoryState
+from components.flights.closest_approach import (
+    Approaches,
+    OwnTimes,
+    RegularTimes,
+    SampleTimes,
+    closest_approaches,
+    end_of_look,
+)
+from components.flights.fleet import CELLS_AT_ONCE
+from components.flights.many_flights import fleet_of
+from components.geometry import TrajectoryState, line_of_sight_ned
 from components.metrics.separation import (
     RelativeFlight,
     distances_m,
@@ -93,8 +98,8 @@ class FlightsTogether:
         owns = {id(flight.own): flight.own for flight in flights}
         number_of = {key: number for number, key in enumerate(owns)}
         self._own_of = np.array([number_of[id(flight.own)] for flight in flights], dtype=np.int64)
-        self._owns = ManyFlights(list(owns.values()))
-        self._targets = ManyFlights([flight.target for flight in flights])
+        self._owns = fleet_of(list(owns.values()))
+        self._targets = fleet_of([flight.target for flight in flights])
 
     def own_at(self, flight: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states of the ownships of flights (n,), each at a time (n,) of its own."""

@@ -12,9 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.closest_approach import present_together_s
-from components.flights.sample_times import SampleTimes, regular_count, regular_times_s
-from components.geometry.ellipsoid import line_of_sight, north_east_up
+from components.flights.closest_approach import (
+    SampleTimes,
+    present_together_s,
+    regular_count,
+    regular_times_s,
+)
+from components.geometry import line_of_sight, north_east_up
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -129,7 +133,7 @@ class RelativeFlight:
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""
-        return present_together_s(self.own, [self.target], self.end_s)
+        return present_together_s(self.own, np.array([self.target.interval_present()]), self.end_s)
 
     @property
     def closing_mps(self) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import STATUSES
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -22,8 +23,6 @@ from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
 #: A nautical mile, m.
 MILE_M = 1852.0
 _TABLE = "state_tracks"
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _ERRORS = {
     "error_across_m": "horizontal error of the position across the line of sight, m",
     "error_horizontal_m": "horizontal error of the position, m",
@@ -62,9 +61,7 @@ class ErrorsByRange(Metric):
     """Quantiles of the errors of confirmed tracks at given ranges, and the share with a track."""
 
     Parameters = ErrorsByRangeParameters
-    tables = {
-        _TABLE: ("block", "time_s", "state_s", "track_status", "has_range", *_STATE, *_ORIGIN)
-    }
+    tables = {_TABLE: ("block", "time_s", "state_s", "track_status", "has_range", *STATE, *ORIGIN)}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -81,7 +78,7 @@ class ErrorsByRange(Metric):
             found.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
             found += [
                 Result(f"{name}.{r:g}", NUMBER, f"{what}, at {r:g} nmi: {share}",
-                       quantile=self.p.quantile)
+                       quantile=self.p.quantile, least=0.0)
                 for name, what in _ERRORS.items()
             ]  # fmt: skip
         return found
@@ -135,8 +132,8 @@ class ErrorsByRange(Metric):
         self, columns: Any, rows: IntArray, own: Any, target: Any
     ) -> tuple[dict[str, FloatArray], IntArray, float]:
         """Return errors of rows that are the target's, these rows, and the range of the first."""
-        origin = np.stack([columns[name][rows] for name in _ORIGIN])
-        estimate = np.stack([columns[name][rows] for name in _STATE])
+        origin = np.stack([columns[name][rows] for name in ORIGIN])
+        estimate = np.stack([columns[name][rows] for name in STATE])
         true, there = states_in_frame([target], columns["state_s"][rows], origin)
         apart = estimate - true[0]
         mine = there[0] & (np.sqrt((apart[:3] ** 2).sum(axis=0)) < self.p.within_m)

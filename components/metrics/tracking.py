@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.messages.state_tracks import COVARIANCE, STATUSES
+from components.messages.columns import ORIGIN, STATE
+from components.messages.state_tracks import COVARIANCE, STATUSES, full_covariance
 from components.metrics.rows import is_named
 from components.metrics.separation import traffic_of
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
@@ -17,8 +18,6 @@ from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import FRACTION, NUMBER, Group, Metric, Result, recorded_by
 
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _TABLE = "state_tracks"
 _MOST_STRETCHES = 400
 
@@ -108,7 +107,7 @@ class Tracking(Metric):
         _TABLE: (
             "block", "time_s", "state_s", "track", "track_status", "has_range", "nis",
             "nis_freedom",
-            *_STATE, *_ORIGIN, *COVARIANCE.values(),
+            *STATE, *ORIGIN, *COVARIANCE.values(),
         ),
         "detections": ("time_s", "target"),
     }  # fmt: skip
@@ -178,7 +177,7 @@ class Tracking(Metric):
         messages = [rows[start[i] : ends[i]] for i in used.tolist()]
         messages = [m[kept[m]] for m in messages]
         every = np.concatenate([rows[:0], *messages])
-        origin = np.stack([columns[name][every] for name in _ORIGIN])
+        origin = np.stack([columns[name][every] for name in ORIGIN])
         state, _ = states_in_frame(targets, columns["state_s"][every], origin)
         there = [np.broadcast_to(t.at(instants[used]).present, used.shape) for t in targets]
         present = np.array(there, dtype=bool).reshape(len(targets), len(used))
@@ -222,14 +221,12 @@ def _is_asked_for(column: Any, scene: Scene, block: str | None) -> Any:
 def _reported(
     columns: Any, rows: IntArray, time_s: float, confirmed_s: Mapping[int, float]
 ) -> ReportedTracks:
-    covariance = np.empty((len(rows), 6, 6))
-    for (i, j), name in COVARIANCE.items():
-        covariance[:, i, j] = covariance[:, j, i] = columns[name][rows]
+    covariance = np.moveaxis(full_covariance(columns, rows), -1, 0).copy()
     number = columns["track"][rows]
     return ReportedTracks(
         time_s,
         number,
-        np.stack([columns[name][rows] for name in _STATE]),
+        np.stack([columns[name][rows] for name in STATE]),
         covariance,
         np.array([confirmed_s[n] for n in number.tolist()]),
     )

@@ -8,9 +8,8 @@ own keys.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,11 +30,11 @@ from components.geometry import (
     unit_vector,
     wrap_two_pi,
 )
-from components.messages.detections import Detections, LastingPart
+from components.messages.detections import REPORT, Detections, LastingPart, Reporting
 from components.messages.targets import RelativeTargets, TrafficStates
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Built, Effect, Hook, Verdict
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.gauss_markov import GaussMarkov
 
@@ -159,6 +158,16 @@ def _displaced(
 
 
 Belief = dict[str, FloatArray]
+
+
+class Believing(Protocol):
+    """Gives what the ownship believes of itself."""
+
+    def __call__(self, states: TrafficStates, /) -> Belief:
+        """Return position and attitude at each instant, by name."""
+
+
+OWNSHIP = Hook("ownship", Believing, "what the ownship believes of itself, by name")
 Three = tuple[float, float, float]
 
 _SCAN_BITS = 48
@@ -208,9 +217,8 @@ def _errors_of(context: Context) -> list[str]:
     ]
 
 
-class _Navigation(Effect):
+class _Navigation(Effect[Built]):
     name = "navigation"
-    neutral = False
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -221,13 +229,13 @@ class _Navigation(Effect):
         return Verdict(False, "[navigation] has no bias and no noise")
 
 
-class NavigationErrors(_Navigation):
+class NavigationErrors(_Navigation[Believing]):
     """What the ownship believes of its position and attitude: biases, and noise that lasts."""
 
-    acts_on = "ownship"
+    acts_on = OWNSHIP
     lockstep = True
 
-    def build(self, block: Any) -> Callable[[TrafficStates], Belief]:
+    def build(self, block: Any) -> Believing:
         """Return what gives the belief at each instant.
 
         All transforms of a scene share the ownship's one navigation system: its noise is keyed by
@@ -283,13 +291,13 @@ class NavigationErrors(_Navigation):
         return believed
 
 
-class NavigationReport(_Navigation):
+class NavigationReport(_Navigation[Reporting]):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
-    acts_on = "report"
+    acts_on = REPORT
     lockstep = True
 
-    def build(self, block: Any) -> Callable[[Detections, RelativeTargets, IntArray], Detections]:
+    def build(self, block: Any) -> Reporting:
         """Return what adds the columns to a report, and to its variances what navigation knows."""
         nothing = (0.0, 0.0, 0.0)
         noise = navigation_noise(block.context) if block.turned_by_belief else (nothing, nothing)

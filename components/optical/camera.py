@@ -1,7 +1,7 @@
 """The base class of EO and IR cameras: pixels, signature, threshold (thesis §3.5.2)."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
@@ -11,8 +11,8 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.geometry import sector_width_rad
 from components.optical.area_of_cells import check_silhouette, fitted_otherwise
+from components.optical.contrast import CONTRAST
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
     FAINTEST_PD,
@@ -27,16 +27,15 @@ from components.optical.detector import (
     farthest_detection_m,
     settled,
 )
-from components.optical.signature import DynamicSignature, pixels_of_cells
-from components.optical.weather_effects import Visibility
+from components.optical.infrared_area import AREA
+from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
+from components.optical.weather_effects import DARKNESS, Visibility
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, Look
+from components.sensor.look import CUE, Cells, CellValues, Look
 from components.sensor.parameters import GlintParameters, SensorParameters
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
-
-CellValues = Callable[[Cells], FloatArray]
 
 
 class CameraParameters(GlintParameters, SensorParameters):
@@ -162,12 +161,7 @@ class Camera(Sensor):
     #: Columns of the roster that hold the areas and the contrast it sees.
     areas: ClassVar[str] = ""
     contrasts: ClassVar[str] = ""
-    hooks = {
-        "area": "(cells) -> area in m² to add to each cell's",
-        "contrast": "(cells) -> factor of each cell's contrast",
-        "signature": "(cells) -> what to add to each cell's signature",
-        "darkness": "whether it is too dark to see anything",
-    }
+    hooks = (AREA, CONTRAST, SIGNATURE, DARKNESS)
     inputs = CUED_INPUTS
     effects: ClassVar[tuple[Effect, ...]] = (
         DynamicSignature(),
@@ -178,8 +172,7 @@ class Camera(Sensor):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        width = sector_width_rad(*self.reach.azimuth_rad)
-        height = self.reach.elevation_rad[1] - self.reach.elevation_rad[0]
+        width, height = self.reach.width_rad
         self.pixel_azimuth_rad = width / parameters.azimuth_pixels
         self.pixel_elevation_rad = height / parameters.elevation_pixels
         # Reports come on the pixel grid unless the scene gives a coarser one.
@@ -208,15 +201,15 @@ class Camera(Sensor):
         """Check the targets' silhouettes, and take what effects do to area, signature, contrast."""
         for roster in known_targets(self.context) if self.areas else ():
             check_silhouette(roster, self.areas, self.p.silhouette)
-        self._areas = self.built("area")
-        self._contrast_factors = self.built("contrast")
-        self._signatures = self.built("signature")
+        self._areas = self.built(AREA)
+        self._contrast_factors = self.built(CONTRAST)
+        self._signatures = self.built(SIGNATURE)
         if self.p.errors == "signal" and self.detector.noise == 0.0:
             raise ValueError(
                 "errors is 'signal' and noise_equivalent_contrast is not given, and neither do a "
                 "threshold above 0 and false alarms say how large the noise is"
             )
-        if any(self.built("darkness")):
+        if self.built_one(DARKNESS):
             self.reach = replace(self.reach, enabled=False)
         if not self.context.simulate_everything:
             farthest_m = farthest_detection_m(self, self.areas, self.contrasts)
@@ -336,7 +329,7 @@ class Camera(Sensor):
 
     def lowest_threshold(self) -> float:
         """Return the least signature that is ever detected."""
-        if self.p.cued_threshold is None or not self.built("cue"):
+        if self.p.cued_threshold is None or not self.built(CUE):
             return self.detector.threshold
         return float(min(self.detector.threshold, self.p.cued_threshold))
 

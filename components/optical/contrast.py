@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,10 @@ from components.arguments.checks import broadcast_flat, not_negative, positive, 
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues
 from components.terrain.rays import dip_rad
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 def contrast_gain(
@@ -96,13 +95,15 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
     return unflatten(np.where(gone, 0.0, np.exp(-KOSCHMIEDER * depth)), shape)
 
 
-class Background(Effect):
+CONTRAST = Hook("contrast", CellValues, "factor of each cell's contrast")
+
+
+class Background(Effect[CellValues]):
     """Contrast of the painted target against sky or ground under the scene's sun."""
 
     lockstep = True
     name = "background and sun"
-    acts_on = "contrast"
-    neutral = False
+    acts_on = CONTRAST
     outside_the_proof = "no sun leaves every target's contrast exactly as it is"
 
     def verdict(self, block: Any) -> Verdict:
@@ -110,7 +111,7 @@ class Background(Effect):
         background = block.p.background
         return Verdict(background != "none", f"background is {background!r}")
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
         p = block.p
         sun = {

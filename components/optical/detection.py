@@ -23,8 +23,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry import sector_width_rad
-from components.messages.detections import Detections
+from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.radar.detection.output import false_alarm_count
 from dsa_des.block.effect import Effect, Verdict
@@ -128,12 +127,12 @@ _HOW_MANY, _AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST = range(5)
 _NO_TARGET = np.uint64(0)
 
 
-class FrameFalseAlarms(Effect):
+class FrameFalseAlarms(Effect[Reporting]):
     """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
 
     lockstep = True
     name = "false alarms"
-    acts_on = "report"
+    acts_on = REPORT
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``false_alarms`` and ``false_alarms_per_frame``."""
@@ -147,7 +146,7 @@ class FrameFalseAlarms(Effect):
         rate = p.false_alarms_per_frame
         return Verdict(rate > 0, f"false_alarms_per_frame is {rate:g}")
 
-    def build(self, block: Any) -> AddedFalseAlarms:
+    def build(self, block: Any) -> Reporting:
         """Return what adds the false alarms to the report."""
         return AddedFalseAlarms(block)
 
@@ -206,7 +205,7 @@ class AddedFalseAlarms:
             azimuth_draw,
             elevation_draw,
             azimuth_start_rad=reach.azimuth_rad[0],
-            azimuth_width_rad=sector_width_rad(*reach.azimuth_rad),
+            azimuth_width_rad=reach.width_rad[0],
             lowest_elevation_rad=reach.elevation_rad[0],
             highest_elevation_rad=reach.elevation_rad[1],
         )

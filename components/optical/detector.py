@@ -10,13 +10,14 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import not_negative, positive
-from components.optical.contrast import visibility_transmission
+from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
     deviations_exceeded,
     exceeding_probability,
 )
-from components.optical.signature import pixels_of_cells
+from components.optical.infrared_area import AREA
+from components.optical.signature import SIGNATURE, pixels_of_cells
 from components.optical.weather_effects import own_band
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Parameters
@@ -245,7 +246,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         effect.name
         for effect in type(camera).effects
         if effect.name in camera.context.effects
-        and effect.acts_on in ("area", "contrast", "signature")
+        and effect.acts_on in (AREA, CONTRAST, SIGNATURE)
         and effect.name not in _TAKING
     ]
     faintest = camera.lowest_threshold() - FAINTEST_DEVIATIONS * camera.detector.noise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,9 @@ from numpy.typing import ArrayLike
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
 from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues, turned_to_sight
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 # Assumption: the plume seen from dead astern, as a share of the back area. Table 4.5 only ranks the
 # engines: a propeller's airflow is cold, a turbofan mixes much cold with little hot air, a
@@ -103,12 +102,15 @@ def infrared_area(
     )
 
 
-class Plume(Effect):
+AREA = Hook("area", CellValues, "area in m² to add to each cell's")
+
+
+class Plume(Effect[CellValues]):
     """Each aircraft's exhaust plume by its engine; those without one are not computed."""
 
     lockstep = True
     name = "plume"
-    acts_on = "area"
+    acts_on = AREA
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``plume``, and for a target whose engine has one."""
@@ -123,7 +125,7 @@ class Plume(Effect):
                     return Verdict(True, f"plume is true and {name!r} has a {engine}")
         return Verdict(False, "plume is true, but no target's engine has one")
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return what is added to every cell's area."""
         scale = 1.0 if block.p.plume else 0.0
         shares = {engine: scale * share for engine, share in PLUME_SHARE_OF_BACK.items()}
@@ -137,10 +139,7 @@ class Plume(Effect):
                     continue
                 chosen = np.flatnonzero(engines == engine)
                 area[chosen] = plume_area(
-                    cells.relative_heading_rad[chosen],
-                    cells.target_pitch_rad[chosen],
-                    cells.target_roll_rad[chosen],
-                    cells.elevation_rad[chosen],
+                    *turned_to_sight(cells, chosen),
                     back_m2=back[chosen],
                     engine=engine,
                     plume_share_of_back=shares[engine],

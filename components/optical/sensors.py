@@ -2,22 +2,22 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.optical.area_of_cells import area_of_cells
 from components.optical.camera import Camera, CameraParameters
 from components.optical.contrast import Background
-from components.optical.infrared_area import Plume
+from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.ladder_values import over_cells
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, turned_to_sight
 from components.sensor.marks import EO, IR
-from components.sensor.parameters import SensorParameters
+from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -61,21 +61,15 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     if np.finfo(np.longdouble).eps >= np.finfo(np.float64).eps:
         raise Unavailable("not measured: this machine has no extended precision")
     camera: Any = block
-    if getattr(camera.p, "silhouette", "") != "convex_hull" or camera.built("area"):
+    if getattr(camera.p, "silhouette", "") != "convex_hull" or camera.built(AREA):
         raise Unavailable("nothing more exact is known")
 
     def values(cells: Cells) -> dict[str, FloatArray]:
         roster = cells.roster
         names = ["front_m2", "side_m2", "horizontal_m2"]
         names += ["back_m2"] if camera.areas == "ir" else []
-        angles = (
-            cells.relative_heading_rad,
-            cells.target_pitch_rad,
-            cells.target_roll_rad,
-            cells.elevation_rad,
-        )
         bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
-        wide = [array.astype(np.longdouble) for array in (*angles, *bodies)]
+        wide = [array.astype(np.longdouble) for array in (*turned_to_sight(cells), *bodies)]
         areas: Any = (*wide, None)[:8]
         exact = union_area(*areas)
         error = np.abs(camera.shown_area(cells).astype(np.longdouble) - exact)
@@ -282,6 +276,8 @@ def fuselage_length_m(front_m2: FloatArray, side_m2: FloatArray) -> FloatArray:
 class CameraBoundaryParameters(SensorParameters):
     """Parameters of a range boundary camera; the defaults are TECVOL's."""
 
+    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "share"}
+
     range_km: float = Field(
         default=3.0, gt=0, description="Range inside which every target is detected, km."
     )
@@ -291,6 +287,28 @@ class CameraBoundaryParameters(SensorParameters):
     elevation_resolution_deg: float = Field(
         default=0.1, ge=0, description="Grid step of measured elevation, deg; 0 measures exactly."
     )
+    range_error_share: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="Standard deviation of the range that passive ranging gives, as a share of it; "
+        "0: no range is measured.",
+    )
+    range_bias_share: float = Field(
+        default=0.0, ge=-1, le=1, description="Bias of that range, as a share of it; see biases."
+    )
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_share, s."
+    )
+
+    @model_validator(mode="after")
+    def _errs_by_chance(self) -> Self:
+        if self.range_bias_share and not self.range_error_share:
+            raise ValueError(
+                f"range_bias_share is {self.range_bias_share:g} and range_error_share is 0: no "
+                "range is measured; give range_error_share too, or leave range_bias_share out"
+            )
+        return self
 
 
 class OpticalRangeBoundary(Sensor):
@@ -305,6 +323,10 @@ class OpticalRangeBoundary(Sensor):
     inputs = CUED_INPUTS
     lockstep = True
     ladders = (VISIBLE,)
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.measures_range = parameters.range_error_share > 0.0
 
     def setup(self) -> None:
         """Refuse cues: everything inside the range is seen anyway."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,9 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.geometry import angle_between, wrap_by_sines
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 def line_of_sight_rate(
@@ -213,11 +212,14 @@ def detection_range(
     return unflatten(np.where(needs_image, distance, np.inf), shape)
 
 
-class DynamicSignature(Effect):
+SIGNATURE = Hook("signature", CellValues, "what to add to each cell's signature")
+
+
+class DynamicSignature(Effect[CellValues]):
     """The rate of the line of sight adds b·V to the signature."""
 
     name = "dynamic signature"
-    acts_on = "signature"
+    acts_on = SIGNATURE
     lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
@@ -225,7 +227,7 @@ class DynamicSignature(Effect):
         weight = block.p.dynamic_weight
         return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return what is added to every cell's signature."""
         return MovingTargets(block.p.dynamic_weight, block.p.rate, block.context.ticks_per_s)
 

@@ -1,6 +1,5 @@
 """The contrast that haze, fog and rain take from a camera."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,13 +19,13 @@ from components.atmosphere.visibility import (
     rain_visibility_m,
 )
 from components.environment.tables import Weather
-from components.optical.contrast import visibility_transmission
-from components.sensor.look import Cells
+from components.optical.contrast import CONTRAST, visibility_transmission
+from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 
-class Visibility(Effect):
+class Visibility(Effect[CellValues]):
     """Contrast falls with range by Koschmieder's law.
 
     The visibility is the scene's own, or follows from its fog and rain.
@@ -34,7 +33,7 @@ class Visibility(Effect):
 
     lockstep = True
     name = "visibility"
-    acts_on = "contrast"
+    acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
@@ -55,7 +54,7 @@ class Visibility(Effect):
             return Verdict(True, f"[weather] {' and '.join(found)}")
         return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
         visibility_m = scene_visibility_m(block.context.sections["weather"])
         if visibility_m is None or own_band(block) is not None:
@@ -67,18 +66,18 @@ class Visibility(Effect):
         return factor
 
 
-class BandExtinction(Effect):
+class BandExtinction(Effect[CellValues]):
     """What clear air, haze, fog and rain take from an infrared band's contrast."""
 
     lockstep = True
     name = "extinction in the band"
-    acts_on = "contrast"
+    acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``extinction_band``."""
         return Verdict(own_band(block) is not None, _band_said(block))
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
         band = own_band(block)
         if band is None:
@@ -99,13 +98,15 @@ class BandExtinction(Effect):
         return factor
 
 
-class Night(Effect):
+DARKNESS = Hook("darkness", bool, "whether it is too dark to see anything")
+
+
+class Night(Effect[bool]):
     """Without daylight a camera for visible light sees nothing; lights are not simulated."""
 
     lockstep = True
     name = "night"
-    acts_on = "darkness"
-    neutral = False
+    acts_on = DARKNESS
     outside_the_proof = "a camera in the dark is off"
 
     def verdict(self, block: Any) -> Verdict:

@@ -9,21 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, finite, positive, unflatten
-from components.geometry.angles import TWO_PI, wrap_pi
-from components.messages.detections import Detections
-from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
+from components.geometry import TWO_PI, wrap_pi
+from components.messages.detections import REPORT, Detections, OwnOfEntries, Reporting
+from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.radar.resolution import azimuth_width_rad
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues
+from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
-from dsa_des.block.message import per_row
+from dsa_des.block.effect import Effect, Hook, Verdict
+from dsa_des.block.message import Message, per_row
 
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding
 # of times in a run of days.
@@ -156,7 +156,7 @@ def _into_sweep(angle: FloatArray, width: float) -> FloatArray:
     return np.where(past_the_end, np.where(nearer_to_start, 0.0, width), angle)
 
 
-class BeamSweep(Effect):
+class BeamSweep(Effect[Reporting]):
     """A beam that sweeps once per scan lights each target at an instant of its own.
 
     Everything about a target is then that of this instant: whether it is in reach, its SNR, its
@@ -167,9 +167,8 @@ class BeamSweep(Effect):
     """
 
     name = "beam sweep"
-    acts_on = "report"
+    acts_on = REPORT
     lockstep = True
-    neutral = False
     outside_the_proof = "it fills a column that is null without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -181,7 +180,12 @@ class BeamSweep(Effect):
         return Sweep(block)
 
 
-class BeamShape(Effect):
+BEAM_SHAPE = Hook(
+    "beam shape", CellValues, "share of a target's echo that is left off the beam's axis"
+)
+
+
+class BeamShape(Effect[CellValues]):
     """What a target off the beam's axis loses: between beam positions, or on average in a sweep.
 
     The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
@@ -191,9 +195,8 @@ class BeamShape(Effect):
     """
 
     name = "beam shape"
-    acts_on = "beam shape"
+    acts_on = BEAM_SHAPE
     lockstep = True
-    neutral = False
     outside_the_proof = "no target is amid every beam"
 
     def verdict(self, block: Any) -> Verdict:
@@ -211,9 +214,9 @@ class OffAxis:
     def __init__(self, block: Any) -> None:
         self._block = block
         positions, reach = block.p.beams, block.p.reach()
-        low_rad, high_rad = reach.elevation_rad
-        self._columns = reach.azimuth_rad[0], azimuth_width_rad(reach), positions.azimuth
-        self._bars = low_rad, high_rad - low_rad, positions.elevation
+        across_rad, upward_rad = reach.width_rad
+        self._columns = reach.azimuth_rad[0], across_rad, positions.azimuth
+        self._bars = reach.elevation_rad[0], upward_rad, positions.elevation
         self._beam_rad = [
             math.radians(width)
             for width in (block.p.azimuth_beamwidth_deg, block.p.elevation_beamwidth_deg)
@@ -249,7 +252,7 @@ class Sweep:
         self._block = block
         self._turn = {
             "start_rad": block.reach.azimuth_rad[0],
-            "width_rad": azimuth_width_rad(block.reach),
+            "width_rad": block.reach.width_rad[0],
             "scan_period_s": self.period_s,
         }
         self._ticks_per_s = block.context.ticks_per_s
@@ -271,7 +274,7 @@ class Sweep:
         at_start = targets.take(rows)
         revisit = at_start.revisit
         assert revisit is not None
-        start_s = self._start_s(at_start)[:, np.newaxis]
+        start_s = (at_start.picture_tick / self._ticks_per_s)[:, np.newaxis]
         found: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
@@ -312,11 +315,6 @@ class Sweep:
         after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
         return replace(detections, extras=extras, own_of_entries=own, ticks_after=after)
 
-    def _start_s(self, targets: RelativeTargets) -> FloatArray:
-        """Return when the picture of each row was; one that came late goes on from there."""
-        start = targets.tick if targets.state_tick is None else targets.state_tick
-        return np.asarray(start / self._ticks_per_s)
-
     def _own_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray
     ) -> dict[str, FloatArray] | None:
@@ -328,7 +326,7 @@ class Sweep:
             return believed
         # Where the ownship is does not depend on the target that is asked for with it.
         flights, anyone = targets.revisit.take_rows(row), np.zeros(1, dtype=np.int64)
-        start_s = self._start_s(targets)[row]
+        start_s = targets.picture_tick[row] / self._ticks_per_s
         before, then = (
             flights(anyone, time_s[:, np.newaxis])["own"]
             for time_s in (start_s, start_s + offset_s)
@@ -341,35 +339,30 @@ class Sweep:
         return moved
 
 
-#: Gain times beamwidths in square degrees.
-GAIN_TIMES_BEAM = 30_000.0
+class SweepingSensor(Sensor):
+    """A sensor whose beam may sweep: then it sees each target when the beam lights it."""
 
+    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
 
-MOST_GAIN_DISAGREEMENT_DB = 3.0
+    @property
+    def _sweep(self) -> Sweep | None:
+        return self.context.effects.get(BeamSweep.name)
 
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where a beam sweeps, the ownship at each entry's instant."""
+        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
 
-def beam_against_gain(parameters: Any) -> list[str]:
-    """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
+    def request(self, port: str) -> Any:
+        """Ask for the targets in our reach; a sweep decides for itself when that is."""
+        reach = super().request(port)
+        if self._sweep is None or not self.p.enabled:
+            return reach
+        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
 
-    A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are
-    built (M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 9.2, has 26,000; C. A.
-    Balanis, Antenna Theory, section 2.6, 30,000).
-    """
-    p = parameters
-    widths_deg = p.azimuth_beamwidth_deg, p.elevation_beamwidth_deg
-    whose = "azimuth_beamwidth_deg and elevation_beamwidth_deg are"
-    if p.azimuth_beamwidth_deg is None:
-        widths_deg = p.azimuth_resolution_deg, p.elevation_resolution_deg
-        whose = "no beamwidths are given, and the grid that stands for the beam is"
-    azimuth_deg, elevation_deg = widths_deg
-    if not (azimuth_deg and elevation_deg):
-        return []
-    gain_db = 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg))
-    if abs(gain_db - p.antenna_gain_db) <= MOST_GAIN_DISAGREEMENT_DB:
-        return []
-    alike_deg = math.sqrt(GAIN_TIMES_BEAM / 10.0 ** (0.1 * p.antenna_gain_db))
-    return [
-        f"antenna_gain_db is {p.antenna_gain_db:g}, which is a beam of {alike_deg:.3g} x "
-        f"{alike_deg:.3g} deg, and {whose} {azimuth_deg:g} x {elevation_deg:g} deg, which is "
-        f"{gain_db:.3g} dB: clutter, false alarms and what is told apart go by the beam"
-    ]
+    def seen(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets at the instants at which the beam lights them."""
+        if self._sweep is None:
+            return targets, rows
+        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))

@@ -24,7 +24,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,11 +39,11 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.ellipsoid import north_east_up
+from components.geometry import north_east_up
 from components.radar.ground_clutter import Echo, terrain_of
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 FILTERS = ("single_canceller", "double_canceller", "filter_bank")
 FEWEST_PULSES, MOST_PULSES = 8, 256
@@ -197,20 +197,29 @@ _AHEAD = (0.0, 1.0, 2.0, 3.0, 4.0), (-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -1.0 / 
 _BEHIND = tuple(-point for point in _AHEAD[0]), tuple(-weight for weight in _AHEAD[1])
 
 
-class RangeRate(Effect):
+class RangeRates(Protocol):
+    """Gives true range rates."""
+
+    def __call__(self, cells: Cells, found: IntArray, /) -> FloatArray:
+        """Return those of some cells, m/s."""
+
+
+RANGE_RATE = Hook("range rate", RangeRates, "rate of some cells' slant range, m/s")
+
+
+class RangeRate(Effect[RangeRates]):
     """Rate of the slant range between the two aircraft, as they fly."""
 
     lockstep = True
     name = "range rate"
-    acts_on = "range rate"
-    neutral = False
+    acts_on = RANGE_RATE
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``measures_range_rate``."""
         return Verdict.of_flag(block.p, "measures_range_rate")
 
-    def build(self, block: Any) -> Any:
+    def build(self, block: Any) -> RangeRates:
         """Return what gives the rates of some cells."""
         return range_rates
 
@@ -271,32 +280,6 @@ def _rates_of(
 _LEAST_GAIN = 1e-30
 
 
-class DopplerFilter(Effect):
-    """Moving-target filter: gains of target and ground by their range rates.
-
-    The range rates are those of the two aircraft as they fly, and of the ground in the target's
-    range cell as the ownship flies over it. The notch lies at the ground's (``clutter_lock``) or at
-    0. The ground's echo is spread by the beam's width across the ownship's course and by its own
-    motion ([terrain] ``clutter_motion_m_s``); rain is blown and falls, and what sidelobes meet lies
-    all around.
-    """
-
-    lockstep = True
-    name = "moving target filter"
-    acts_on = "Doppler"
-    neutral = False
-    outside_the_proof = "every filter takes something from a target"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``moving_target_filter``."""
-        kind = block.p.moving_target_filter
-        return Verdict(kind != "none", f"moving_target_filter is {kind!r}")
-
-    def build(self, block: Any) -> DopplerProcessing:
-        """Return what gives the gains."""
-        return DopplerProcessing(block)
-
-
 class DopplerProcessing:
     """The gains of one radar's filter; called with cells."""
 
@@ -342,3 +325,35 @@ class DopplerProcessing:
             - down * np.sin(elevation_rad)
         )
         return along
+
+
+DOPPLER = Hook(
+    "Doppler",
+    DopplerProcessing,
+    "factors on the power of each cell's target and of each echo beside it",
+)
+
+
+class DopplerFilter(Effect[DopplerProcessing]):
+    """Moving-target filter: gains of target and ground by their range rates.
+
+    The range rates are those of the two aircraft as they fly, and of the ground in the target's
+    range cell as the ownship flies over it. The notch lies at the ground's (``clutter_lock``) or at
+    0. The ground's echo is spread by the beam's width across the ownship's course and by its own
+    motion ([terrain] ``clutter_motion_m_s``); rain is blown and falls, and what sidelobes meet lies
+    all around.
+    """
+
+    lockstep = True
+    name = "moving target filter"
+    acts_on = DOPPLER
+    outside_the_proof = "every filter takes something from a target"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``moving_target_filter``."""
+        kind = block.p.moving_target_filter
+        return Verdict(kind != "none", f"moving_target_filter is {kind!r}")
+
+    def build(self, block: Any) -> DopplerProcessing:
+        """Return what gives the gains."""
+        return DopplerProcessing(block)

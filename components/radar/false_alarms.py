@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import Vector
-from components.geometry.attitude import body_to_ned, unit_vector
-from components.messages.detections import Detections
+from components.geometry import Vector, body_to_ned, unit_vector
+from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import in_measured_order
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
@@ -20,6 +19,7 @@ from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, beamwidths_ra
 from components.radar.measurement import FAINTEST
 from components.radar.rain import RainClutter
 from components.radar.resolution import cells_of_radar
+from components.sensor.look import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -45,7 +45,7 @@ class Alarms:
     rate: FloatArray
 
 
-class FalseAlarms(Effect):
+class FalseAlarms(Effect[Reporting]):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
     Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
@@ -58,8 +58,7 @@ class FalseAlarms(Effect):
 
     lockstep = True
     name = "false alarms"
-    acts_on = "report"
-    neutral = False
+    acts_on = REPORT
     outside_the_proof = "a report without false alarms is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -89,7 +88,7 @@ class NoiseReports:
     def _crossings(self) -> list[Crossing]:
         """Thresholds elsewhere and, where it is another, within cue cones; known after setup."""
         block = self._block
-        cued = block.cued_crossing() if block.built("cue") else None
+        cued = block.cued_crossing() if block.built(CUE) else None
         return [block.crossing] + ([] if cued is None else [cued])
 
     def refuse_too_many(self) -> None:
@@ -160,7 +159,7 @@ def _between(uniform: Any, field: tuple[float, float]) -> Any:
 _OF_GROUND = np.uint64(2**41)
 
 
-class ClutterAlarms(Effect):
+class ClutterAlarms(Effect[Reporting]):
     """Reports of cells in which the ground crosses the threshold that noise does not.
 
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
@@ -172,8 +171,7 @@ class ClutterAlarms(Effect):
 
     lockstep = True
     name = "clutter false alarms"
-    acts_on = "report"
-    neutral = False
+    acts_on = REPORT
     outside_the_proof = "a report without the ground is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
@@ -376,8 +374,13 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     ]
 
 
-def unlikely_false_alarms(noise_key: str, pfa: float, cells: int, by_default: bool) -> list[str]:
+def unlikely_false_alarms(block: Any) -> list[str]:
     """Say how many false alarms a scan has where there are many, or practically none."""
+    if not (block.p.false_alarms and block.p.enabled):
+        return []
+    pfa, cells = block.crossing.false_alarm_probability, cells_of_radar(block).count
+    noise_key, own = block.noise_key(), "false_alarm_probability"
+    by_default = noise_key.startswith(own) and own not in block.p.model_fields_set
     comes_to = (
         f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"
     )

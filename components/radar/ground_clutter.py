@@ -21,7 +21,7 @@ from components.arguments.checks import (
 from components.radar.resolution import cell_size
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 # Ground farther from the beam's axis than this many beamwidths (two-way gain below -96 dB) is dark.
 BEAM_REACH_BEAMWIDTHS = 2.0
@@ -125,57 +125,6 @@ Velocity = tuple[FloatArray, FloatArray, FloatArray]
 _CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
 
 
-class GroundClutter(Effect):
-    """Echo of flat terrain in the cell of each target, where the beam meets it.
-
-    The beam points at the target and is as wide as a resolution cell, unless the scene gives its
-    beamwidths; clutter more than two beamwidths off its axis is 0. The air takes from the echo of
-    the ground what it takes from the target's. What the threshold does there is said by
-    ``clutter_threshold``.
-    """
-
-    lockstep = True
-    name = "ground clutter"
-    acts_on = "clutter"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] height_m``."""
-        terrain = terrain_of(block)
-        if terrain is None:
-            return Verdict(False, "[terrain] height_m is not given")
-        return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
-
-    def build(self, block: Any) -> Echo:
-        """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
-        terrain = terrain_of(block)
-        if terrain is None:
-            return NoEcho(block)
-        for width, name in zip(cell_size(block.p), _CELL, strict=True):
-            if width == 0:
-                raise ValueError(
-                    f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
-                )
-        if block.p.pulses_summed > 1:
-            if block.p.budget == "dwell" and block.p.integration == "noncoherent":
-                raise ValueError(
-                    f"integration is 'noncoherent', which sums {block.p.pulses_summed} pulses: "
-                    "ground clutter is known for one look only; set it to 'coherent'"
-                )
-            raise ValueError(
-                f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
-                "set it to 1, with integration_gain_db for pulses integrated coherently"
-            )
-
-        if terrain.clutter_mean == "constant" and block.p.cfar_reference_cells is not None:
-            raise ValueError(
-                f"cfar_reference_cells is {block.p.cfar_reference_cells} and [terrain] "
-                "clutter_mean is 'constant': an average of cells is known for clutter that "
-                "fluctuates; leave one of them out"
-            )
-
-        return GroundEcho(block, terrain)
-
-
 @dataclass(frozen=True)
 class Clutter:
     """Power over noise by the cells of a look: of the ground amid the beam, and of diffuse clutter.
@@ -266,6 +215,60 @@ class NoEcho(Echo):
     ) -> tuple[FloatArray, FloatArray]:
         """Of nothing: those of the ground."""
         return ground_m_s, np.zeros(len(cells))
+
+
+CLUTTER = Hook("clutter", Echo, "RCS in m² of what else echoes in each cell's resolution cell")
+
+
+class GroundClutter(Effect[Echo]):
+    """Echo of flat terrain in the cell of each target, where the beam meets it.
+
+    The beam points at the target and is as wide as a resolution cell, unless the scene gives its
+    beamwidths; clutter more than two beamwidths off its axis is 0. The air takes from the echo of
+    the ground what it takes from the target's. What the threshold does there is said by
+    ``clutter_threshold``.
+    """
+
+    lockstep = True
+    name = "ground clutter"
+    acts_on = CLUTTER
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] height_m``."""
+        terrain = terrain_of(block)
+        if terrain is None:
+            return Verdict(False, "[terrain] height_m is not given")
+        return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
+
+    def build(self, block: Any) -> Echo:
+        """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
+        terrain = terrain_of(block)
+        if terrain is None:
+            return NoEcho(block)
+        for width, name in zip(cell_size(block.p), _CELL, strict=True):
+            if width == 0:
+                raise ValueError(
+                    f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
+                )
+        if block.p.pulses_summed > 1:
+            if block.p.budget == "dwell" and block.p.integration == "noncoherent":
+                raise ValueError(
+                    f"integration is 'noncoherent', which sums {block.p.pulses_summed} pulses: "
+                    "ground clutter is known for one look only; set it to 'coherent'"
+                )
+            raise ValueError(
+                f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
+                "set it to 1, with integration_gain_db for pulses integrated coherently"
+            )
+
+        if terrain.clutter_mean == "constant" and block.p.cfar_reference_cells is not None:
+            raise ValueError(
+                f"cfar_reference_cells is {block.p.cfar_reference_cells} and [terrain] "
+                "clutter_mean is 'constant': an average of cells is known for clutter that "
+                "fluctuates; leave one of them out"
+            )
+
+        return GroundEcho(block, terrain)
 
 
 class BoundaryClutter(GroundClutter):

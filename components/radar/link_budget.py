@@ -304,3 +304,35 @@ def _other_unit(value: float, low: float, high: float, unit: str) -> str:
         if value > 0 and 10.0 * low <= value * factor <= high:
             return f" (is it {value:g} {_PREFIXES[factor]}{unit}, {value * factor:g} {unit}?)"
     return ""
+
+
+#: Gain times beamwidths in square degrees.
+GAIN_TIMES_BEAM = 30_000.0
+MOST_GAIN_DISAGREEMENT_DB = 3.0
+
+
+def beam_against_gain(parameters: Any) -> list[str]:
+    """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
+
+    A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are
+    built (M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 9.2, has 26,000; C. A.
+    Balanis, Antenna Theory, section 2.6, 30,000).
+    """
+    p = parameters
+    widths_deg = p.azimuth_beamwidth_deg, p.elevation_beamwidth_deg
+    whose = "azimuth_beamwidth_deg and elevation_beamwidth_deg are"
+    if p.azimuth_beamwidth_deg is None:
+        widths_deg = p.azimuth_resolution_deg, p.elevation_resolution_deg
+        whose = "no beamwidths are given, and the grid that stands for the beam is"
+    azimuth_deg, elevation_deg = widths_deg
+    if not (azimuth_deg and elevation_deg):
+        return []
+    gain_db = 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg))
+    if abs(gain_db - p.antenna_gain_db) <= MOST_GAIN_DISAGREEMENT_DB:
+        return []
+    alike_deg = math.sqrt(GAIN_TIMES_BEAM / 10.0 ** (0.1 * p.antenna_gain_db))
+    return [
+        f"antenna_gain_db is {p.antenna_gain_db:g}, which is a beam of {alike_deg:.3g} x "
+        f"{alike_deg:.3g} deg, and {whose} {azimuth_deg:g} x {elevation_deg:g} deg, which is "
+        f"{gain_db:.3g} dB: clutter, false alarms and what is told apart go by the beam"
+    ]

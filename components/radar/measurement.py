@@ -10,12 +10,12 @@ from pydantic import Field, model_validator
 
 from components.arguments.checks import not_negative, positive
 from components.messages.columns import OWN_VELOCITY
-from components.messages.detections import Detections
+from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.detection.output import measured_snr
 from components.radar.link_budget import wavelength
 from components.radar.resolution import ResolutionParameters
-from components.sensor.look import Cells, Look
+from components.sensor.look import STRENGTH, Cells, Look, Strengthening
 from components.sensor.parameters import CorrelationTime, ErrorParameters, GlintParameters
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -215,7 +215,7 @@ def _range_rate_resolution_m_s(p: Any) -> float | None:
 FAINTEST = 1e-6
 
 
-class MeasuredStrength(Effect):
+class MeasuredStrength(Effect[Strengthening]):
     """What a radar knows of a target's echo is what it knows of noise: how strong it came out.
 
     SNR and confidence of a detection are those of the output that crossed the threshold, by the
@@ -226,8 +226,7 @@ class MeasuredStrength(Effect):
 
     lockstep = True
     name = "measured strength"
-    acts_on = "strength"
-    neutral = False
+    acts_on = STRENGTH
     outside_the_proof = "a radar always measures strength"
 
     def verdict(self, block: Any) -> Verdict:
@@ -307,7 +306,7 @@ def noise_at_targets(parameters: Any) -> list[str]:
     ]
 
 
-class OwnVelocity(Effect):
+class OwnVelocity(Effect[Reporting]):
     """The ownship's velocity over ground beside every detection; navigation has no error of it.
 
     A range rate is of two aircraft: who estimates the other one's velocity from it must know ours.
@@ -315,15 +314,14 @@ class OwnVelocity(Effect):
 
     lockstep = True
     name = "own velocity"
-    acts_on = "report"
-    neutral = False
+    acts_on = REPORT
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``measures_range_rate``."""
         return Verdict.of_flag(block.p, "measures_range_rate")
 
-    def build(self, block: Any) -> Any:
+    def build(self, block: Any) -> Reporting:
         """Return what adds the velocity to a report."""
         ticks_per_s = block.context.ticks_per_s
 
@@ -334,7 +332,7 @@ class OwnVelocity(Effect):
             after, some = detections.ticks_after, counts > 0
             # At instants of their own, or once a scan.
             row = rows[some] if after is None else np.repeat(rows, counts)
-            state = (targets.tick if targets.state_tick is None else targets.state_tick)[row]
+            state = targets.picture_tick[row]
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = own_velocity(targets, row, time_s)
             if after is not None:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.detection.cfar import FEWEST_CELLS, MOST_CELLS
+from components.radar.detection.probability import detection_probability, required_snr
 from components.radar.doppler import FEWEST_PULSES, MOST_PULSES
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth, implausible
 from components.radar.measurement import (
@@ -335,13 +336,19 @@ def budget_report(name: str, budget: LinkBudget) -> dict[str, Any]:
     return {"link_budgets": {name: {"bandwidth_hz": float(budget.bandwidth_hz)}}}
 
 
-def moved_threshold(parameters: Any, pd: float) -> list[str]:
+def moved_threshold(p: LinkBudgetParameters) -> list[str]:
     """Say what Pd a calibration's range has where the threshold is not the one it was for."""
-    known = parameters.calibrate
-    if known is None or parameters.calibrated_pfa == parameters.false_alarm_probability:
+    known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability
+    if known is None or stated == now:
         return []
+    look: dict[str, Any] = {
+        "pulses": p.stated_pulses_summed,
+        "model": f"swerling{known.swerling}",
+    }
+    snr = required_snr(known.pd, false_alarm_probability=stated, **look)
+    pd = float(detection_probability(snr, false_alarm_probability=now, **look))
     return [
-        f"calibrate holds at false_alarm_probability {parameters.calibrated_pfa:g} and the "
-        f"threshold is set for {parameters.false_alarm_probability:g}: the hardware stays, and Pd "
-        f"at {known.range_km:g} km is {pd:.3g} instead of {known.pd:g}"
+        f"calibrate holds at false_alarm_probability {stated:g} and the threshold is set for "
+        f"{now:g}: the hardware stays, and Pd at {known.range_km:g} km is {pd:.3g} instead of "
+        f"{known.pd:g}"
     ]

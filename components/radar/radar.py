@@ -1,6 +1,6 @@
 """The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -8,65 +8,64 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry.attitude import body_to_ned, unit_vector
-from components.messages.detections import OwnOfEntries
-from components.messages.reach import farthest_look
+from components.geometry import body_to_ned, unit_vector
 from components.messages.targets import RelativeTargets, own_velocity
-from components.radar.beam import BeamSweep, Sweep
-from components.radar.detection.cfar import Averaging, CellAveraging
+from components.radar.beam import BeamSweep, SweepingSensor
+from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
 from components.radar.detection.probability import required_snr
 from components.radar.doppler import (
+    DOPPLER,
     LASTS_S,
+    RANGE_RATE,
     DopplerFilter,
     DopplerProcessing,
     RangeRate,
+    RangeRates,
     folded_range_rate,
 )
-from components.radar.ground_clutter import BoundaryClutter, Echo, clutter_as_signal, terrain_of
+from components.radar.ground_clutter import (
+    CLUTTER,
+    BoundaryClutter,
+    Echo,
+    clutter_as_signal,
+    terrain_of,
+)
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
 from components.radar.rain import RainClutter, SidelobeClutter
-from components.radar.resolution import Merging, OneReportByCell
+from components.radar.resolution import ONE_REPORT, Merging, OneReportByCell
 from components.radar.timing import unambiguous_range_m
 from components.radar.weather import (
+    SNR,
     WEATHER_EFFECTS,
     BlindRange,
-    CellFactor,
     rain_warnings,
     weather_without_carrier,
 )
+from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
-from components.sensor.sensor import Sensor
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect
-from dsa_des.block.message import Message
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 #: Over ground, of the fastest aircraft that a radar listens for: a jet's at cruise.
 FASTEST_M_S = 250.0
 
 
-class Radar(Sensor):
+class Radar(SweepingSensor):
     """A sensor that measures range; subclasses decide what is detected."""
 
     mark = RADAR
     measures_range = True
     #: Of the carrier, m; None where it is not known.
     wavelength_m: float | None = None
-    hooks = {
-        "SNR": "(cells) -> factor of each cell's SNR",
-        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
-        "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
-        "one report by cell": "(cells, power) -> power of the echo that stands for its "
-        "resolution cell, 0 of the others",
-    }
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (SNR, DOPPLER, RANGE_RATE, ONE_REPORT)
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
-    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -78,38 +77,27 @@ class Radar(Sensor):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.snr_factors: list[CellFactor] = []
+        self.snr_factors: list[CellValues] = []
         self._merging: Merging | None = None
         self.doppler: DopplerProcessing | None = None
         self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
-        self.snr_factors = self.built("SNR")
-        (self.doppler,) = self.built("Doppler") or [None]
-        (self._merging,) = self.built("one report by cell") or [None]
+        self.snr_factors = self.built(SNR)
+        self.doppler = self.built_one(DOPPLER)
+        self._merging = self.built_one(ONE_REPORT)
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
 
-    def records(self) -> list[type[Message]]:
-        """Return what is recorded: where the beam sweeps, the ownship at each entry's instant."""
-        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
-
-    @property
-    def _sweep(self) -> Sweep | None:
-        return self.context.effects.get(BeamSweep.name)
-
     def request(self, port: str) -> Any:
-        """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
+        """Ask for the targets in our reach, and how they go on where rates are of interest."""
         reach = super().request(port)
-        if not self.p.enabled:
+        if not (self.p.enabled and (self._rates or self.built(DOPPLER))):
             return reach
-        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
-        if self._sweep is None:
-            return replace(reach, lasts_s=lasts_s)
-        return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+        return replace(reach, lasts_s=LASTS_S + reach.lasts_s)
 
     def offer(self, port: str) -> Any:
         """Say beside what every sensor says whether range rates fold."""
@@ -121,8 +109,8 @@ class Radar(Sensor):
         return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
-    def _rates(self) -> list[Callable[[Cells, IntArray], FloatArray]]:
-        return self.built("range rate")
+    def _rates(self) -> RangeRates | None:
+        return self.built_one(RANGE_RATE)
 
     @property
     def steps(self) -> dict[str, float]:
@@ -133,7 +121,7 @@ class Radar(Sensor):
 
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
-        return self._rates[0](cells, found) if self._rates else None
+        return None if self._rates is None else self._rates(cells, found)
 
     def _in_body(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
@@ -165,8 +153,8 @@ class Radar(Sensor):
             assert self.wavelength_m is not None
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
         each, place = np.unique(row, return_inverse=True)
-        tick = (targets.tick if targets.state_tick is None else targets.state_tick)[each]
-        velocity = own_velocity(targets, each, tick / self.context.ticks_per_s)
+        time_s = targets.picture_tick[each] / self.context.ticks_per_s
+        velocity = own_velocity(targets, each, time_s)
         body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude
         if attitude is None or not np.isfinite(velocity).all():
@@ -176,13 +164,23 @@ class Radar(Sensor):
         nearer_m_s: FloatArray = (towards * velocity[:, place]).sum(axis=0)
         return off * FASTEST_M_S - nearer_m_s
 
-    def seen(
-        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
-    ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets at the instants at which the beam lights them."""
-        if self._sweep is None:
-            return targets, rows
-        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+
+class LaterAcquisition(Effect[CellValues]):
+    """Sees a target from where it is acquired on, as long as no scan misses it."""
+
+    lockstep = True
+    name = "acquisition"
+    acts_on = SNR
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``acquisition``."""
+        if not block.p.acquisition:
+            return Verdict(False, "acquisition is not given")
+        return Verdict(True, f"acquisition has {len(block.p.acquisition)} ranges")
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every cell's SNR: 0 of whom has not been acquired, else 1."""
+        return Acquired(block.p.acquisition)
 
 
 class RangeBoundaryParameters(RadarParameters):
@@ -191,6 +189,11 @@ class RangeBoundaryParameters(RadarParameters):
     range_km: float = Field(gt=0, description="Range inside which every target is detected, km.")
     minimum_range_m: float | None = Field(
         default=None, gt=0, description="Closer than this nothing is detected, m; none by default."
+    )
+    acquisition: tuple[AcquisitionRange, ...] = Field(
+        default=(),
+        description="Where targets are acquired that it then keeps, by their speed, slowest first; "
+        "by default anywhere within range_km.",
     )
     boundary_rcs_dbsm: float = Field(
         default=0.0,
@@ -224,6 +227,7 @@ class RangeBoundaryParameters(RadarParameters):
 
     @model_validator(mode="after")
     def _carrier(self) -> Self:
+        check_speeds(self.acquisition)
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
             if getattr(self, key) != off and self.frequency_hz is None:
                 raise ValueError(
@@ -260,13 +264,11 @@ class RangeBoundary(Radar):
     Parameters = RangeBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    hooks = {
-        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
-        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
-    }
+    hooks = (CLUTTER, REFERENCE_CELLS)
     effects = (
         *WEATHER_EFFECTS,
         BlindRange(),
+        LaterAcquisition(),
         BoundaryClutter(),
         RainClutter(),
         SidelobeClutter(),
@@ -288,8 +290,15 @@ class RangeBoundary(Radar):
         """Take what the scene's effects do to the boundary."""
         super().setup()
         refuse_cues(self)
-        self._echoes = self.built("clutter")
-        (self._cfar,) = self.built("threshold from reference cells") or [None]
+        self._echoes = self.built(CLUTTER)
+        self._cfar = self.built_one(REFERENCE_CELLS)
+
+    def request(self, port: str) -> Any:
+        """Ask how targets go on too, where their speed decides who is acquired."""
+        reach = super().request(port)
+        if not (self.p.enabled and len(self.p.acquisition) > 1):
+            return reach
+        return replace(reach, lasts_s=max(reach.lasts_s, 2.0 * STEP_S))
 
     def warnings(self) -> list[str]:
         """Say that clutter counts as signal, where it does, and what it hears of the weather."""

@@ -18,6 +18,7 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.radar.ground_clutter import (
+    CLUTTER,
     Echo,
     NoEcho,
     Velocity,
@@ -151,7 +152,7 @@ def _below(deviations: FloatArray) -> FloatArray:
     return share
 
 
-class RainClutter(Effect):
+class RainClutter(Effect[Echo]):
     """Echo of rain in the resolution cell of each target, as far as it rains there.
 
     The beam points at the target. Drops scatter after Rayleigh, by the rain rate (Z = 200 R^1.6);
@@ -161,7 +162,7 @@ class RainClutter(Effect):
 
     lockstep = True
     name = "rain echo"
-    acts_on = "clutter"
+    acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] rain_rate_mm_h``, and for a carrier and a cell."""
@@ -230,7 +231,7 @@ class RainEcho(Echo):
         return np.asarray(mean), np.hypot(own, platform)
 
 
-class SidelobeClutter(Effect):
+class SidelobeClutter(Effect[Echo]):
     """Ground and rain at the target's range all around, received through the sidelobes.
 
     All sidelobes have one mean level (``sidelobe_level_db``), towards the ground below as well:
@@ -240,7 +241,7 @@ class SidelobeClutter(Effect):
 
     lockstep = True
     name = "sidelobe clutter"
-    acts_on = "clutter"
+    acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``sidelobe_level_db``, and for ground or rain."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +19,11 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry.attitude import aspect_angles, unit_vector
-from components.sensor.look import Cells
+from components.geometry import aspect_angles, unit_vector
+from components.sensor.look import Cells, CellValues, turned_to_sight
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
 
@@ -80,21 +80,21 @@ def scan_rcs(
     return total / pulses
 
 
+def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
+    """Return from where each cell's target is seen, in its body axes."""
+    # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
+    # heading.
+    *turned, elevation = turned_to_sight(cells)
+    return aspect_angles(np.zeros(len(cells)), elevation, *turned)
+
+
 def mean_rcs_m2(cells: Cells) -> FloatArray:
     """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
     tables, place = cells.roster.tables("rcs_table")
     if not tables:
         return rcs
-    # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
-    # heading.
-    azimuth, elevation = aspect_angles(
-        np.zeros(len(cells)),
-        cells.elevation_rad,
-        cells.relative_heading_rad,
-        cells.target_pitch_rad,
-        cells.target_roll_rad,
-    )
+    azimuth, elevation = _aspect_angles(cells)
     which = place[cells.craft]
     for index, table in enumerate(tables):
         chosen = np.flatnonzero(which == index)
@@ -102,18 +102,25 @@ def mean_rcs_m2(cells: Cells) -> FloatArray:
     return rcs
 
 
-#: Swerling models with the cells that each holds for.
-ModelsOfCells = Callable[[Cells], list[tuple[int, Any]]]
+class ModelsOfCells(Protocol):
+    """Tells which Swerling model each cell has."""
+
+    def __call__(self, cells: Cells, /) -> list[tuple[int, Any]]:
+        """Return models (5 written as 0) with the cells that each holds for."""
+
+
+FLUCTUATION = Hook("RCS", ModelsOfCells, "which Swerling model each cell has")
+MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 
 _UNKNOWN = "the targets are not known before the run"
 
 
-class RcsFluctuation(Effect):
+class RcsFluctuation(Effect[ModelsOfCells]):
     """Swerling fluctuation I to IV (thesis §4.1.2); without it every target is steady."""
 
     lockstep = True
     name = "RCS fluctuation"
-    acts_on = "RCS"
+    acts_on = FLUCTUATION
 
     def verdict(self, block: Any) -> Verdict:
         """Ask the radar's ``swerling``, and where it has none each target's."""
@@ -131,12 +138,12 @@ class RcsFluctuation(Effect):
         return models_of(block.p.swerling)
 
 
-class AspectRcs(Effect):
+class AspectRcs(Effect[CellValues]):
     """Mean RCS from a table over the direction from which the radar sees the aircraft."""
 
     lockstep = True
     name = "aspect RCS"
-    acts_on = "mean RCS"
+    acts_on = MEAN_RCS
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
@@ -149,7 +156,7 @@ class AspectRcs(Effect):
             return Verdict(False, "no target has an rcs_table")
         return Verdict(True, f"{_first(found)} an rcs_table{_more(found)}")
 
-    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+    def build(self, block: Any) -> CellValues:
         """Return each cell's mean RCS; a target without a table has its constant."""
         return mean_rcs_m2
 
@@ -270,8 +277,14 @@ class Scatterers:
         return [radius * level * np.cos(turn), radius * level * np.sin(turn), radius * z]
 
 
-#: (cells, chosen of them, Swerling model) → power of each echo over its mean.
-Fading = Callable[[Cells, Any, int], FloatArray]
+class Fading(Protocol):
+    """Gives the power of lasting echoes over their mean."""
+
+    def __call__(self, cells: Cells, chosen: Any, model: int, /) -> FloatArray:
+        """Return it of some cells that have one Swerling model."""
+
+
+FADING = Hook("fading", Fading, "power of lasting echoes over their mean")
 
 
 def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
@@ -288,7 +301,7 @@ def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
     return total / len(amplitudes)
 
 
-class LastingFluctuation(Effect):
+class LastingFluctuation(Effect[Fading]):
     """Echoes whose complex amplitude lasts: in time, and in the aspect that the radar has.
 
     With ``fluctuation_correlation_s`` the amplitude of each target is a Gauss-Markov process: its
@@ -304,8 +317,7 @@ class LastingFluctuation(Effect):
 
     lockstep = True
     name = "lasting fluctuation"
-    acts_on = "fading"
-    neutral = False
+    acts_on = FADING
     outside_the_proof = "without it every scan draws a fade of its own"
 
     def verdict(self, block: Any) -> Verdict:
@@ -371,12 +383,6 @@ class LastingFluctuation(Effect):
 
 def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the unit vector from each target to the radar in the target's body axes."""
-    azimuth, elevation = aspect_angles(
-        np.zeros(len(cells)),
-        cells.elevation_rad,
-        cells.relative_heading_rad,
-        cells.target_pitch_rad,
-        cells.target_roll_rad,
-    )
+    azimuth, elevation = _aspect_angles(cells)
     x, y, z = unit_vector(azimuth[chosen], elevation[chosen])
     return x, y, z

@@ -10,14 +10,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.arguments.checks import positive
-from components.geometry.angles import TWO_PI
-from components.geometry.field_of_view import sector_width_rad
-from components.messages.reach import Reach
 from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells
 from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.errors import Disagreements
 
 
@@ -179,11 +176,6 @@ class ResolutionParameters(SensorParameters):
         return self
 
 
-def azimuth_width_rad(reach: Reach) -> float:
-    """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
-    return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
-
-
 def cell_size(parameters: Any) -> tuple[float, float, float]:
     """Return the size of a resolution cell (rad, rad, m): its beam, or its grid's step, or 0."""
     widths = [
@@ -212,7 +204,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
         )
     return resolution_cells(
         azimuth_start_rad=block.reach.azimuth_rad[0],
-        azimuth_width_rad=azimuth_width_rad(block.reach),
+        azimuth_width_rad=block.reach.width_rad[0],
         lowest_elevation_rad=block.reach.elevation_rad[0],
         highest_elevation_rad=block.reach.elevation_rad[1],
         nearest_m=block.budget.nearest_m,
@@ -221,36 +213,6 @@ def cells_of_radar(block: Any) -> ResolutionCells:
         elevation_cell_rad=elevation_rad,
         range_cell_m=range_m,
     )
-
-
-class OneReportByCell(Effect):
-    """Targets whose echoes fall into one resolution cell give one report.
-
-    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
-
-    It is that of the strongest echo, looked at with the sum of their powers (phases are random
-    against each other), and with that target's fluctuation and draws. So noise alone reports a
-    cell with the probability of false alarm, however many faint targets it holds.
-    """
-
-    lockstep = True
-    name = "resolution cells"
-    acts_on = "one report by cell"
-    neutral = False
-    outside_the_proof = "without it every target has a report of its own"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``resolution_cells``."""
-        p = block.p
-        if p.resolution_cells is None and p.errors != "grid":
-            if p.sizeless_steps:
-                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
-            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
-        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
-
-    def build(self, block: Any) -> Merging:
-        """Return what adds up the echoes of each cell."""
-        return Merging(block)
 
 
 class Merging:
@@ -290,3 +252,39 @@ class Merging:
             summed[more] += power[order[first[more] + later]]
         total[order[first]] = summed
         return total
+
+
+ONE_REPORT = Hook(
+    "one report by cell",
+    Merging,
+    "power of the echo that stands for its resolution cell, 0 of the others",
+)
+
+
+class OneReportByCell(Effect[Merging]):
+    """Targets whose echoes fall into one resolution cell give one report.
+
+    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
+
+    It is that of the strongest echo, looked at with the sum of their powers (phases are random
+    against each other), and with that target's fluctuation and draws. So noise alone reports a
+    cell with the probability of false alarm, however many faint targets it holds.
+    """
+
+    lockstep = True
+    name = "resolution cells"
+    acts_on = ONE_REPORT
+    outside_the_proof = "without it every target has a report of its own"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``resolution_cells``."""
+        p = block.p
+        if p.resolution_cells is None and p.errors != "grid":
+            if p.sizeless_steps:
+                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
+            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
+        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
+
+    def build(self, block: Any) -> Merging:
+        """Return what adds up the echoes of each cell."""
+        return Merging(block)

@@ -8,13 +8,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.ladder import ExactDetection, method_reasons
+from components.radar.detection.ladder import PD_METHOD, ExactDetection, method_reasons
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
 from components.radar.measurement import noise_at_targets, signal_over_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
+    FADING,
+    FLUCTUATION,
     Fading,
     LastingFluctuation,
     ModelsOfCells,
@@ -25,7 +27,7 @@ from components.radar.rcs import (
 )
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather import WEATHER_EFFECTS
-from components.sensor.look import Cells, Look
+from components.sensor.look import CUE, Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
 from dsa_des.time.randomness import Stream
@@ -156,11 +158,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     Parameters = SwerlingParameters
     lockstep = True
-    hooks = {
-        "RCS": "which Swerling model each cell has",
-        "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",
-        "method of Pd": "name of the method that gives the probability of detection",
-    }
+    hooks = (FLUCTUATION, FADING, PD_METHOD)
     effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -176,10 +174,10 @@ class SwerlingRadar(LinkBudgetRadar):
     def setup(self) -> None:
         """Take the scene's effects; without fluctuation every target is steady."""
         super().setup()
-        (self._models,) = self.built("RCS") or [steady]
-        (self._fading,) = self.built("fading") or [None]
+        self._models = self.built_one(FLUCTUATION) or steady
+        self._fading = self.built_one(FADING)
         if self.p.detection == "exact":
-            (self._method,) = self.built("method of Pd") or ["table"]
+            self._method = self.built_one(PD_METHOD) or "table"
 
     def left_out(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
@@ -232,7 +230,7 @@ class SwerlingRadar(LinkBudgetRadar):
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
         pfa: Any = self.p.false_alarm_probability
-        if clutter is not None or self._cued_detector(cells) is not None:
+        if clutter is not None or (cells.cued is not None and self._cued_detector is not None):
             pfa = self._pd_of_cells(cells, np.zeros(len(cells)), clutter)
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
@@ -263,10 +261,11 @@ class SwerlingRadar(LinkBudgetRadar):
         """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
-    def _cued_detector(self, cells: Cells) -> tuple[int, float] | None:
-        """Return pulses and false alarm probability in cue cones; None where all is as usual."""
+    @property
+    def _cued_detector(self) -> tuple[int, float] | None:
+        """Pulses and false alarm probability in cue cones; None where all is as usual."""
         p = self.p
-        if cells.cued is None or not (p.cued_pulses or p.cued_false_alarm_probability):
+        if not (p.cued_pulses or p.cued_false_alarm_probability):
             return None
         return (
             p.cued_pulses or p.pulses_summed,
@@ -276,7 +275,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def _pd_of_cells(self, cells: Cells, snr: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability of detection of every cell."""
         pd = np.empty(len(cells))
-        cued = self._cued_detector(cells)
+        cued = None if cells.cued is None else self._cued_detector
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
             beside = None if clutter is None else clutter.of(chosen)
@@ -330,7 +329,7 @@ class SwerlingRadar(LinkBudgetRadar):
         None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
         moving-target filter.
         """
-        if self.built("cue"):
+        if self.built(CUE):
             return None
         proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
         if terrain_of(self) is not None or not proven:
@@ -345,11 +344,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
-        p = self.p
-        if not (p.cued_pulses or p.cued_false_alarm_probability):
-            return None
-        pfa = p.cued_false_alarm_probability or p.false_alarm_probability
-        return Crossing.of(p.cued_pulses or p.pulses_summed, pfa)
+        return None if self._cued_detector is None else Crossing.of(*self._cued_detector)
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:

@@ -1,6 +1,6 @@
 """A radar that detects above a fixed SNR (``radar.threshold``, thesis §3.5.1)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -12,10 +12,10 @@ from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
-from components.radar.beam import BeamShape, BeamSweep, beam_against_gain
-from components.radar.detection.cfar import Averaging, CellAveraging
+from components.radar.beam import BEAM_SHAPE, BeamShape, BeamSweep
+from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION, RCS
-from components.radar.detection.probability import detection_probability, required_snr
+from components.radar.detection.probability import required_snr
 from components.radar.detection.threshold import Crossing
 from components.radar.doppler import DopplerFilter
 from components.radar.false_alarms import (
@@ -26,13 +26,14 @@ from components.radar.false_alarms import (
     unlikely_false_alarms,
 )
 from components.radar.ground_clutter import (
+    CLUTTER,
     Clutter,
     Echo,
     GroundClutter,
     clutter_as_signal,
     terrain_of,
 )
-from components.radar.link_budget import implausible
+from components.radar.link_budget import beam_against_gain, implausible
 from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
@@ -42,14 +43,14 @@ from components.radar.parameters import (
 )
 from components.radar.radar import Radar
 from components.radar.rain import RainClutter, SidelobeClutter
-from components.radar.rcs import AspectRcs, constant_rcs_m2, mean_rcs_m2
-from components.radar.resolution import OneReportByCell, cells_of_radar
-from components.radar.timing import TimeBudget, time_report
+from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
+from components.radar.resolution import OneReportByCell
+from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, Look
-from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.effect import Effect
+from components.sensor.look import CUE, Cells, CellValues, Look
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import nanosecond_of
 
@@ -72,13 +73,9 @@ class LinkBudgetRadar(Radar):
 
     Parameters = LinkBudgetParameters
     inputs = CUED_INPUTS
-    hooks = {
-        "mean RCS": "(cells) -> each cell's mean RCS in m²",
-        "energy of a look": "what the time of a scan leaves for each beam",
-        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
-        "beam shape": "(cells) -> share of a target's echo that is left off the beam's axis",
-        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
-    }
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (
+        MEAN_RCS, LOOK_ENERGY, CLUTTER, BEAM_SHAPE, REFERENCE_CELLS,
+    )  # fmt: skip
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
@@ -107,10 +104,10 @@ class LinkBudgetRadar(Radar):
         # Until the scene's effects are known, all that the parameters and targets call for.
         self._echo_budget = self.budget
         #: Each cell's mean RCS, m².
-        self.mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
+        self.mean_rcs_m2: CellValues = mean_rcs_m2
         #: What gives an echo beside the target.
         self.echoes: list[Echo] = []
-        self._beam_shape: Callable[[Cells], FloatArray] | None = None
+        self._beam_shape: CellValues | None = None
         self.cfar: Averaging | None = None
         self._roster: Roster | None = None
 
@@ -118,11 +115,11 @@ class LinkBudgetRadar(Radar):
         """Take what the scene's effects do to the SNR, and leave out what it does not call for."""
         super().setup()
         self._echo_budget = self._without_blind_range()
-        (self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
-        self.echoes = self.built("clutter")
-        (self._beam_shape,) = self.built("beam shape") or [None]
-        (self.cfar,) = self.built("threshold from reference cells") or [None]
-        if self.built("cue") and self.p.cued_dwell_factor is not None:
+        self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
+        self.echoes = self.built(CLUTTER)
+        self._beam_shape = self.built_one(BEAM_SHAPE)
+        self.cfar = self.built_one(REFERENCE_CELLS)
+        if self.built(CUE) and self.p.cued_dwell_factor is not None:
             self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
         self._set_threshold()
         if noise := self.context.effects.get(FalseAlarms.name):
@@ -241,10 +238,10 @@ class LinkBudgetRadar(Radar):
             where, {"snr": alarms.snr}, (alarms.key, scan, instant_ns, run)
         )
         snr_db = 10.0 * np.log10(alarms.snr)
-        extras = {"snr_db": snr_db}
+        extras: dict[str, AnyArray] = {"snr_db": snr_db}
         kept: Any = slice(None)
-        if cones := self.built("cue"):
-            inside = cones[0].in_cones(row, azimuth, elevation)
+        if cones := self.built_one(CUE):
+            inside = cones.in_cones(row, azimuth, elevation)
             extras["cued"] = inside
             kept = slice(None) if cued is None else np.flatnonzero(inside == cued)
         return add_false_detections(
@@ -288,35 +285,13 @@ class LinkBudgetRadar(Radar):
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
             *cue_warnings(self),
-            *self._said_of_calibration(),
-            *self._said_of_false_alarms(),
+            *moved_threshold(self.p),
+            *unlikely_false_alarms(self),
             *clutter_as_signal(self.p, terrain_of(self)),
             *beam_against_gain(self.p),
             *rain_warnings(self),
             *gas_left_out(self),
         ]
-
-    def _said_of_calibration(self) -> list[str]:
-        p = self.p
-        if p.calibrate is None or p.calibrated_pfa == p.false_alarm_probability:
-            return []
-        model, pulses = f"swerling{p.calibrate.swerling}", p.stated_pulses_summed
-        snr = required_snr(
-            p.calibrate.pd, pulses=pulses, false_alarm_probability=p.calibrated_pfa, model=model
-        )
-        pd = detection_probability(
-            snr, pulses=pulses, false_alarm_probability=p.false_alarm_probability, model=model
-        )
-        return moved_threshold(p, float(pd))
-
-    def _said_of_false_alarms(self) -> list[str]:
-        if not (self.p.false_alarms and self.p.enabled):
-            return []
-        pfa, cells = self.crossing.false_alarm_probability, cells_of_radar(self).count
-        key = self.noise_key()
-        own = "false_alarm_probability"
-        by_default = key.startswith(own) and own not in self.p.model_fields_set
-        return unlikely_false_alarms(key, pfa, cells, by_default)
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use, and how the time of a scan is spent where it costs."""

@@ -9,11 +9,9 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.arguments.checks import positive
-from components.geometry.angles import TWO_PI
-from components.geometry.field_of_view import sector_width_rad
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.resolution import ResolutionParameters
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 # A width that is a whole number of steps up to rounding has that many; likewise pulses in a dwell.
 _ROUNDING = 1e-9
@@ -176,10 +174,10 @@ class TimeBudgetParameters(ResolutionParameters):
         """The beam positions of a scan over the field of view, where beamwidths are given."""
         if self.azimuth_beamwidth_deg is None or self.elevation_beamwidth_deg is None:
             return None
-        reach = self.reach()
+        across_rad, upward_rad = self.reach().width_rad
         return beam_positions(
-            azimuth_width_rad=min(sector_width_rad(*reach.azimuth_rad), TWO_PI),
-            elevation_width_rad=reach.elevation_rad[1] - reach.elevation_rad[0],
+            azimuth_width_rad=across_rad,
+            elevation_width_rad=upward_rad,
             azimuth_beamwidth_rad=math.radians(self.azimuth_beamwidth_deg),
             elevation_beamwidth_rad=math.radians(self.elevation_beamwidth_deg),
             spacing=self.beam_spacing,
@@ -313,7 +311,10 @@ def _rounded_down(value: float) -> str:
     return f"{math.floor(value / step) * step:.4g}"
 
 
-class TimeBudget(Effect):
+LOOK_ENERGY = Hook("energy of a look", LookEnergy, "what the time of a scan leaves for each beam")
+
+
+class TimeBudget(Effect[LookEnergy]):
     """Energy of a look from the time that a scan leaves for each beam.
 
     A radar's link budget then differs with its scan rate, so replicas that differ in it have
@@ -322,8 +323,7 @@ class TimeBudget(Effect):
 
     lockstep = True
     name = "time budget"
-    acts_on = "energy of a look"
-    neutral = False
+    acts_on = LOOK_ENERGY
     outside_the_proof = "with it the link budget is that of another look"
 
     def verdict(self, block: Any) -> Verdict:

@@ -1,7 +1,6 @@
 """What the way takes from a radar's echo: gas, rain and fog, and the blind range."""
 
 import math
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,20 +15,19 @@ from components.atmosphere.slant_path import (
 from components.environment.tables import Weather
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
-from components.sensor.look import Cells
+from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
-#: From cells to the factor of each one's SNR.
-CellFactor = Callable[[Cells], FloatArray]
+SNR = Hook("SNR", CellValues, "factor of each cell's SNR")
 
 
-class BlindRange(Effect):
+class BlindRange(Effect[CellValues]):
     """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
 
     lockstep = True
     name = "blind range"
-    acts_on = "SNR"
+    acts_on = SNR
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``minimum_range_m``."""
@@ -38,7 +36,7 @@ class BlindRange(Effect):
             return Verdict(False, "minimum_range_m is not given")
         return Verdict(True, f"minimum_range_m is {nearest:g}")
 
-    def build(self, block: Any) -> CellFactor:
+    def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's SNR: 0 closer than the minimum range, else 1."""
         nearest_m = 0.0 if block.p.minimum_range_m is None else block.p.minimum_range_m
 
@@ -51,10 +49,10 @@ class BlindRange(Effect):
 _NO_CARRIER = "frequency_hz is not given"
 
 
-class Attenuation(Effect):
+class Attenuation(Effect[CellValues]):
     """Loss along the slant path, evaluated once per run into a table over altitude."""
 
-    acts_on = "SNR"
+    acts_on = SNR
     #: Of the scene's ``[weather]``, that says whether there is any.
     key: ClassVar[str]
 
@@ -71,7 +69,7 @@ class Attenuation(Effect):
         """Return the arguments of the table for this effect and no other."""
         raise TypeError(f"{type(self).__name__} has no settings")
 
-    def build(self, block: Any) -> CellFactor:
+    def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's SNR."""
         weather = block.context.sections["weather"]
         if block.wavelength_m is None:

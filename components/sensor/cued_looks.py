@@ -7,9 +7,11 @@ import numpy as np
 
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import axis_in_body
+from components.messages.columns import ORIGIN, STATE
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
+from components.sensor.look import CUE, Cueing
 from components.sensor.sensor import Sensor, believed_pose
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Input
@@ -18,16 +20,14 @@ from dsa_des.block.wake import Wake
 
 #: The input over which they come.
 PORT = "cues"
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
-class CuedLooks(Effect):
+class CuedLooks(Effect[Cueing]):
     """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
 
     lockstep = True
     name = "cues"
-    acts_on = "cue"
+    acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for a wire that brings cues."""
@@ -36,7 +36,7 @@ class CuedLooks(Effect):
             return Verdict(False, "no wire brings cues")
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
-    def build(self, block: Any) -> "ConesAhead":
+    def build(self, block: Any) -> Cueing:
         """Return what finds targets in cones."""
         return ConesAhead()
 
@@ -72,11 +72,11 @@ class ConesAhead:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
         place = pose_in_frame(
-            tuple(getattr(cones, name)[entry] for name in _ORIGIN), tuple(own[:3]), tuple(own[3:])
+            tuple(getattr(cones, name)[entry] for name in ORIGIN), tuple(own[:3]), tuple(own[3:])
         )
         axis = axis_in_body(
             time_s - cones.state_s[entry],
-            np.stack([getattr(cones, name)[entry] for name in _STATE]),
+            np.stack([getattr(cones, name)[entry] for name in STATE]),
             np.stack([cones.azimuth_rad[entry], cones.elevation_rad[entry]]),
             cones.has_range[entry],
             place,

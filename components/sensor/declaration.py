@@ -6,19 +6,17 @@ Looks before the first one count as misses.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.geometry.attitude import body_to_ned, unit_vector
-from components.messages.detections import Detections
+from components.geometry import body_to_ned, unit_vector
+from components.messages.detections import REPORT, Detections, Reporting
+from components.sensor.look import DECLARATION, Cells, Judging, Look
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
-
-if TYPE_CHECKING:
-    from components.sensor.look import Cells, Look
 
 
 def no_looks_yet(n: int, targets: int) -> BoolArray:
@@ -93,11 +91,11 @@ def _checked_rule(m: int, n: int) -> None:
         raise ValueError(f"m is {m}: it must be at most n, {n}")
 
 
-class DeclarationRule(Effect):
+class DeclarationRule(Effect[Judging]):
     """Marks the detections of declared targets; without a rule every detection declares."""
 
     name = "declaration"
-    acts_on = "declaration"
+    acts_on = DECLARATION
     lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
@@ -251,7 +249,7 @@ def _near(
     return near
 
 
-class DeclarationByPlace(Effect):
+class DeclarationByPlace(Effect[Reporting]):
     """Marks detections whose place had others in m of the last n scans, targets or false alarms.
 
     Nothing but measured values decides; places are compared in north-east-down by what the
@@ -259,9 +257,8 @@ class DeclarationByPlace(Effect):
     """
 
     name = "declaration by place"
-    acts_on = "report"
+    acts_on = REPORT
     lockstep = True
-    neutral = False
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:

@@ -15,43 +15,13 @@ from components.geometry import body_angles, body_to_ned, ned_to_body, unit_vect
 from components.messages.detections import LastingPart
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
 
 Place = tuple[FloatArray, FloatArray, FloatArray]
 # Nearer to the vertical azimuths say nothing.
 _LEAST_COS = 1e-3
 _LEAST_AREA_M2 = 0.01
-
-
-class Glint(Effect):
-    """Targets seem to be where their centre of reflection is, which wanders over their extent.
-
-    Along each of a target's own axes the centre is off by a Gauss-Markov process whose standard
-    deviation is ``glint_share`` of the target's extent; so the error across the line of sight is
-    that share of the extent that the sensor sees, over the range, and along it a range's. A sensor
-    does not know whom it sees: what it states is that of the scene's aircraft on average, level
-    and from any side, at the range, or of the size, that it measures.
-    """
-
-    lockstep = True
-    name = "glint"
-    acts_on = "apparent place"
-    neutral = False
-    outside_the_proof = "every target has an extent"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``errors`` and ``glint_share``."""
-        share = getattr(block.p, "glint_share", None)
-        if share is None:
-            return Verdict(False, "its errors do not follow from signals")
-        if block.p.errors != "signal":
-            return Verdict(False, f"errors is {block.p.errors!r}")
-        return Verdict(share > 0.0, f"glint_share is {share:g}")
-
-    def build(self, block: Any) -> "Wander":
-        """Return what moves targets to where they seem to be."""
-        return Wander(block)
 
 
 class Wander:
@@ -142,6 +112,38 @@ class Wander:
             "azimuth": share2 * solid * self._level2 / level**2,
             "elevation": share2 * solid * self._upward2,
         }
+
+
+APPARENT_PLACE = Hook("apparent place", Wander, "where targets seem to be")
+
+
+class Glint(Effect[Wander]):
+    """Targets seem to be where their centre of reflection is, which wanders over their extent.
+
+    Along each of a target's own axes the centre is off by a Gauss-Markov process whose standard
+    deviation is ``glint_share`` of the target's extent; so the error across the line of sight is
+    that share of the extent that the sensor sees, over the range, and along it a range's. A sensor
+    does not know whom it sees: what it states is that of the scene's aircraft on average, level
+    and from any side, at the range, or of the size, that it measures.
+    """
+
+    lockstep = True
+    name = "glint"
+    acts_on = APPARENT_PLACE
+    outside_the_proof = "every target has an extent"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``errors`` and ``glint_share``."""
+        share = getattr(block.p, "glint_share", None)
+        if share is None:
+            return Verdict(False, "its errors do not follow from signals")
+        if block.p.errors != "signal":
+            return Verdict(False, f"errors is {block.p.errors!r}")
+        return Verdict(share > 0.0, f"glint_share is {share:g}")
+
+    def build(self, block: Any) -> Wander:
+        """Return what moves targets to where they seem to be."""
+        return Wander(block)
 
 
 def _level_area_m2(roster: Roster, band: str) -> FloatArray:

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.geometry.angles import TWO_PI, past, wrap_pi
-from components.geometry.field_of_view import rising_sector
+from components.geometry import TWO_PI, past, rising_sector, wrap_pi
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110

@@ -3,13 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.effect import Hook
+from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 
@@ -189,8 +192,7 @@ class Cells:
                 "and moving_target_filter to 'none'"
             )
         row, column = np.divmod(self._flat[cells], self._width)
-        state = targets.tick if targets.state_tick is None else targets.state_tick
-        time_s = state[row] / self._ticks_per_s
+        time_s = targets.picture_tick[row] / self._ticks_per_s
         if hasattr(targets, "offset_s"):
             time_s = time_s + self.offset_s[cells]
         return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
@@ -232,3 +234,56 @@ class Cells:
         """Return uniform draws keyed by each cell's target and scan."""
         keys = self.roster.keys_of(self.target)
         return stream.of_runs(self.run).uniform(keys, self.scan, draw)
+
+
+def turned_to_sight(
+    cells: Any, chosen: Any = slice(None)
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return heading against the line of sight, pitch, roll, and the line's elevation, of cells."""
+    return (
+        cells.relative_heading_rad[chosen],
+        cells.target_pitch_rad[chosen],
+        cells.target_roll_rad[chosen],
+        cells.elevation_rad[chosen],
+    )
+
+
+class CellValues(Protocol):
+    """Gives one number for each cell: a factor, a cross-section, an area."""
+
+    def __call__(self, cells: Cells, /) -> FloatArray:
+        """Return them, (cells,)."""
+
+
+class Cueing(Protocol):
+    """Finds what lies in the cones of cues."""
+
+    def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake, /) -> BoolArray | None:
+        """Return which targets do at each scan, (scans, targets), or None for none."""
+
+    def in_cones(
+        self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
+    ) -> BoolArray:
+        """Return which directions in body axes do at their row in the last call."""
+
+    def with_noise(self, detections: Detections) -> Detections:
+        """Return a report of the same scans whose false alarms say, too, if they do."""
+
+
+class Strengthening(Protocol):
+    """Says how strong detections came out."""
+
+    def __call__(self, cells: Cells, found: IntArray, look: Look, /) -> Look:
+        """Return the look with the strength of the cells that are detected (`found`)."""
+
+
+class Judging(Protocol):
+    """Says which detections declare their target."""
+
+    def __call__(self, cells: Cells, look: Look, /) -> Look:
+        """Return the look with a column ``declared``."""
+
+
+CUE = Hook("cue", Cueing, "which targets lie in a cue cone at each scan")
+STRENGTH = Hook("strength", Strengthening, "look: as strong as its detections came out")
+DECLARATION = Hook("declaration", Judging, "look: which detections declare their target")

@@ -15,7 +15,7 @@ from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.recorded_columns import nothing_in
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
@@ -78,26 +78,6 @@ _NEAREST_M = 1e-3
 _QUARTER = 0.5 * math.pi
 
 
-class MeasurementErrors(Effect):
-    """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
-
-    lockstep = True
-    name = "measurement errors"
-    acts_on = "measurement"
-    neutral = False
-    outside_the_proof = "without it reports are the truth on a grid"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``errors``."""
-        if block.p.errors == "grid":
-            return Verdict(False, "errors is 'grid': values are rounded to the grid")
-        return Verdict(True, f"errors is '{block.p.errors}'")
-
-    def build(self, block: Any) -> "Erring":
-        """Return what measures with errors."""
-        return Erring(block)
-
-
 class Erring:
     """Measures with errors; called in place of the sensor's grid."""
 
@@ -113,6 +93,9 @@ class Erring:
             for name in self._steps
         }
         self._variances = _mean_squares(p, self._steps)
+        #: Mean square of errors that are stated as a share of the value, by quantity.
+        self._shares = {name: mean_square(_stated(p, name), p.biases == "drawn")
+                        for name in self._steps if of_share(p, name)}  # fmt: skip
         self._grids = {
             "azimuth": Grid(self._steps["azimuth"]),
             "elevation": Grid(self._steps["elevation"], limit_low=-_QUARTER, limit_high=_QUARTER),
@@ -132,10 +115,7 @@ class Erring:
         when = cells.scan[found], cells.instant_ns[found], cells.run[found]
         if look.noise is not None and self._signal:
             true = self._in_cells(true, look.noise[found], keys, when[0], when[2])
-        values = {
-            name: true[name] + error(keys, *when, of_signal.get(name))
-            for name, error in self._errors.items()
-        }
+        values = self._off(true, lambda name, error: error(keys, *when, of_signal.get(name)))
         return self._stated(self._valid(values), of_signal, signal)
 
     def _in_cells(
@@ -188,11 +168,20 @@ class Erring:
         of_signal = self._of_signal(signal)
         if drawn is not None:
             keys, scan, instant_ns, run = drawn
-            where = {
-                name: where[name] + error(keys, scan, instant_ns, run, of_signal.get(name))
-                for name, error in self._errors.items()
-            }
+            when = scan, instant_ns, run
+            where = self._off(where, lambda name, error: error(keys, *when, of_signal.get(name)))
         return self._stated(self._valid(where), of_signal, signal)
+
+    def _off(
+        self,
+        true: Mapping[str, FloatArray],
+        drawn: Callable[[str, QuantityError], FloatArray],
+    ) -> dict[str, FloatArray]:
+        """Return values with their errors, which some have as a share of the value."""
+        return {
+            name: true[name] + drawn(name, error) * (true[name] if name in self._shares else 1.0)
+            for name, error in self._errors.items()
+        }
 
     def _stated(
         self,
@@ -202,6 +191,8 @@ class Erring:
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
         """Return what is measured, with its variances by column."""
         columns = self._columns(len(values["azimuth"]), of_signal)
+        for name, share in self._shares.items():
+            columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + share * values[name] ** 2
         if self._block.wander is not None:
             added = self._block.wander.variances(values, signal, self._block.pixel_rad)
             for name, more in added.items():
@@ -243,11 +234,39 @@ class Erring:
         return found
 
 
+MEASUREMENT = Hook("measurement", Erring, "what is measured, and its variances")
+
+
+class MeasurementErrors(Effect[Erring]):
+    """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
+
+    lockstep = True
+    name = "measurement errors"
+    acts_on = MEASUREMENT
+    outside_the_proof = "without it reports are the truth on a grid"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``errors``."""
+        if block.p.errors == "grid":
+            return Verdict(False, "errors is 'grid': values are rounded to the grid")
+        return Verdict(True, f"errors is '{block.p.errors}'")
+
+    def build(self, block: Any) -> Erring:
+        """Return what measures with errors."""
+        return Erring(block)
+
+
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
     """Return the variances that all detections of a sensor share, by column; none by signal."""
     if p.errors == "signal":
         return {}
-    return {VARIANCE_OF[name]: v for name, v in _mean_squares(p, _steps(p, steps)).items()}
+    known = _mean_squares(p, _steps(p, steps))
+    return {VARIANCE_OF[name]: v for name, v in known.items() if not of_share(p, name)}
+
+
+def of_share(p: Any, name: str) -> bool:
+    """Return whether a quantity's error is stated as a share of its value, and so differs."""
+    return bool(p.errors != "grid" and p.quantities.get(name) == "share")
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
@@ -259,9 +278,23 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
         parts = [LastingPart(bias)] if bias else []
         if stated.correlation_time_s is not None and stated.deviation:
             parts.append(LastingPart(stated.deviation**2, stated.correlation_time_s))
+        if of_share(p, name):
+            parts = _shares_of(parts, mean_square(stated, p.biases == "drawn"), step)
         if step or parts:
             found[name] = LastingError(step, tuple(parts))
     return found
+
+
+def _shares_of(parts: Iterable[LastingPart], whole: float, step: float) -> list[LastingPart]:
+    """Return parts of an error that grows with its value: as shares of the variance but rounding's.
+
+    `whole` is the mean square of the share.
+    """
+    rounding = variance_of_step(step)
+    return [
+        LastingPart(-part.variance / whole * rounding, part.lasts_s, share=part.variance / whole)
+        for part in parts
+    ]
 
 
 def with_parts(
@@ -281,10 +314,14 @@ def _steps(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
 
 
 def _mean_squares(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return the mean square of what is stated and of rounding, by quantity."""
+    """Return the mean square of what is stated and of rounding, by quantity.
+
+    What is stated as a share of the value is none of it.
+    """
     drawn = p.biases == "drawn"
     return {
-        name: mean_square(_stated(p, name), drawn) + variance_of_step(step)
+        name: variance_of_step(step)
+        + (0.0 if of_share(p, name) else mean_square(_stated(p, name), drawn))
         for name, step in steps.items()
     }
 

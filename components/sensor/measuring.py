@@ -6,9 +6,11 @@ from functools import cached_property
 from typing import Any
 
 from components.messages.reach import Reach
+from components.sensor.glint import APPARENT_PLACE, Wander
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
 from components.sensor.look import Cells, Look
-from components.sensor.mounting import BodyAxes
+from components.sensor.measurement_errors import MEASUREMENT, Erring
+from components.sensor.mounting import AXES, BodyAxes
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 
@@ -36,18 +38,16 @@ class Measuring(Component):
     @cached_property
     def axes(self) -> BodyAxes:
         """The sensor's axes; known once the scene's effects are."""
-        mounted = self.built("axes")
-        return mounted[0] if mounted else _BODY_AXES
+        return self.built_one(AXES) or _BODY_AXES
 
     @cached_property
-    def _erring(self) -> list[Any]:
-        return self.built("measurement")
+    def _erring(self) -> Erring | None:
+        return self.built_one(MEASUREMENT)
 
     @cached_property
-    def wander(self) -> Any:
-        """Where targets seem to be on themselves (`components.sensor.glint`), or None."""
-        (wander,) = self.built("apparent place") or [None]
-        return wander
+    def wander(self) -> Wander | None:
+        """Where targets seem to be on themselves or None."""
+        return self.built_one(APPARENT_PLACE)
 
     @property
     def pixel_rad(self) -> tuple[float, float] | None:
@@ -96,8 +96,8 @@ class Measuring(Component):
         true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
         if (rate := self.range_rate(cells, found)) is not None:
             true["range_rate"] = rate
-        if self._erring:
-            return self._in_body(*self._erring[0](cells, found, look, true))
+        if self._erring is not None:
+            return self._in_body(*self._erring(cells, found, look, true))
         return self._in_body(*self._on_grid(true))
 
     def report_noise(
@@ -113,8 +113,8 @@ class Measuring(Component):
         them a place by the edge of the field of view would never be reported beyond it. The last
         value holds the other measured columns of `Detections`.
         """
-        if self._erring:
-            return self._in_body(*self._erring[0].of_noise(where, signal, drawn))
+        if self._erring is not None:
+            return self._in_body(*self._erring.of_noise(where, signal, drawn))
         return self._in_body(*self._on_grid(where))
 
     def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:

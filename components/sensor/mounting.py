@@ -14,7 +14,7 @@ from components.geometry import (
 )
 from components.messages.reach import Reach, ReasonArray
 from dsa_des.arrays.types import BoolArray, FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 Angles = tuple[FloatArray, FloatArray]
 
@@ -152,13 +152,15 @@ class MountedReach(Reach):
         return super().decide(*angles, range_m, present, hidden)
 
 
-class Mounting(Effect):
+AXES = Hook("axes", BodyAxes, "the sensor's axes in the ownship's")
+
+
+class Mounting(Effect[BodyAxes]):
     """Boresight and roll of the sensor, and an error of them that is not known to the ownship."""
 
     lockstep = True
     name = "mounting"
-    acts_on = "axes"
-    neutral = False
+    acts_on = AXES
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:

@@ -14,27 +14,37 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.messages.columns import POSE
-from components.messages.detections import Detections, LastingError, SensorOffer
+from components.messages.detections import REPORT, Detections, LastingError, Reporting, SensorOffer
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
-from components.sensor.glint import Glint
+from components.sensor.glint import APPARENT_PLACE, Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
-from components.sensor.look import Cells, Look
+from components.sensor.look import (
+    CUE,
+    DECLARATION,
+    STRENGTH,
+    Cells,
+    Cueing,
+    Judging,
+    Look,
+    Strengthening,
+)
 from components.sensor.measurement_errors import (
+    MEASUREMENT,
     MeasurementErrors,
     constant_variances,
     lasting_errors,
     with_parts,
 )
 from components.sensor.measuring import Measuring
-from components.sensor.mounting import Mounting
+from components.sensor.mounting import AXES, Mounting
 from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
-from dsa_des.block.effect import Effect
+from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
@@ -126,15 +136,9 @@ class Sensor(Measuring):
     also_records: ClassVar[tuple[type[Message], ...]] = (EveryLook,)
     windowed = True
     rewindable = True
-    hooks: ClassVar[Mapping[str, str]] = {
-        "cue": "(targets, rows, wake) -> which targets lie in a cue cone at each scan",
-        "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
-        "apparent place": "(cells, found, line of sight) -> where targets seem to be",
-        "strength": "(cells, found, look) -> look: as strong as its detections came out",
-        "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
-        "declaration": "(cells, look) -> look: which detections declare their target",
-        "report": "(detections, targets, rows) -> detections: what is sent",
-    }
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (
+        CUE, AXES, APPARENT_PLACE, STRENGTH, MEASUREMENT, DECLARATION, REPORT,
+    )  # fmt: skip
     effects = SENSOR_EFFECTS
     #: Whether lines of sight are measured in body axes, so that who turns them into the world's by
     #: what the ownship believes of its pose has its errors in them too.
@@ -216,20 +220,20 @@ class Sensor(Measuring):
         return [self._message, EveryLook] if self._says_looks else [self._message]
 
     @cached_property
-    def _judgements(self) -> list[Any]:
-        return self.built("declaration")
+    def _judgements(self) -> list[Judging]:
+        return self.built(DECLARATION)
 
     @cached_property
-    def _cueing(self) -> list[Any]:
-        return self.built("cue")
+    def _cueing(self) -> Cueing | None:
+        return self.built_one(CUE)
 
     @cached_property
-    def _strengths(self) -> list[Any]:
-        return self.built("strength")
+    def _strengths(self) -> list[Strengthening]:
+        return self.built(STRENGTH)
 
     @cached_property
-    def _reporting(self) -> list[Any]:
-        return self.built("report")
+    def _reporting(self) -> list[Reporting]:
+        return self.built(REPORT)
 
     def seen(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
@@ -259,7 +263,7 @@ class Sensor(Measuring):
         held = wake.held("targets")
         if held is None:
             return None
-        cued = self._cueing[0](*held, wake) if self._cueing else None
+        cued = None if self._cueing is None else self._cueing(*held, wake)
         targets, rows = self.seen(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
@@ -317,13 +321,13 @@ class Sensor(Measuring):
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
-        if self._cueing:
-            detections = self._cueing[0].with_noise(detections)
+        if self._cueing is not None:
+            detections = self._cueing.with_noise(detections)
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what is recorded of each cell beside its detection."""
-        if not self._cueing:
+        if self._cueing is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}
 

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearised
+from components.messages.columns import STATE
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
@@ -139,9 +140,6 @@ def _measurements(state: Any) -> list[Any]:
     single = getattr(hypothesis, "single_hypotheses", None)
     hypotheses = [hypothesis] if single is None else single
     return [one.measurement for one in hypotheses if one]
-
-
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 
 
 def _builder(value: Any) -> Any:
@@ -341,7 +339,7 @@ class StoneSoupTracker(Component):
         def column(name: str, kind: type = float) -> Any:
             return np.array([getattr(one, name) for one in tracks], dtype=kind)
 
-        moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(_STATE)}
+        moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(STATE)}
         assert self._origin is not None
         lat, lon, alt = (np.full(count, value) for value in self._origin)
         return StateTracks(

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from components.estimation.carried_errors import BEARING, RANGE
-from components.geometry.angles import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
 from components.messages.reach import Reach

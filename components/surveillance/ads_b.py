@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach

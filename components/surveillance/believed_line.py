@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.geometry.attitude import body_angles_unchecked, ned_to_body_unchecked
-from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry import body_angles_unchecked, line_of_sight_ned, ned_to_body_unchecked
 from components.navigation.errors import position_with_error
 from dsa_des.arrays.types import FloatArray
 

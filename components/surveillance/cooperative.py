@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry import line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
 from components.sensor.marks import COOPERATIVE

@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
-from components.geometry import radii_of_curvature
-from components.geometry.angles import RAD_PER_DEG, past
+from components.geometry import RAD_PER_DEG, past, radii_of_curvature
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, status_of

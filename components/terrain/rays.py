@@ -15,8 +15,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M
-from components.geometry.angles import DEG_PER_RAD, Vector, local_axes
+from components.geometry import (
+    DEG_PER_RAD,
+    ECCENTRICITY_SQUARED,
+    SEMI_MAJOR_AXIS_M,
+    Vector,
+    local_axes,
+)
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray
 

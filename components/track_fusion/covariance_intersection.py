@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from components.estimation.motion import ConstantVelocity
+from components.messages.columns import ORIGIN, POSITION
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
@@ -34,7 +35,6 @@ from dsa_des.block.wake import Arrivals, Wake
 
 # Fused tracks by number: as many as are compared.
 _TRACKS = 64
-_POSITION = ("north_m", "east_m", "down_m")
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
@@ -46,7 +46,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
         row = np.repeat(np.searchsorted(wake.ticks, reported.tick), np.diff(reported.offsets))
         mine = np.flatnonzero(reported.has_range & (reported.track <= _TRACKS))
         place = row[mine], reported.track[mine] - 1
-        position[place] = np.stack([getattr(reported, name)[mine] for name in _POSITION], axis=-1)
+        position[place] = np.stack([getattr(reported, name)[mine] for name in POSITION], axis=-1)
         variance = sum(reported.covariance[f"covariance_{i}{i}_m2"][mine] for i in range(3))
         spread[place] = np.sqrt(np.asarray(variance))
     return {"position": position, "spread": spread}
@@ -70,9 +70,6 @@ RULE = Ladder(
     (Quantity("position", "m", _distance), Quantity("spread", "m")),
     measure,
 )  # fmt: skip
-
-
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
 class IntersectionParameters(Parameters):
@@ -201,7 +198,7 @@ class CovarianceIntersection(Component):
         newest[replica[ends]] = so_far[ends]
         self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
-        return Arrivals(new.source, new.tick[which], new.message.take(which))
+        return Arrivals(new.source, new.instants.take(which), new.message.take(which))
 
     def _records_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
@@ -216,7 +213,7 @@ class CovarianceIntersection(Component):
             sooner = row[entries] < first[of]
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
-            records.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
+            records.origin[:, of] = [getattr(message, column)[entries] for column in ORIGIN]
         kept = self._records.continued(records)
         return kept.with_columns(
             origin=np.where(np.isnan(kept.origin[0]), records.origin, kept.origin)

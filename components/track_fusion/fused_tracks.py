@@ -9,6 +9,7 @@ from components.estimation.covariance_intersection import Rule, combined, invers
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind, linearised
 from components.estimation.motion import ConstantVelocity
+from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import (
     COASTED,
     CONFIRMED,
@@ -115,10 +116,6 @@ def _newest(tracks: LocalTracks, of: IntArray, count: int) -> IntArray:
     return order[np.cumsum(np.bincount(of, minlength=count)) - 1]
 
 
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_OWN = ("own_north_m", "own_east_m", "own_down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
-
 _WHOLE = ("replica", "row", "track", "track_status", "contributors", "updated_by")
 _NUMBERS = (
     "born_s", "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
@@ -214,7 +211,7 @@ def state_tracks(
         extras={},
         sensors=sensors,
         **{name: reported.columns[name] for name in names},
-        **dict(zip(_STATE, reported.state, strict=True)),
-        **dict(zip(_OWN, reported.own, strict=True)),
-        **dict(zip(_ORIGIN, reported.origin, strict=True)),
+        **dict(zip(STATE, reported.state, strict=True)),
+        **dict(zip(OWN_POSITION, reported.own, strict=True)),
+        **dict(zip(ORIGIN, reported.origin, strict=True)),
     )

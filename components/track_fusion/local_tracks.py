@@ -8,13 +8,11 @@ import numpy as np
 from components.estimation.batched import times
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
-from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
+from components.messages.columns import ORIGIN, OWN_POSITION, STATE
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
 
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_OWN = ("own_north_m", "own_east_m", "own_down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 #: Tracks of one tracker in a run are fewer than this.
 _NUMBERS = 1 << 36
 
@@ -96,12 +94,10 @@ def local_tracks(
         return getattr(message, name)[which]
 
     ranged = column("has_range")
-    state = np.stack([np.where(ranged, column(name), 0.0) for name in _STATE])
-    covariance = np.empty((6, 6, len(which)))
-    for (i, j), name in COVARIANCE.items():
-        value = np.where(ranged, message.covariance[name][which], float(i == j))
-        covariance[i, j] = covariance[j, i] = value
-    change = frame_change(np.stack([column(name) for name in _ORIGIN]), origin_deg_m[:, row])
+    state = np.stack([np.where(ranged, column(name), 0.0) for name in STATE])
+    one = np.eye(6)[:, :, np.newaxis]
+    covariance = np.where(ranged, full_covariance(message.covariance, which), one)
+    change = frame_change(np.stack([column(name) for name in ORIGIN]), origin_deg_m[:, row])
     found = LocalTracks(
         replica=replica[row],
         tracker=np.full(len(which), tracker, dtype=np.int64),
@@ -116,7 +112,7 @@ def local_tracks(
         elevation_rad=column("elevation_rad"),
         azimuth_variance_rad2=column("azimuth_variance_rad2"),
         elevation_variance_rad2=column("elevation_variance_rad2"),
-        own_m=change.positions(np.stack([column(name) for name in _OWN])),
+        own_m=change.positions(np.stack([column(name) for name in OWN_POSITION])),
         turn=change.turn,
         time_s=column("state_s"),
         updated_s=column("updated_s"),

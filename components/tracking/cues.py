@@ -9,18 +9,15 @@ from pydantic import Field, model_validator
 
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import half_angle_rad
+from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.cues import CueCones
-from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
-
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-_OWN = ("own_north_m", "own_east_m", "own_down_m")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
 class CueParameters(Parameters):
@@ -125,15 +122,13 @@ class Cues(Component):
             wanted &= tracks.track_status != TENTATIVE
         entry = np.flatnonzero(wanted)
         lasts_s = self.p.lasts_s
-        state = np.stack([getattr(tracks, name)[entry] for name in _STATE])
-        covariance = np.empty((6, 6, len(entry)))
-        for (i, j), name in COVARIANCE.items():
-            covariance[i, j] = covariance[j, i] = tracks.covariance[name][entry]
+        state = np.stack([getattr(tracks, name)[entry] for name in STATE])
+        covariance = full_covariance(tracks.covariance, entry)
         across = lasts_s * (covariance[:3, 3:] + covariance[3:, :3])
         spread = covariance[:3, :3] + across + lasts_s**2 * covariance[3:, 3:]
         for i in range(3):
             spread[i, i] += self.p.acceleration_intensity_m2_s3 * lasts_s**3 / 3.0
-        own = np.stack([getattr(tracks, name)[entry] for name in _OWN])
+        own = np.stack([getattr(tracks, name)[entry] for name in OWN_POSITION])
         axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(entry), axis=2)
         half = half_angle_rad(state[:3], spread, SensorPose(own, axes), self.p.sigmas)
         level = np.cos(tracks.elevation_rad[entry])
@@ -156,7 +151,7 @@ class Cues(Component):
         entry: IntArray,
         half_rad: FloatArray,
     ) -> CueCones:
-        names = ("track", "azimuth_rad", "elevation_rad", "has_range", "state_s", *_STATE, *_ORIGIN)
+        names = ("track", "azimuth_rad", "elevation_rad", "has_range", "state_s", *STATE, *ORIGIN)
         return CueCones(
             tick=wake.ticks[rows],
             run=wake.run[rows],

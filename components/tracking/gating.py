@@ -11,7 +11,7 @@ from components.estimation.estimator import PairMeasurement, log_mixture, pair_m
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected
-from components.geometry.angles import wrap_pi_unchecked
+from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of

@@ -7,10 +7,10 @@ import numpy as np
 from components.estimation.covariance_intersection import distance_squared
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import position_of
-from components.messages.columns import POSE
+from components.messages.columns import ORIGIN, POSE, POSITION, VELOCITY
 from components.messages.false_detections import true_entries
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks, full_covariance
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -18,9 +18,6 @@ from dsa_des.block.wake import Wake
 
 # A track farther from a target than this is not taken to be of it.
 _NEAR_M = 1000.0
-_POSITION = ("north_m", "east_m", "down_m")
-_VELOCITY = ("north_m_s", "east_m_s", "down_m_s")
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
@@ -61,10 +58,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     best = best[distance[best] <= _NEAR_M]
     row, target = row_of_entry[entry[best]], fused.target[entry[best]]
     errors["position"][row, target] = distance[best]
-    spread = np.empty((3, 3, len(best)))
-    for (i, j), name in COVARIANCE.items():
-        if j < 3:
-            spread[i, j] = spread[j, i] = tracks.covariance[name][mine[best]]
+    spread = full_covariance(tracks.covariance, mine[best], 3)
     nees = distance_squared(error[:, best], spread) / 3.0
     # A covariance is not carried back: of late detections only the position counts.
     errors["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
@@ -77,7 +71,7 @@ def _apart(
     """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
     measured_s = fused.measured_tick[entry] / wake.ticks_per_s
     lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
-    origin: Any = tuple(getattr(tracks, name)[mine] for name in _ORIGIN)
+    origin: Any = tuple(getattr(tracks, name)[mine] for name in ORIGIN)
     turned: Any = tuple(attitude)
     pose = pose_in_frame(origin, (lat, lon, alt), turned)
     true = np.stack(
@@ -85,8 +79,8 @@ def _apart(
     )
     truth_m, _ = position_of(true, pose)
     back_s = tracks.state_s[mine] - measured_s
-    position = np.stack([getattr(tracks, name)[mine] for name in _POSITION])
-    velocity = np.stack([getattr(tracks, name)[mine] for name in _VELOCITY])
+    position = np.stack([getattr(tracks, name)[mine] for name in POSITION])
+    velocity = np.stack([getattr(tracks, name)[mine] for name in VELOCITY])
     return position - back_s * velocity - truth_m, np.abs(back_s)
 
 

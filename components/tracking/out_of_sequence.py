@@ -44,10 +44,8 @@ class Before:
 class Memory:
     """The looks of one replica that may still have to be worked on again, in order."""
 
-    # When each was made, and its number among the looks of the wake
-    keys: list[Key] = field(default_factory=list)
-    # When each was made, and its number among the looks of the wake
-    looks: list[int] = field(default_factory=list)
+    keys: list[Key] = field(default_factory=list)  # When each was made, and by whom
+    looks: list[int] = field(default_factory=list)  # Its number among the looks of the wake
 
 
 @dataclass(frozen=True, eq=False)

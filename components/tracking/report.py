@@ -10,6 +10,7 @@ from components.estimation.batched import selected
 from components.estimation.estimator import Estimates, combined
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import direction, range_share
+from components.messages.columns import STATE
 from components.messages.state_tracks import COVARIANCE, StateTracks
 from components.tracking.management import existence
 from components.tracking.track_store import TrackStore
@@ -17,7 +18,6 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
 
-_COMPONENTS = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _ACCELERATIONS = (
     "acceleration_north_m_s2", "acceleration_east_m_s2", "acceleration_down_m_s2",
 )  # fmt: skip
@@ -110,7 +110,7 @@ def state_tracks(
         sensors=sensors,
         nis=np.where(freedom > 0, store.plain("nis"), np.nan),
         nis_freedom=freedom,
-        **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
+        **{name: known(state[i]) for i, name in enumerate(STATE)},
     )  # fmt: skip
 
 

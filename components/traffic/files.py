@@ -12,9 +12,8 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
-from components.flights.fleet import SampledFleet
-from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
-from components.flights.sampled_flight import SampledTrajectory
+from components.flights.closest_approach import OwnTimes, SampleTimes, SharedTimes
+from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
@@ -190,8 +189,7 @@ class RecordedTraffic(TrafficSource):
         super().__init__(name, parameters, context)
         self.content = self._in_wind(self.read())
         self.own = self.content.ownship
-        self.targets = self.content.intruders
-        self.fleet = SampledFleet(self.content.intruders)
+        self.targets = SampledFleet(self.content.intruders)
         self.roster = roster_of(
             [target.name for target in self.content.intruders],
             parameters.intruder,

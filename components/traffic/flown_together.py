@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any, Self, cast
+from dataclasses import replace
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
-from components.flights.bounds import intervals_present_s, max_speeds_mps
 from components.flights.culling import (
     NearIntervals,
     closing_speeds_mps,
@@ -23,8 +22,8 @@ from components.flights.culling import (
     near_intervals,
     within_of,
 )
-from components.flights.fleet import fleet_of
-from components.flights.many_flights import Fleet, OwnFlights
+from components.flights.fleet import Fleet
+from components.flights.many_flights import SteeredFleet, fleet_of
 from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import flat
@@ -45,7 +44,7 @@ class RowFlights:
     """
 
     def __init__(
-        self, own: OwnFlights, targets: Any, width: int, replica: IntArray, known: IntArray
+        self, own: SteeredFleet, targets: Any, width: int, replica: IntArray, known: IntArray
     ) -> None:
         self._own, self._targets, self._width = own, targets, width
         self._replica, self._known = replica, known
@@ -140,28 +139,12 @@ class AskedFlights(RowFlights):
         return found
 
 
-@dataclass(frozen=True)
-class AllFlown:
+class AllFlown(NamedTuple):
     """The flights of all replicas: an ownship each, and the targets of all one after the other."""
 
     own: Fleet
     targets: Fleet
-    own_speed_mps: FloatArray
-    target_speed_mps: FloatArray
-    own_present_s: FloatArray
-    target_present_s: FloatArray
     roster: Roster
-
-    @classmethod
-    def of(
-        cls, fleets: Sequence[Fleet], flights: Sequence[Sequence[Any]], roster: Roster
-    ) -> AllFlown:
-        """Return ownships and targets, as fleets and one by one, with their speeds and times."""
-        (own_fleet, target_fleet), (own, targets) = fleets, flights
-        return cls(
-            own_fleet, target_fleet, max_speeds_mps(own), max_speeds_mps(targets),
-            intervals_present_s(own), intervals_present_s(targets), roster,
-        )  # fmt: skip
 
 
 class FlownTogether:
@@ -171,7 +154,7 @@ class FlownTogether:
         self._flown, self._roster = flown, flown.roster
         self._width = len(face.roster)
         self._columns = np.arange(self._width)
-        self._own = OwnFlights(flown.own, len(flown.own_speed_mps))
+        self._own = SteeredFleet(flown.own)
         self._ticks_per_s = face.context.ticks_per_s
         self._says_truth, self._asked_for = face.says_truth, face.flights_asked_for
         self._rates_hz = rates_hz
@@ -191,17 +174,18 @@ class FlownTogether:
 
     def _near_intervals(self, reach_m: float, end_s: float) -> NearIntervals:
         flown, width = self._flown, max(1, self._width)
-        own = np.repeat(np.arange(len(flown.own_speed_mps)), self._width)
-        first = np.maximum(flown.target_present_s[:, 0], flown.own_present_s[own, 0])
-        last = np.minimum(flown.target_present_s[:, 1], flown.own_present_s[own, 1])
+        own = np.repeat(np.arange(len(flown.own)), self._width)
+        own_s, targets_s = flown.own.intervals_present_s[own], flown.targets.intervals_present_s
         return near_intervals(
             lambda target, time_s: self.range_m(target // width, target, time_s),
-            closing_speed_mps=flown.target_speed_mps + flown.own_speed_mps[own],
-            present_s=(first, last),
+            closing_speed_mps=flown.targets.max_speeds_mps + flown.own.max_speeds_mps[own],
+            present_s=(
+                np.maximum(targets_s[:, 0], own_s[:, 0]), np.minimum(targets_s[:, 1], own_s[:, 1]),
+            ),
             reach_m=reach_m,
             end_s=end_s,
             of_run=width,
-        )
+        )  # fmt: skip
 
     def range_m(self, ownship: IntArray, target: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the range from ownships to targets (n,), each at a time (n,) of its own."""
@@ -265,7 +249,7 @@ class FlownTogether:
     def _steer(self, wake: Wake, replica: IntArray) -> IntArray:
         """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
         self._pending += arrived_manoeuvres(wake)
-        known: IntArray = self._own.count[replica]
+        known: IntArray = self._own.manoeuvre_count[replica]
         if self._pending:
             now, self._pending = self._due(wake)
             came = _instants(now)
@@ -306,10 +290,10 @@ class _Epochs:
 
     def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
         self._flights, self._width = flights, width
-        replicas = len(flown.own_speed_mps)
-        self._speeds_mps = flown.target_speed_mps.reshape(replicas, width)
-        self._own_mps, self._reach_m = flown.own_speed_mps, reach_m
-        closing = closing_speeds_mps(self._speeds_mps, flown.own_speed_mps[:, np.newaxis])
+        replicas = len(flown.own)
+        self._speeds_mps = flown.targets.max_speeds_mps.reshape(replicas, width)
+        self._own_mps, self._reach_m = flown.own.max_speeds_mps, reach_m
+        closing = closing_speeds_mps(self._speeds_mps, self._own_mps[:, np.newaxis])
         self._epoch_s = epochs_of(closing, reach_m)
         self._last: IntArray = np.full(replicas, -1, dtype=np.int64)
         self._range_m: FloatArray = np.zeros((replicas, width))
@@ -357,12 +341,4 @@ def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
         targets += list(source.targets)
         aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
     roster = joint_roster(face.roster, aircraft)
-    if roster is None:
-        return None
-    fleets: list[Fleet] = []
-    for flights in (own, targets):
-        fleet = fleet_of(flights)
-        if fleet is None:
-            return None
-        fleets.append(fleet)
-    return AllFlown.of(fleets, (own, targets), roster)
+    return None if roster is None else AllFlown(fleet_of(own), fleet_of(targets), roster)

@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
-from components.flights.fleet import ScriptedFleet
-from components.flights.sample_times import RegularTimes, SampleTimes
-from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
+from components.flights.closest_approach import RegularTimes, SampleTimes
+from components.flights.many_flights import Starts
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource
@@ -86,9 +86,9 @@ class RandomTraffic(TrafficSource):
         )
         altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
         speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
-        flights = flights_of(Starts(names, lat, lon, altitude, 360.0 * heading, speed))
-        self.targets = flights
-        self.fleet = ScriptedFleet(flights)
+        zero, free = np.zeros(len(names)), np.full((3, len(names)), np.nan)
+        starts = (names, lat, lon, altitude, 360.0 * heading, speed, zero, zero, zero + np.inf)
+        self.targets = Starts(*starts, fixed_deg=free).fleet()
         aircraft = [p.aircraft] * len(names)
         if p.equipage_shares != EquipageShares():
             aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))

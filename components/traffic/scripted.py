@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights import legs
 from components.flights.attitude import Wind, ground_speed_mps
-from components.flights.fleet import ScriptedFleet
-from components.flights.sample_times import RegularTimes, SampleTimes
-from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
+from components.flights.closest_approach import RegularTimes, SampleTimes
+from components.flights.many_flights import Starts
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.traffic.flown_together import AllFlown
 from components.traffic.source import SourceParameters, TrafficSource
@@ -187,9 +187,7 @@ class ScriptedTraffic(TrafficSource):
         used = Counter(intruder.name for intruder in crafts)
         for twice in sorted(name for name, count in used.items() if count > 1):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        flights = _intruders(crafts, reference, self.wind)
-        self.targets = flights
-        self.fleet = ScriptedFleet(flights)
+        self.targets = _intruders(crafts, reference, self.wind)
         self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 
     def flown_of(self, parameters: Sequence[Any]) -> AllFlown | None:
@@ -206,14 +204,9 @@ class ScriptedTraffic(TrafficSource):
             return None
         places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
-        ownships = flights_of(_starts(own, places, None))
-        targets = (
-            flights_of(_starts(crafts, _start_positions(crafts, references), None))
-            if crafts
-            else []
-        )
-        fleets = ScriptedFleet(ownships), ScriptedFleet(targets)
-        return AllFlown.of(fleets, (ownships, targets), roster)
+        starts = _start_positions(crafts, references)
+        ownships, targets = _starts(own, places, None), _starts(crafts, starts, None)
+        return AllFlown(ownships.fleet(), targets.fleet(), roster)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""
@@ -258,12 +251,14 @@ def _leg(leg: Any) -> Any:
 
 def _intruders(
     crafts: Sequence[Intruder], reference: tuple[float, float, float], wind: Wind | None
-) -> Sequence[ScriptedTrajectory]:
+) -> ScriptedFleet:
     """Return the flights of all intruders; starts given as offsets are converted together."""
     known = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
-    if crafts and not any(craft.legs for craft in crafts):
-        return flights_of(_starts(crafts, known, wind))
-    return [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
+    if not any(craft.legs for craft in crafts):
+        return _starts(crafts, known, wind).fleet()
+    return ScriptedFleet(
+        [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
+    )
 
 
 def _start_positions(
@@ -294,7 +289,7 @@ def _starts(
     crafts: Sequence[Flight], known: list[tuple[float, float, float]], wind: Wind | None
 ) -> Starts:
     """Return flights without legs as columns."""
-    lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).T.copy()
+    lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).reshape(-1, 3).T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:
         values = [getattr(craft, name, None) for craft in crafts]

@@ -18,24 +18,23 @@ from components.flights.bounds import (
     TrafficEnvelope,
     check_above_terrain,
     check_on_raster,
-    max_speeds_mps,
     traffic_envelope,
 )
 from components.flights.closest_approach import (
     Approaches,
+    SampleTimes,
     censored_approaches,
     closest_approaches,
     present_together_s,
 )
 from components.flights.culling import Culling, SteeredCulling
-from components.flights.many_flights import Fleet
-from components.flights.sample_times import SampleTimes
-from components.flights.steered_flight import Trajectory
+from components.flights.fleet import Fleet
 from components.geometry.state import TrajectoryState
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_together import FlownTogether, flown_by
 from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
+from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -59,7 +58,7 @@ class TrafficSource(SteeredOwnship):
 
     When manoeuvres are wired to it, its ownship flies them from the time they come.
 
-    Subclasses set `own`, `fleet` and `roster` in `setup`, and say at which times their data hold
+    Subclasses set `own`, `targets` and `roster` in `setup`, and say at which times their data hold
     samples.
     """
 
@@ -68,9 +67,8 @@ class TrafficSource(SteeredOwnship):
     windowed = True
     rewindable = True
     clocked = "demand"
-    hooks = {"attitude": "turns the attitudes that follow from paths, of_own and of_targets"}
+    hooks = (ATTITUDE,)
 
-    targets: Sequence[Trajectory]
     roster: Roster
     also_records = (TrueStates,)
     _offered: KnownTraffic | None = None
@@ -99,7 +97,7 @@ class TrafficSource(SteeredOwnship):
 
     def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        envelope = traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
+        envelope = traffic_envelope(self.own, self.targets, duration_s, reach_m)
         weather = self.context.sections.get("weather")
         if weather is not None and weather.wind_mps > 0.0:
             # In wind a nose may point anywhere.
@@ -110,7 +108,7 @@ class TrafficSource(SteeredOwnship):
         """Learn how far sensors look; what stays beyond it is not moved."""
         self._check_terrain(self.own.at)
         self._all_columns = np.arange(len(self.roster))
-        self._crabbing = self.built("attitude")
+        self._crabbing = self.built(ATTITUDE)
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
         self.flights_asked_for = look.lasts_s > 0.0
@@ -133,14 +131,10 @@ class TrafficSource(SteeredOwnship):
             return
         if not self.context.producers:
             end_s = float(self.context.duration_s)
-            self._culling = Culling(
-                self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
-            )
+            self._culling = Culling(self.own, self.targets, look.range_m, end_s, look.lasts_s)
         elif not self.flights_asked_for:
             speed_mps: float = self.own.max_speed_mps
-            self._steered_culling = SteeredCulling(
-                speed_mps, self.targets, self.fleet, look.range_m
-            )
+            self._steered_culling = SteeredCulling(speed_mps, self.targets, look.range_m)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -184,7 +178,7 @@ class TrafficSource(SteeredOwnship):
         """Return the state of all aircraft that may matter, at every instant."""
         flights, truth = self._steer(wake)
         time_s = wake.time_s
-        columns, fleet, near = self._all_columns, self.fleet, None
+        columns, fleet, near = self._all_columns, self.targets, None
         if self._steered_culling is not None:
             own, columns, fleet, near = self._steered_culling.cut(self.own, time_s)
         else:
@@ -253,11 +247,11 @@ class TrafficSource(SteeredOwnship):
 
     def _closest_approaches(self, end_s: float) -> Approaches:
         best = Approaches.none(len(self.targets))
-        speeds = max_speeds_mps(self.targets)
-        present_s = present_together_s(self.own, self.targets, end_s)
+        speeds = self.targets.max_speeds_mps
+        present_s = present_together_s(self.own, self.targets.intervals_present_s, end_s)
         for times in self.sample_times():
             closest_approaches(
-                lambda _, time_s: self.own.at(time_s), self.fleet.each, times,
+                lambda _, time_s: self.own.at(time_s), self.targets.each, times,
                 closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
             )  # fmt: skip
         return best

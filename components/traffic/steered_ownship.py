@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from components.flights.culling import Culling
-from components.flights.many_flights import Fleet
+from components.flights.fleet import Fleet
 from components.flights.steered_flight import SteeredFlight, Trajectory
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
@@ -86,7 +86,7 @@ def arrived_manoeuvres(wake: Wake) -> list[Coming]:
 class SteeredOwnship(Component):
     """A block whose ownship flies manoeuvres from the time they come.
 
-    Subclasses set `own` and `fleet` in `setup`, and then call `_be_steered`.
+    Subclasses set `own` and `targets` in `setup`, and then call `_be_steered`.
     """
 
     inputs = {
@@ -99,7 +99,7 @@ class SteeredOwnship(Component):
     }
 
     own: Trajectory
-    fleet: Fleet
+    targets: Fleet
     _crabbing: list[Any]
     _culling: Culling | None = None
     #: Whether blocks ask for flights at other instants, and whether the truth is recorded.
@@ -145,7 +145,7 @@ class SteeredOwnship(Component):
             time_s = np.floor(time_s * rate) / rate
         time_s = time_s + ahead_s
         columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
-        others = self.fleet.each(columns_each, times)
+        others = self.targets.each(columns_each, times)
         if self._culling is not None:
             near = self._culling.intervals.holds(columns_each, times, times)
             others = replace(others, present=others.present & near)
@@ -186,4 +186,4 @@ class SteeredOwnship(Component):
 
     def _true_flights(self) -> TrueFlights | None:
         """Return all flights as they are known now, if the truth is recorded."""
-        return TrueFlights(self.own, self.fleet, self._crabbing) if self.says_truth else None
+        return TrueFlights(self.own, self.targets, self._crabbing) if self.says_truth else None

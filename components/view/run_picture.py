@@ -15,6 +15,7 @@ from components.display.symbols import block_marks
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
+from components.messages.columns import ORIGIN
 from components.view.page import RunPicture
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
@@ -28,7 +29,6 @@ _TABLES = (
 )  # fmt: skip
 _OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
         "own_roll_rad")  # fmt: skip
-_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
 
@@ -91,6 +91,8 @@ def run_picture(folder: Path) -> RunPicture:
     for name in ("fused", "tracks"):
         if name in found and "azimuth_rad" in found[name]:
             table = found[name]
+            if name == "tracks":
+                picture.trackers = _trackers(table)
             picture.tables[name] = {
                 "time_s": table["time_s"],
                 "target": _codes(table["target"], targets),
@@ -100,7 +102,7 @@ def run_picture(folder: Path) -> RunPicture:
             }
     if "state_tracks" in found:
         table = found["state_tracks"]
-        picture.trackers = sorted(set(_text(table["block"]))) if "block" in table else []
+        picture.trackers = _trackers(table)
         picture.tables["tracks"] = _estimates(table, picture.trackers, own, plane)
     if "alerts" in found:
         table = found["alerts"]
@@ -168,9 +170,13 @@ def _codes(column: list[str | None], names: Any) -> AnyArray:
 
 def _sources(table: _RunColumns) -> dict[str, AnyArray]:
     """Return by number which block each row is of."""
-    if "block" not in table:
-        return {}
-    return {"source": _codes(table["block"], sorted(set(_text(table["block"]))))}
+    names = _trackers(table)
+    return {"source": _codes(table["block"], names)} if names else {}
+
+
+def _trackers(table: _RunColumns) -> list[str]:
+    """Return the names of the blocks of a table, in the order of their numbers on the page."""
+    return sorted(set(_text(table["block"]))) if "block" in table else []
 
 
 def _whole(column: Any) -> AnyArray:
@@ -273,7 +279,7 @@ def _estimates(
 
     time_s = column("time_s")
     ned_m = np.stack([column(name) for name in ("north_m", "east_m", "down_m")])
-    ends = offset_positions(ned_m, [column(name) for name in _ORIGIN])
+    ends = offset_positions(ned_m, [column(name) for name in ORIGIN])
     east, north = plane.east_north_m(*ends)
     pose = _pose_at(own, time_s)
     from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))

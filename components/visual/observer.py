@@ -16,7 +16,7 @@ from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import FieldOfView
 from components.messages.reach import Reach
 from components.optical.area_of_cells import area_of_cells
-from components.optical.weather_effects import Night, scene_visibility_m
+from components.optical.weather_effects import DARKNESS, Night, scene_visibility_m
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import EYES
@@ -215,7 +215,7 @@ class Lookout(Sensor):
     mark = EYES
     Parameters = LookoutParameters
     lockstep = True
-    hooks = {"darkness": "whether it is too dark to see anything"}
+    hooks = (DARKNESS,)
     effects: ClassVar[tuple[Effect, ...]] = (Night(),)
     ladders = (BETWEEN_SCANS,)
 
@@ -233,7 +233,7 @@ class Lookout(Sensor):
         """Look no farther than the largest aircraft shows, and not in the dark."""
         visibility_m = scene_visibility_m(self.context.sections["weather"])
         self._extinction_per_m = 0.0 if visibility_m is None else KOSCHMIEDER / visibility_m
-        if any(self.built("darkness")):
+        if self.built_one(DARKNESS):
             self.reach = replace(self.reach, enabled=False)
         rosters = known_targets(self.context)
         if rosters and self._smallest_rad and not self.context.simulate_everything:

@@ -9,8 +9,8 @@ import numpy as np
 
 from components.geometry import (
     body_angles,
-    earth_models,
-    ellipsoid,
+    geodesic_line_of_sight,
+    line_of_sight,
     longitude_difference_deg,
     sensor_angles,
 )
@@ -96,7 +96,7 @@ def _slant_range(what: str, own: Position, target: Position) -> NumericalCase:
     mpmath = multiprecision()
     with mpmath.workdps(40):
         truth = _distance(mpmath, own, target)
-    ours = float(ellipsoid.line_of_sight(*own, *target)[2])
+    ours = float(line_of_sight(*own, *target)[2])
     naive = _distance(math, own, target)
     return NumericalCase(
         f"{what}: range, m", "ECEF coordinates subtracted", naive, ours, truth, "mpmath"
@@ -109,7 +109,7 @@ def _antimeridian() -> NumericalCase:
     east = (target[1] - own[1]) * 111_195.0 * math.cos(own[0] * DEG)
     with mpmath.workdps(40):
         truth = _distance(mpmath, own, target)
-    ours = float(ellipsoid.line_of_sight(*own, *target)[2])
+    ours = float(line_of_sight(*own, *target)[2])
     return NumericalCase(
         "across the antimeridian: range, m",
         "thesis eq. 2, not wrapped",
@@ -138,7 +138,7 @@ def _longitudes() -> NumericalCase:
 def _quarter_meridian() -> NumericalCase:
     mpmath = multiprecision()
     naive = 90.0 * 111_195.0
-    ours = float(earth_models.geodesic_line_of_sight(0.0, 0.0, 0.0, 90.0, 0.0, 0.0)[2])
+    ours = float(geodesic_line_of_sight(0.0, 0.0, 0.0, 90.0, 0.0, 0.0)[2])
     with mpmath.workdps(40):
         flattening = 1 / mpmath.mpf("298.257223563")
         truth = float(6378137 * mpmath.ellipe(flattening * (2 - flattening)))

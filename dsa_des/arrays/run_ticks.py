@@ -5,7 +5,7 @@ instants comes here: how two numbers are compared as one is nobody else's busine
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,9 @@ _ZERO.flags.writeable = False
 _ZEROS: IntArray = np.ndarray((1 << 40,), np.int64, buffer=_ZERO, strides=(0,))
 # Keys stay below this.
 _MOST = 1 << 62
+# A tick has at least so many bits of a key (two hours of ns either way), so that the keys that an
+# array of instants keeps serve whatever it is compared with.
+_LEAST_BITS = 44
 
 
 def no_runs(rows: int) -> IntArray:
@@ -38,7 +41,7 @@ def joined_runs(parts: Sequence[IntArray]) -> IntArray:
     return np.concatenate(parts)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(eq=False, slots=True)
 class RunTicks:
     """Instants, in order of run and then of tick unless it is said otherwise.
 
@@ -50,6 +53,9 @@ class RunTicks:
 
     run: IntArray
     tick: IntArray
+    #: Keys that were asked for, with the bits of a tick in them, and what bounds these.
+    _keys: tuple[int, IntArray] | None = field(default=None, init=False, repr=False)
+    _extent: tuple[int, int] | None = field(default=None, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.tick)
@@ -109,7 +115,7 @@ class RunTicks:
         """Return what puts them in order, those of one instant as they stand; None if they are."""
         if len(self) < 2:
             return None
-        (key,) = _keys(self)
+        (key,) = _keys(self)[0]
         if bool((key[1:] >= key[:-1]).all()):
             return None
         return np.argsort(key, kind="stable")
@@ -138,35 +144,40 @@ def _one_run(parts: Sequence[RunTicks]) -> bool:
     return not filled or all(run[0] == filled[0][0] == run[-1] for run in filled)
 
 
-def _keys(*parts: RunTicks) -> list[IntArray]:
-    """Return numbers that lie as the instants do, also where these are in no order."""
-    if all(says_no_runs(part.run) for part in parts):
-        return [part.tick for part in parts]
-    return _coded(parts)[0]
+def _keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
+    """Return numbers that lie as the instants do, and how many bits of them are the ticks'.
 
-
-def _coded(parts: Sequence[RunTicks]) -> tuple[list[IntArray], int, int]:
-    """Return a number for each instant, how many bits of it are the tick's, and the tick of 0.
-
-    Where runs and ticks do not go into one number, ranks of the ticks do, and there are -1 bits.
+    Instants may be in no order. Where runs and ticks do not go into one number, ranks of the ticks
+    do, and there are -1 bits.
     """
-    filled = [part for part in parts if len(part)]
-    runs = max((int(part.run.max()) for part in filled), default=0) + 1
-    earliest = min((int(part.tick.min()) for part in filled), default=0)
-    earliest = min(earliest, 0)
-    bits = (max((int(part.tick.max()) for part in filled), default=0) - earliest).bit_length()
-    if runs << bits < _MOST:
-        keys = [part.run << bits for part in parts]
-        for key, part in zip(keys, parts, strict=True):
-            key += part.tick
-            if earliest:
-                key -= earliest
-        return keys, bits, earliest
+    if all(says_no_runs(part.run) for part in parts):
+        return [part.tick for part in parts], -1
+    extents = [_extent(part) for part in parts]
+    bits = max(_LEAST_BITS, max(most.bit_length() for most, _ in extents) + 1)
+    if (max(runs for _, runs in extents) + 1) << bits < _MOST:
+        return [_key(part, bits) for part in parts], bits
     ticks, rank = np.unique(np.concatenate([part.tick for part in parts]), return_inverse=True)
     ends = np.cumsum([len(part) for part in parts])[:-1]
     ranks: Any = np.split(rank.reshape(-1), ends)
-    keys = [part.run * len(ticks) + rank for part, rank in zip(parts, ranks, strict=True)]
-    return keys, -1, 0
+    return [part.run * len(ticks) + rank for part, rank in zip(parts, ranks, strict=True)], -1
+
+
+def _extent(part: RunTicks) -> tuple[int, int]:
+    """Return the largest tick, either way, and the largest run."""
+    if part._extent is None:
+        tick, run = part.tick, part.run
+        most = max(int(tick.max()), -int(tick.min())) if len(tick) else 0
+        part._extent = most, int(run.max()) if len(run) else 0
+    return part._extent
+
+
+def _key(part: RunTicks, bits: int) -> IntArray:
+    """Return run · 2**bits + tick, which ticks below 0 leave in order."""
+    if part._keys is None or part._keys[0] != bits:
+        key = part.run << bits
+        key += part.tick
+        part._keys = bits, key
+    return part._keys[1]
 
 
 def union(parts: Sequence[RunTicks]) -> RunTicks:
@@ -175,14 +186,15 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
         ticks = sorted_union([part.tick for part in parts])
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         return RunTicks.of_run(run, ticks)
-    keys, bits, earliest = _coded(parts)
+    keys, bits = _keys(*parts)
     if bits < 0:
         _, first = np.unique(np.concatenate(keys), return_index=True)
         return RunTicks.joined(parts).take(first)
     every = sorted_union(keys)
-    runs = every >> bits
-    every -= runs << bits
-    return RunTicks(runs, every + earliest if earliest else every)
+    runs = (every + (1 << (bits - 1))) >> bits
+    instants = RunTicks(runs, every - (runs << bits))
+    instants._keys = bits, every
+    return instants
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
@@ -200,32 +212,43 @@ def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     (n,) of int64
         -1 where the run has none.
     """
+    return _last_of_run(instants, asked)[0]
+
+
+def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
+    """Return what `last_of_run` does, and whether each is known to be one of the instants."""
     if len(instants) == 0:
-        return np.full(len(asked), -1, dtype=np.int64)
+        return np.full(len(asked), -1, dtype=np.int64), False
     if instants.tick is asked.tick and instants.run is asked.run:
-        return np.arange(len(asked))
+        return np.arange(len(asked)), True
     if _one_run((instants, asked)):
         return last_at_or_before(instants.tick, asked.tick)
-    if _alike(instants, asked):
-        return np.arange(len(asked))
-    places = last_at_or_before(*_keys(instants, asked))
-    other = instants.run[places] != asked.run
-    if other.any():
-        places[other] = -1
-    return places
+    places, met = last_at_or_before(*_keys(instants, asked)[0])
+    if not met:
+        other = instants.run[places] != asked.run
+        if other.any():
+            places[other] = -1
+    return places, met
 
 
-def _alike(some: RunTicks, others: RunTicks) -> bool:
-    """Whether all instants are the same, and no two that follow each other are."""
-    if len(some) != len(others) or not np.array_equal(some.tick, others.tick):
-        return False
-    same = some.run is others.run or np.array_equal(some.run, others.run)
-    return same and bool((some.tick[1:] != some.tick[:-1]).all())
+def place_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
+    """Return the place of each instant that is asked for, and whether it is there; None for all.
+
+    Parameters
+    ----------
+    instants, asked : RunTicks
+        As for `last_of_run`.
+    """
+    places, met = _last_of_run(instants, asked)
+    if met or len(instants) == 0:
+        return places, None if met else np.zeros(len(asked), dtype=bool)
+    there: BoolArray = (places >= 0) & (instants.tick[places] == asked.tick)
+    return places, None if there.all() else there
 
 
 def ranks(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """Return the number of each instant among all there are, and how many these are."""
-    keys = _keys(*parts)
+    keys, _ = _keys(*parts)
     every, rank = np.unique(np.concatenate(keys), return_inverse=True)
     ends = np.cumsum([len(key) for key in keys])[:-1]
     return np.split(rank.reshape(-1), ends), len(every)
@@ -238,7 +261,7 @@ def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     """
     if _one_run((instants, asked)):
         return np.searchsorted(instants.tick, asked.tick)
-    keys = _keys(instants, asked)
+    keys, _ = _keys(instants, asked)
     return np.searchsorted(keys[0], keys[1])
 
 

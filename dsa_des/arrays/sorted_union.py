@@ -38,8 +38,10 @@ def sorted_union(arrays: Sequence[_Array]) -> _Array:
     return values if bool(rise.all()) else values[new]
 
 
-def last_at_or_before(values: IntArray, asked: IntArray) -> IntArray:
+def last_at_or_before(values: IntArray, asked: IntArray) -> tuple[IntArray, bool]:
     """Return the place of the last of `values` that is not above each of `asked`; -1 for none.
+
+    With it comes whether each of `asked` is known to be one of `values`.
 
     Parameters
     ----------
@@ -54,16 +56,17 @@ def last_at_or_before(values: IntArray, asked: IntArray) -> IntArray:
         and bool(np.array_equal(values, asked))
         and bool((values[1:] > values[:-1]).all())
     ):
-        return np.arange(len(asked))
+        return np.arange(len(asked)), True
     if len(asked) < _WORTH_A_GUESS or not bool((values[1:] > values[:-1]).all()):
-        return np.searchsorted(values, asked, side="right") - 1
+        return np.searchsorted(values, asked, side="right") - 1, False
     key = len(values), len(asked)
     guess = _found.get(key)
     if guess is not None and bool(np.array_equal(values[guess], asked)):
-        return guess.copy()
+        return guess.copy(), True
     places: IntArray = np.searchsorted(values, asked, side="right") - 1
-    if places[0] >= 0 and bool(np.array_equal(values[places], asked)):
+    met = places[0] >= 0 and bool(np.array_equal(values[places], asked))
+    if met:
         _found[key] = places.copy()
         if len(_found) > _MOST_FOUND:
             _found.popitem(last=False)
-    return places
+    return places, met

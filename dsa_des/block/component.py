@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from dsa_des.block.effect import Effect
+from dsa_des.block.effect import Built, Effect, Hook
 from dsa_des.block.ladder import Ladder, Verified
 from dsa_des.block.mark import Mark
 from dsa_des.block.message import Message
@@ -191,9 +191,9 @@ class Component:
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
-    #: Quantities that effects may act on, and how what they build is called there. Those of base
-    #: classes count too. The block asks for what was built by `built`.
-    hooks: ClassVar[Mapping[str, str]] = {}
+    #: Quantities that effects may act on, each with its contract. Those of base classes count too.
+    #: The block asks for what was built by `built`.
+    hooks: ClassVar[tuple[Hook[Any], ...]] = ()
     #: Physics that is built only when the scene calls for it (`dsa_des.block.effect`). Each acts on
     #: one of the `hooks`.
     effects: ClassVar[tuple[Effect, ...]] = ()
@@ -235,12 +235,10 @@ class Component:
         return cls
 
     @classmethod
-    def all_hooks(cls) -> dict[str, str]:
-        """Return the hooks of this class and its bases, with their descriptions."""
-        found: dict[str, str] = {}
-        for base in reversed(cls.__mro__):
-            found.update(vars(base).get("hooks", {}))
-        return found
+    def all_hooks(cls) -> tuple[Hook[Any], ...]:
+        """Return the hooks of this class and its bases."""
+        found = [hook for base in reversed(cls.__mro__) for hook in vars(base).get("hooks", ())]
+        return tuple(dict.fromkeys(found))
 
     @classmethod
     def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
@@ -311,7 +309,7 @@ class Component:
         """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []
 
-    def built(self, acts_on: str) -> list[Any]:
+    def built(self, acts_on: Hook[Built]) -> list[Built]:
         """Return what was built of the effects that act on a quantity, in declared order.
 
         Raises
@@ -330,6 +328,13 @@ class Component:
             for effect in type(self).effects
             if effect.acts_on == acts_on and effect.name in self.context.effects
         ]
+
+    def built_one(self, acts_on: Hook[Built]) -> Built | None:
+        """Return what was built of the one effect that acts on a quantity, or None."""
+        if not (built := self.built(acts_on)):
+            return None
+        (one,) = built
+        return one
 
     def serves_replicas(self) -> bool:
         """Return whether this block, with the effects built, may serve replicas in lock step."""

@@ -7,9 +7,42 @@ effect that can be parametrised neutrally is built all the same, and the recordi
 change by a bit.
 """
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
+
+#: What effects build for a hook.
+Built = TypeVar("Built")
+
+
+class Hook(str, Generic[Built]):
+    """A quantity that effects may act on: its name, with the contract of what they build for it.
+
+    Parameters
+    ----------
+    name : str
+        For people, "SNR"; an effect may name it so.
+    contract : type
+        A protocol of what the block calls, or the type of a value.
+    meaning : str
+        What is returned, or what the value is.
+    """
+
+    contract: type[Built]
+    meaning: str
+
+    def __new__(cls, name: str, contract: type[Built], meaning: str) -> "Hook[Built]":
+        hook = super().__new__(cls, name)
+        hook.contract, hook.meaning = contract, meaning
+        return hook
+
+    def sentence(self) -> str:
+        """Return, for example, ``(cells) -> factor of each cell's SNR``."""
+        if not any("__call__" in vars(base) for base in self.contract.__mro__):
+            return self.meaning
+        _, *names = inspect.signature(self.contract.__call__).parameters
+        return f"({', '.join(names)}) -> {self.meaning}"
 
 
 @dataclass(frozen=True)
@@ -37,15 +70,17 @@ class Verdict:
         return cls(asked, f"{name} is {str(asked).lower()}")
 
 
-class Effect:
+class Effect(Generic[Built]):
     """One effect of a block type; stateless, shared by all blocks of that type."""
 
-    #: What it is called, and the quantity it acts on: one of the hooks of its block.
+    #: What it is called.
     name: ClassVar[str]
-    acts_on: ClassVar[str]
-    #: Whether it can be built when the scene does not call for it, without changing a bit.
+    #: The quantity it acts on, one of the hooks of its block, whose contract `build` keeps.
+    acts_on: Hook[Built]
+    #: Whether it can be built when the scene does not call for it, without changing a bit: not
+    #: where the next one says something.
     neutral: ClassVar[bool] = True
-    #: Of an effect that is not neutral: why nothing can be built that changes no bit.
+    #: Why nothing can be built that changes no bit.
     outside_the_proof: ClassVar[str] = ""
     #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
     #: of different replicas may come in one call. A subclass says it again for itself.
@@ -54,11 +89,13 @@ class Effect:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
+        if cls.outside_the_proof:
+            cls.neutral = False
 
     def verdict(self, block: Any) -> Verdict:
         """Say whether the scene calls for this effect in this block (a `Component`)."""
         raise TypeError(f"{type(self).__name__} gives no verdict")
 
-    def build(self, block: Any) -> Any:
+    def build(self, block: Any) -> Built:
         """Return what the block (a `Component`) calls at run time."""
         raise TypeError(f"{type(self).__name__} builds nothing")

@@ -151,7 +151,10 @@ class Message:
     @property
     def instants(self) -> RunTicks:
         """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
-        return RunTicks(self._runs(), self.tick)
+        run, known = self._runs(), self.__dict__.get("_instants")
+        if known is None or known.tick is not self.tick or known.run is not run:
+            known = self.__dict__["_instants"] = RunTicks(run, self.tick)
+        return known
 
     @classmethod
     def empty(cls, **others: Any) -> Self:

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -19,20 +19,20 @@ class Arrivals:
     ----------
     source : str
         Name of the sending block.
-    tick : ndarray of int64
-        When each row arrived.
+    instants : RunTicks
+        When each row arrived, and in which run.
     message : Message
         The rows; ``message.tick`` says what instants they speak of.
     """
 
     source: str
-    tick: IntArray
+    instants: RunTicks
     message: Any
 
     @property
-    def instants(self) -> RunTicks:
-        """When each row arrived, and in which run."""
-        return RunTicks(self.message.run, self.tick)
+    def tick(self) -> IntArray:
+        """When each row arrived, in ticks of its run."""
+        return self.instants.tick
 
 
 class Wake:
@@ -40,8 +40,9 @@ class Wake:
 
     Parameters
     ----------
-    ticks : ndarray of int64, shape (rows,)
-        Since the start of the run of the scene that the row is of.
+    instants : RunTicks
+        Run and tick of each row, in order of run: ``run`` and ``ticks``. A single run is run 0, and
+        ticks count from the start of the row's own.
     scans : ndarray of int64, shape (rows,)
         Scan numbers of the block's own clock; -1 at instants that are not its own scans.
     ticks_per_s : int
@@ -52,8 +53,6 @@ class Wake:
     demand : callable, or None
         Gives the attribute of this name when it is first asked for: a mapping from each clocked
         block downstream to the rows of this wake at which it scans.
-    run : ndarray of int64, shape (rows,)
-        Of which run of the scene each row is, ascending; all 0 by default.
     first_run : int
         The first run that goes on: rows of those before it never come again.
     clock : callable, optional
@@ -63,23 +62,22 @@ class Wake:
 
     def __init__(
         self,
-        ticks: IntArray,
+        instants: RunTicks,
         scans: IntArray,
         ticks_per_s: int,
         held: Mapping[str, tuple[Any, IntArray]],
         arrived: Mapping[str, list[Arrivals]],
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
-        run: IntArray | None = None,
         first_run: int = 0,
         clock: Callable[[IntArray, IntArray], IntArray] | None = None,
     ) -> None:
-        self.ticks = ticks
+        self.instants = instants
+        self.run, self.ticks = instants.run, instants.tick
         self.scans = scans
         self.ticks_per_s = ticks_per_s
         self._held = held
         self._arrived = arrived
         self._demand = demand
-        self.run = no_runs(len(ticks)) if run is None else run
         self.first_run = first_run
         self._clock = clock
 
@@ -102,11 +100,6 @@ class Wake:
     def time_s(self) -> FloatArray:
         """Time of each row since the start of its run, s."""
         return self.ticks / self.ticks_per_s
-
-    @property
-    def instants(self) -> RunTicks:
-        """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
-        return RunTicks(self.run, self.ticks)
 
     def held(self, port: str) -> tuple[Any, IntArray] | None:
         """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""

@@ -1,4 +1,4 @@
-"""``dsa-des components`` and ``examples``: block types, and shipped scenes and studies."""
+"""``dsa-des components`` and ``examples``: block types, and shipped scenes, studies and cases."""
 
 import inspect
 import os
@@ -156,7 +156,7 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
         hook: ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
         for hook in hooks
     }
-    rows = [(f"  {hook}", how, acting[hook] or "-") for hook, how in sorted(hooks.items())]
+    rows = [(f"  {hook}", hook.sentence(), acting[hook] or "-") for hook in sorted(hooks)]
     _print_rows(console, ("  hook", "what it calls", "effects"), rows)
 
 
@@ -174,13 +174,14 @@ def _describe_ladder(console: Any, ladder: Ladder) -> None:
 _HEADINGS = {
     "scene": "Scenes: dsa-des run NAME",
     "study": "Studies: dsa-des study NAME",
+    "case": "Cases, from requirement to verdict: dsa-des evidence NAME",
 }
 _OPTION = "--copy"
 _CODE = "__pycache__"
 
 
 def show_examples(copy: str | None) -> None:
-    """List all shipped scenes and studies, or copy their folders with all that they extend."""
+    """List all shipped scenes, studies and cases, or copy their folders with what they extend."""
     if copy is not None:
         _copy(named(copy, _OPTION))
         return

@@ -29,7 +29,7 @@ from dsa_des.results.curves import draw_scatter
 from dsa_des.results.figures import safe_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
 from dsa_des.results.labels import short
-from dsa_des.results.printing import interval_text, times
+from dsa_des.results.printing import rounded, times
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.rows import paired_units
 from dsa_des.results.statistics import changes_of, difference
@@ -283,9 +283,8 @@ def _compare(
             )[1:]
             d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             lines.append(
-                [*map(short, at), metric, short(d.paired.value), interval_text(d.paired),
-                 str(d.paired.count), interval_text(d.unpaired).rstrip(" *"),
-                 times(d.narrower)]
+                [*map(short, at), metric, *rounded(d.paired), str(d.paired.count),
+                 rounded(d.unpaired)[1].rstrip(" *"), times(d.narrower)]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
     shown = [r for r in one.results if r.name in known and (not only or r.name in only)]

@@ -33,6 +33,11 @@ def examples(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     return _shipped("scene", incomplete) + _shipped("study", incomplete)
 
 
+def cases(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    """Return shipped cases, and leave files to the shell."""
+    return _shipped("case", incomplete)
+
+
 def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return block types, their kinds and the tables of scenes."""
     names = registered()

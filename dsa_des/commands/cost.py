@@ -1,6 +1,7 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]
+_QUIET_S = 10.0
 
 
 def cost_of_accuracy(
@@ -59,8 +61,9 @@ def cost_of_accuracy(
     costs: list[RungCost] = []
     chain: list[dict[str, Any]] = []
     with target.writing() as folder:
-        for name, ladder in climbs:
-            _say(f"{name}: {ladder.name} ...", as_json)
+        progress = Progress(silent=as_json)
+        for number, (name, ladder) in enumerate(climbs, 1):
+            progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
             try:
                 costs += climb(variants, name, ladder, against=against, repeats=repeats,
                                budgets=limits, compare=compare)  # fmt: skip
@@ -72,7 +75,7 @@ def cost_of_accuracy(
         if whole_chain:
             from dsa_des.costs.chain import draw_chain, run_chain
 
-            _say("whole chain ...", as_json)
+            progress.say("whole chain ...")
             found = run_chain(variants, costs, compare)
             chain = found.rows
             notes.append(found.picked)
@@ -92,9 +95,18 @@ def cost_of_accuracy(
         say(f"{target.path}: {', '.join(names)}")
 
 
-def _say(text: str, silent: bool) -> None:
-    if not silent and sys.stderr.isatty():
-        say(text, err=True)
+class Progress:
+    """Says what is measured: every step on a terminal, elsewhere one every ten seconds."""
+
+    def __init__(self, silent: bool) -> None:
+        self._silent, self._last_s = silent, time.monotonic()
+
+    def say(self, text: str) -> None:
+        """Say what is begun."""
+        now_s = time.monotonic()
+        if not self._silent and (sys.stderr.isatty() or now_s - self._last_s > _QUIET_S):
+            say(text, err=True)
+            self._last_s = now_s
 
 
 def ladders_to_climb(

@@ -12,7 +12,7 @@ from dsa_des.evidence.inputs import files_of_case
 from dsa_des.evidence.pack import INPUTS, MACHINE, PAGE, STUDIES, Pack
 from dsa_des.evidence.page import evidence_page
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_names import check_place, named, reason_of
+from dsa_des.files.output_names import check_place, named, why_not_written
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
@@ -33,7 +33,7 @@ def evidence_command(
     check_workers(workers)
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
-    found = read_case(chosen_file(case), sets, encounters)
+    found = read_case(chosen_file(case, "case"), sets, encounters)
     target = named(out)
     check_place(target)
     if target.is_dir() and any(target.iterdir()) and not resume:
@@ -46,7 +46,8 @@ def evidence_command(
         for name, content in files_of_case(found).copies().items():
             _write(target / INPUTS / name, content)
     except OSError as error:
-        raise UsageError(f"--out {target}: cannot be written: {reason_of(error)}") from error
+        why = why_not_written(error, target)
+        raise UsageError(f"--out {target}: cannot be written: {why}") from error
     folders: dict[str, StudyFolder] = {}
     tables: dict[str, Tables] = {}
     for name, study in found.studies.items():

@@ -25,6 +25,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal import terminal
+from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import say, say_json
 from dsa_des.text.safe_text import shell_line, shortened
 
@@ -169,31 +170,26 @@ def explain_scene(
     simulate_everything: bool,
 ) -> None:
     """Print a table of every block's effects; with `measure`, run the scene to time them."""
-    from rich.table import Table
-
     loaded = load(scene, sets, swaps, seed, duration)
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for heading in ("block", "effect", "largest influence"):
-        table.add_column(heading, no_wrap=heading == "block")
-    if shares is not None:
-        table.add_column("share of run time", justify="right")
-    planned = [*simulation.plan, *simulation.timing_plan]
+    # What the scene calls for stands first: most of what there is, it does not call for.
+    planned = sorted([*simulation.plan, *simulation.timing_plan], key=lambda item: not item.built)
+    rows = []
     for item in planned:
-        row = [shortened(item.block), item.sentence(), _bound(item)]
-        if shares is not None:
-            share = shares.get((item.block, item.effect.name))
-            row.append("" if share is None else f"{share:.1%}")
-        table.add_row(*row)
+        share = None if shares is None else shares.get((item.block, item.effect.name))
+        timed = "" if share is None else f"{share:.1%}"
+        rows.append((shortened(item.block), _bound(item), timed, item.sentence()))
     for name, component in simulation.components.items():
-        for sentence in component.left_out():
-            table.add_row(shortened(name), sentence)
-    if not table.row_count:
+        rows += [(shortened(name), "", "", sentence) for sentence in component.left_out()]
+    if not rows:
         console.print("No block of this scene declares effects.")
         return
-    console.print(table)
+    headings = ("block", "largest influence", "share of run time", "effect")
+    acting = sum(item.built for item in planned)
+    title = f"{shortened(loaded.title)}: {acting} effects simulated, {len(planned) - acting} not"
+    print_table(console, title, headings, rows, group=0)
     if outside := [item for item in planned if not item.effect.neutral and not item.built]:
         console.print()
         console.print(_outside_the_proof(outside))

@@ -4,6 +4,7 @@ Everything is checked before anything runs: a limit without a unit, a result tha
 parameter whose source nobody states, are errors of the file.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -300,7 +301,23 @@ def _unknown_results(case: EvidenceCase) -> list[Any]:
         elif inside and len(case.studies[study].cells) != 1:
             message = f"has {len(case.studies[study].cells)} cells; a requirement is held to one"
             found.append(case.file.problem((*at, "study"), message, study))
+        elif inside:
+            found += _limit_beyond(case, at, study, name)
     return found
+
+
+def _limit_beyond(
+    case: EvidenceCase, at: tuple[str, int], study: str, result: str
+) -> list[Problem]:
+    """Return a problem where a limit says nothing: no value of its result is as low, or as high."""
+    asked = case.tables.requirements[at[1]]
+    low, high = case.results[study][result].bounds
+    if low <= asked.limit <= high:
+        return []
+    allowed = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
+    sense = "most" if asked.most is not None else "least"
+    message = f"no value of {result} lies there; allowed: {allowed}"
+    return [case.file.problem((*at, sense), message, asked.limit)]
 
 
 def _without_source(case: EvidenceCase) -> list[Any]:

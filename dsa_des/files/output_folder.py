@@ -22,6 +22,7 @@ from dsa_des.files.output_names import (
     named,
     new_folder_name,
     reason_of,
+    why_not_written,
 )
 from dsa_des.terminal.interruption import deferred
 
@@ -160,9 +161,8 @@ class OutputFolder:
             raise
         except OSError as error:
             if not ready:
-                raise UsageError(
-                    f"--out {self.path}: cannot be written: {reason_of(error)}"
-                ) from error
+                why = why_not_written(error, place)
+                raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
             raise OutputError(
                 f"{self.path}: the results cannot be written: {reason_of(error)}"
             ) from error
@@ -242,7 +242,8 @@ def _make(folder: Path) -> bool:
         new = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UsageError(f"--out {folder}: cannot be written: {reason_of(error)}") from error
+        why = why_not_written(error, folder)
+        raise UsageError(f"--out {folder}: cannot be written: {why}") from error
     return new
 
 

@@ -4,6 +4,7 @@ Everything about a name that can be known is found out before a run begins: a ru
 an hour must not fail because there is no place for it.
 """
 
+import errno
 import os
 import re
 import stat
@@ -57,6 +58,17 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
+def why_not_written(error: OSError, place: Path) -> str:
+    """Return what an error of the system says of a place that was to be made or written into.
+
+    Some file systems (``/proc``) take no folder and call it missing: what is there is named.
+    """
+    if error.errno != errno.ENOENT or place.exists():
+        return reason_of(error)
+    there = next(parent for parent in place.absolute().parents if os.path.lexists(parent))
+    return f"no folder can be made in {there}"
+
+
 def new_folder_name(parent: Path, stem: str) -> Path:
     """Return the first of ``parent/stem-001``, ``-002``, ... that does not exist."""
     number = 1
@@ -85,7 +97,8 @@ def claim_folder(parent: Path, stem: str) -> Path:
                 continue
             raise UsageError(f"{parent}: is no folder") from None
         except OSError as error:
-            raise UsageError(f"{folder}: cannot be written: {reason_of(error)}") from error
+            why = why_not_written(error, folder)
+            raise UsageError(f"{folder}: cannot be written: {why}") from error
         return folder
 
 

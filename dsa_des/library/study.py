@@ -27,7 +27,7 @@ from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
 from dsa_des.studies.study import Study, changed_scene
 from dsa_des.studies.study_file import read_study, study_of_tables
-from dsa_des.terminal.terminal import html_of
+from dsa_des.terminal.terminal import html_of, text_of
 from dsa_des.text.safe_text import shortened
 
 if TYPE_CHECKING:
@@ -104,6 +104,9 @@ class StudyResult:
 
     def _repr_html_(self) -> str:
         return html_of(lambda console: show(console, self._tables))
+
+    def __str__(self) -> str:
+        return text_of(lambda console: show(console, self._tables), 160)
 
     def __repr__(self) -> str:
         rows = self._tables.rows

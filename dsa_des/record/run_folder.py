@@ -22,7 +22,7 @@ from dsa_des.files.output_folder import RUN_JSON, with_files
 from dsa_des.files.output_names import new_folder_name
 from dsa_des.record.drawing import pictures_in
 from dsa_des.record.notes import OF_ROWS
-from dsa_des.terminal.terminal import html_of
+from dsa_des.terminal.terminal import html_of, text_of
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shortened
 
@@ -109,15 +109,19 @@ class Run:
         ]
         return "\n".join([*lines, *(["  ..."] if len(tables) > _MOST_LINES else [])])
 
+    def __str__(self) -> str:
+        return text_of(self._show)
+
     def _repr_html_(self) -> str:
+        return html_of(self._show)
+
+    def _show(self, console: Any) -> None:
+        """Print what the run is and came to, as ``dsa-des run`` does."""
         from rich.text import Text
 
-        def show(console: Any) -> None:
-            console.print(Text(repr(self)))
-            for point in registered(REPORTS).values():
-                installed(point)().show(console, self.summary)
-
-        return html_of(show)
+        console.print(Text(repr(self)))
+        for point in registered(REPORTS).values():
+            installed(point)().show(console, self.summary)
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from dsa_des.running.effects import plan, unspent
 from dsa_des.running.grain import Grain, opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import EqualWindows, Rewinder, Windows
+from dsa_des.running.windows import Rewinder, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
@@ -245,17 +245,17 @@ class Replicas(Timeline):
         return self.split.get(component.name, component) if found is None else found
 
     def windows(
-        self, longest_ticks: int, lookahead_ticks: int | None, rewinder: Rewinder | None
+        self, longest_ticks: int, horizon_ticks: int | None, rewinder: Rewinder | None
     ) -> Windows:
         """Return windows that hold many whole replicas, or in loops stretches of all of them."""
-        if lookahead_ticks is None:
-            return EqualWindows(self.time, longest_ticks)
+        if horizon_ticks is None:
+            return Windows(self.time, longest_ticks)
         scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
-        if self.time.run_ticks > lookahead_ticks * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
-            said = f"{lookahead_ticks / self.scene.ticks_per_s:.2g} s"
+        if self.time.run_ticks > horizon_ticks * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
+            said = f"{horizon_ticks / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
         of_all = max(1, longest_ticks // self.runs)  # each of them has as many scans
-        return EqualWindows(self.time, min(of_all, lookahead_ticks), self.runs)
+        return Windows(self.time, of_all, horizon_ticks, self.runs)
 
     def grain(self, window: int | None) -> Grain:
         """Return the grain: all run in windows, in loops in those that nothing comes back in."""

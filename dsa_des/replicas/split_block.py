@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import no_runs
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message, by_output
@@ -124,19 +124,20 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
     def demand() -> dict[str, IntArray]:
         return {block: _within(asked, rows) for block, asked in wake.demand.items()}
 
-    ticks, scans = wake.ticks[rows], wake.scans[rows]
+    instants, scans = RunTicks.of_run(0, wake.ticks[rows]), wake.scans[rows]
 
     def before(scans: IntArray, run: IntArray) -> IntArray:
         return wake.scans_before[rows]
 
-    return Wake(ticks, scans, wake.ticks_per_s, held, arrived, demand, clock=before)
+    return Wake(instants, scans, wake.ticks_per_s, held, arrived, demand, clock=before)
 
 
 def _arrivals(new: Arrivals, number: int) -> Arrivals | None:
     first, end = np.searchsorted(new.message.run, [number, number + 1]).tolist()
     if first == end:
         return None
-    return Arrivals(new.source, new.tick[first:end], _alone(new.message.take(slice(first, end))))
+    instants = RunTicks.of_run(0, new.tick[first:end])
+    return Arrivals(new.source, instants, _alone(new.message.take(slice(first, end))))
 
 
 def _alone(message: Message) -> Message:
@@ -151,7 +152,7 @@ def _after(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
         old = found.get(new.source)
         if old is not None:
             message = type(new.message).concatenate([old.message, new.message])
-            new = Arrivals(new.source, np.concatenate([old.tick, new.tick]), message)
+            new = Arrivals(new.source, RunTicks.joined([old.instants, new.instants]), message)
         found[new.source] = new
     return [found[name] for name in sorted(found)]
 

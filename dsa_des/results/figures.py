@@ -71,6 +71,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     axes, metric = tables.rows.axes, str(figure.metric)
     if any(n is not None and n not in axes for n in (figure.axis, figure.x, figure.y)):
         return False
+    called = {name: name for name in axes}
     title = _cut(tables.record.title if figure.title is None else figure.title)
     confidence = tables.record.confidence
     if figure.kind in ("histogram", "cdf"):
@@ -84,8 +85,8 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return False
     lines = [line for line in tables.lines if line.result.name == metric]
     if figure.kind in ("heat", "map"):
-        x = figure.x or axes[0]
-        y = figure.y or next((a for a in axes if a != x), x)
+        x = called[figure.x or axes[0]]
+        y = called[figure.y] if figure.y else next((a for a in axes if a != x), x)
         if x == y:
             return False
         if figure.kind == "heat":
@@ -93,7 +94,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         else:
             draw_map(target, axes, lines, metric, x, y, figure.limits, title, confidence)
         return True
-    axis = figure.axis or axes[0]
+    axis = called[figure.axis or axes[0]]
     if figure.kind == "polar":
         draw_polar(target, axes, lines, metric, axis, title, confidence)
     else:
@@ -115,7 +116,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
     (result,) = (result for result in tables.results if result.name == metric)
     if not result.is_number:
         return False
-    axis = figure.axis or next(iter(rows.axes), None)
+    axis = next((name for name in rows.axes if figure.axis in (None, name)), None)
     found: dict[Any, list[FloatArray]] = {}
     for at, chosen in rows.each_place():
         value = None if axis is None else at[rows.axes.index(axis)]

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, write_file
+from dsa_des.files.output_names import why_not_written
 from dsa_des.results.record import StudyHead, StudyRecord
 from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
 
@@ -64,7 +65,8 @@ class StudyFolder:
             self._take_up(description, resume=resume)
         except OSError as error:
             self.close()
-            raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
+            why = why_not_written(error, self.path)
+            raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
         except BaseException:
             self.close()
             raise

@@ -20,6 +20,18 @@ _ABBREVIATIONS = {"nees", "ospa", "gospa", "nmac", "siap"}
 _CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
 
 
+class AxisName(str):
+    """The column of an axis, which knows what it is called where it counts items of a list."""
+
+    words: str
+
+    def __new__(cls, column: str, words: str = "") -> "AxisName":
+        """Return the column; without `words` it is called what it is."""
+        name = super().__new__(cls, column)
+        name.words = words or column
+        return name
+
+
 def unit_of(name: str) -> str:
     """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
     return _split(name.partition(".")[0])[1]
@@ -37,6 +49,7 @@ def axis_label(key: str) -> str:
     """Return ``Radar scan rate (Hz)`` for ``radar.scan_rate_hz``, ``Type of fusion`` for a swap."""
     if key.startswith("swap."):
         return figure_text(f"Type of {_spaced(key.removeprefix('swap.'))}", 60)
+    key = key.words if isinstance(key, AxisName) else key
     words, unit = _split(key.removeprefix("blocks."))
     label = _capital(_spaced(words.replace(".", " ")))
     return figure_text(f"{label} ({unit})" if unit else label, 60)
@@ -46,9 +59,10 @@ def value_label(axis: str, value: object) -> str:
     """Return ``radar scan rate 5 Hz`` for a value of an axis; a text is its own label."""
     if not isinstance(value, int | float):
         return figure_text(value)
-    words, unit = _split(axis)
+    words, unit = _split(axis.words if isinstance(axis, AxisName) else axis)
     name = _spaced(words.replace(".", " "))
-    return figure_text(f"{name} {value:g}{'' if unit in ('', '°') else ' '}{unit}", 40)
+    # However long the name is, the value stands behind it.
+    return f"{figure_text(name, 50)} {value:g}{'' if unit in ('', '°') else ' '}{unit}"
 
 
 def short(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from dsa_des.results.labels import short
@@ -31,8 +32,9 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
         cut_off = cut_off_text(line)
-        row = [*map(short, line.at), line.result.name, short(e.value)]
-        row += [f"({cut_off})" if cut_off else "", interval_text(e), str(e.count)]
+        value, interval = rounded(e)
+        row = [*map(short, line.at), line.result.name, value]
+        row += [f"({cut_off})" if cut_off else "", interval, str(e.count)]
         row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
         if expected:
             row.append("" if line.expected is None else short(line.expected))
@@ -96,8 +98,8 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
     notes += ["few"] if estimate.few else []
     return [
         answer.requirement.text(), answer.requirement.axis, tables.other_values(answer),
-        "none" if answer.value is None else short(answer.value), short(estimate.value),
-        interval_text(estimate), "none" if answer.estimated is None else short(answer.estimated),
+        "none" if answer.value is None else short(answer.value), *rounded(estimate),
+        "none" if answer.estimated is None else short(answer.estimated),
         "; ".join(notes),
     ]  # fmt: skip
 
@@ -178,9 +180,8 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         d = item.difference
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         rows.append(
-            [short(item.value), *map(short, item.at), item.result.name, short(d.paired.value),
-             interval_text(d.paired), str(d.paired.count), only,
-             interval_text(d.unpaired).rstrip(" *"), times(d.narrower)]
+            [short(item.value), *map(short, item.at), item.result.name, *rounded(d.paired),
+             str(d.paired.count), only, rounded(d.unpaired)[1].rstrip(" *"), times(d.narrower)]
         )  # fmt: skip
     title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
     print_table(console, title, headings, rows, group=1 + len(others))
@@ -219,17 +220,20 @@ def interval_text(estimate: Estimate) -> str:
 
 def rounded(estimate: Estimate) -> tuple[str, str]:
     """Return a value and its interval, rounded to two digits of half the interval."""
-    half = (estimate.high - estimate.low) / 2
-    if not 0 < half < math.inf:
-        return short(estimate.value), interval_text(estimate)
-    places = 1 - math.floor(math.log10(half))
     value, low, high = (
-        f"{round(number, places) + 0.0:,.{max(places, 0)}f}"
+        0.0 if abs(number) < _NOTHING else number
         for number in (estimate.value, estimate.low, estimate.high)
     )
-    return value, f"{low} to {high}" + (" *" if estimate.few else "")
+    half = (high - low) / 2
+    if not _NOTHING < half < math.inf:
+        return short(value), interval_text(replace(estimate, low=low, high=high))
+    places = 1 - math.floor(math.log10(half))
+    shown = [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in (value, low, high)]
+    return shown[0], f"{shown[1]} to {shown[2]}" + (" *" if estimate.few else "")
 
 
+#: What is smaller is the rounding of equal numbers: nothing that is measured is so small.
+_NOTHING = 1e-12
 #: Intervals that shrink more than this rest on the rounding of equal numbers.
 _ROUNDING = 1e9
 

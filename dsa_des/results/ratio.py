@@ -226,6 +226,15 @@ def influences(
     return found
 
 
+def unseen_variance(nominal: FloatArray) -> float:
+    """Return what one event more, or less, adds to the variance of a ratio.
+
+    `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
+    proportion to their weights.
+    """
+    return _unseen(nominal)[1] / math.fsum(nominal) ** 2
+
+
 def _unseen(terms: FloatArray) -> tuple[float, float]:
     """Return what one event more adds to a weighted sum, on average, and to its variance."""
     once = math.fsum(terms)

@@ -5,6 +5,7 @@ stranger, so it is checked when it is read, and nothing that it names is opened 
 saved of results, limits and figures is what the study itself uses.
 """
 
+import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -126,6 +127,13 @@ class Result:
     quantile: Annotated[float, Field(gt=0, lt=1)] | None = None
 
     @property
+    def bounds(self) -> tuple[float, float]:
+        """What no value of it lies below or above; infinite where nothing is known."""
+        low = 0.0 if self.kind in (FRACTION, EVENT, SHARE, RATIO) else self.least
+        high = 1.0 if self.kind in (FRACTION, EVENT, SHARE) else self.most
+        return -math.inf if low is None else low, math.inf if high is None else high
+
+    @property
     def is_number(self) -> bool:
         """Whether each run has a number of its own for it."""
         return self.kind not in (RATIO, CLASS)
@@ -169,6 +177,8 @@ class AxisRecord(StrictRecord):
     """An axis: its column, its values, and what each changes in the scene, as texts."""
 
     column: str
+    #: The column with the names of what it counts, as wires; empty where it counts nothing.
+    words: str = ""
     values: list[_Label]
     over: bool
     numeric: bool

@@ -15,7 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import axis_label, readable, short, value_label
+from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
 from dsa_des.results.models import (
     EffectRecord,
     MeasuredErrors,
@@ -70,7 +70,7 @@ def study_report(folder: StudyFolder) -> bytes:
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
         version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_asked(tables),
         axes=[
-            (axis_label(axis.column), ", ".join(map(_value, axis.values[:40]))
+            (axis_label(AxisName(axis.column, axis.words)), ", ".join(map(_value, axis.values[:40]))
              + ", …" * (len(axis.values) > 40),
              "a sample: its values are independent units" if axis.over else "")
             for axis in record.axes
@@ -188,7 +188,8 @@ def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
         if not mine:
             continue
         others = [name for name in tables.rows.axes if name != requirement.axis]
-        title = f"{axis_label(requirement.axis)} for {requirement.text()}"
+        along = tables.rows.axes[tables.rows.axes.index(requirement.axis)]
+        title = f"{axis_label(along)} for {requirement.text()}"
         if not others:
             found.append((title, ["cheapest"], [[_cheapest(mine[0])]]))
             continue

@@ -12,7 +12,7 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
+from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
 from dsa_des.results.record import CRASHED, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.statistics import (
     Estimate,
@@ -257,7 +257,10 @@ class Rows:
         """Return how a ratio differs between two conditions on the same runs, by their influences.
 
         What each run adds to the error of either ratio is subtracted run by run, so what they
-        share falls out; the interval is that of the normal distribution.
+        share falls out; the interval is that of the normal distribution. Its variance holds one
+        run more that gains the event and one that loses it, of the weight of those below the line:
+        as Bonett and Price do for events without weights (`statistics.difference`), so that runs
+        which all agree still leave as much open as so many can.
         """
         runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
         runs = runs + self.column("replica")
@@ -280,14 +283,16 @@ class Rows:
         _, place = np.unique(cluster, return_inverse=True)
         each = np.array([np.bincount(place, weights=part) for part in parts])
         value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
+        events = np.bincount(place, weights=weight * below).astype(float)
+        more = 2.0 * unseen_variance(events)
+        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
         # A ratio whose runs all agree has no such error; its interval tells another.
-        unseen = sum(
+        alike = sum(
             normal_error(estimate_of(ratio), confidence) ** 2
             for ratio, part in zip(ratios, each, strict=True)
             if np.abs(part).max() < 1e-12
         )
-        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + unseen))
-        apart = float(np.sqrt((each**2).sum() + unseen))
+        apart = float(np.sqrt((each**2).sum() + alike + more))
         return EstimatedDifference(
             symmetric(value, joint, each.shape[1], few, confidence),
             symmetric(value, apart, each.shape[1], few, confidence),

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import short
+from dsa_des.results.labels import AxisName, short
 from dsa_des.results.record import FRACTION, NUMBER, StudyRecord
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.sealed_files import parquet
@@ -38,7 +38,7 @@ class Tables:
         self.folder = folder
         self.record = record
         self.results = record.results
-        axes = [axis.column for axis in record.axes]
+        axes = [AxisName(axis.column, axis.words) for axis in record.axes]
         self.rows = Rows(StoredRows(folder), axes, record.over)
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval,
@@ -55,6 +55,7 @@ class Tables:
         self.baseline: tuple[str, Any] | None = None
         if record.compare is not None and record.compare[0] in self.rows.axes:
             axis, value = record.compare
+            axis = self.rows.axes[self.rows.axes.index(axis)]  # which knows its words
             self.baseline = axis, float(value) if isinstance(value, int) else value
             self.compared = compare_axis(
                 self.rows, *self.baseline, self.results, record.confidence, record.interval,

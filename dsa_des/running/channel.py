@@ -363,11 +363,10 @@ class Inputs:
         for port, wire in self._queued:
             new = wire.collect(end)
             if new is not None:
-                came = Arrivals(wire.source, new[0].tick, new[1])
-                arrived.setdefault(port, []).append(came)
+                arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         rows = None if demand is None else partial(demand, asked)
         first, per_s = self._time.runs.start, self._ticks_per_s
-        return Wake(asked.tick, scans, per_s, held, arrived, rows, asked.run, first, clock)
+        return Wake(asked, scans, per_s, held, arrived, rows, first, clock)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

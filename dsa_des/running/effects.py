@@ -6,7 +6,7 @@ listed as those of blocks are.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -124,7 +124,6 @@ class _OfKey(Effect):
     name: str  # type: ignore[misc]  # of the object, as there is one object for each
     key: str
     everywhere: str
-    acts_on: ClassVar[str] = "time"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask a wire, a block's options or a clock for the key."""
@@ -143,8 +142,6 @@ class SharedProcessor(Effect):
     """Messages that queue for a processor."""
 
     name = "shared processor"
-    acts_on = "time"
-    neutral = False
     outside_the_proof = "work on a message takes a tick or more: no processor adds no time"
     key = "processor"
     everywhere = "every block"

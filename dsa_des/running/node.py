@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, no_runs, says_no_runs, union
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    last_of_run,
+    no_runs,
+    place_among,
+    says_no_runs,
+    union,
+)
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
@@ -177,7 +184,7 @@ class Node:
 
     def _end_in(self, window: Window) -> int:
         """Return up to when it runs in a window."""
-        return window.end if window.ahead is None or not self.ahead else window.ahead
+        return window.ahead if self.ahead else window.end
 
     def _demanded(self, start: int, end: int) -> RunTicks:
         instants = [demand.between(start, end) for demand in self.demands]
@@ -257,9 +264,8 @@ class Node:
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)
-            place = last_of_run(instants, asked)
-            here = (place >= 0) & (instants.tick[place] == asked.tick)
-            rows[demand.block] = place if bool(here.all()) else place[here]
+            place, here = place_among(instants, asked)
+            rows[demand.block] = place if here is None else place[here]
         return rows
 
     def receive(self) -> Wake:
@@ -350,9 +356,8 @@ def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
                     f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
                     "runs: the message must say of which run each is (`run = wake.run[rows]`)"
                 )
-        place = last_of_run(ran, message.instants)
-        there = bool(((place >= 0) & (ran.tick[place] == sent)).all())
-        if there and bool((place[1:] >= place[:-1]).all()):
+        place, there = place_among(ran, message.instants)
+        if there is None and bool((place[1:] >= place[:-1]).all()):
             return message
     raise ValueError(
         f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "

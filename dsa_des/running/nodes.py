@@ -164,7 +164,7 @@ def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> lis
     return [found[key] for key in sorted(found)]
 
 
-def lookahead_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
+def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
     """Return how long what is sent takes at least over some edges, or None without any."""
     return min(
         (

@@ -1,7 +1,7 @@
 """Pacing of a run: simulated time goes by as fast as the clock on the wall, times a factor.
 
-A pacer only waits between look-ahead windows; it changes when results come, never what they are.
-`PacedWindows` lets it wait after each.
+A pacer only waits between look-ahead windows (`Simulation.run`); it changes when results come,
+never what they are.
 """
 
 import math
@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dsa_des.errors import UsageError
-from dsa_des.running.windows import Failure, Window, Windows
 from dsa_des.text.safe_text import shortened
 
 #: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
@@ -104,39 +103,3 @@ class Pacer:
             f"{1000 * said['max_lag_s']:.1f} ms, {1000 * said['mean_lag_s']:.1f} ms on average, "
             f"over {self.windows} windows"
         )
-
-
-class PacedWindows:
-    """Windows short enough to keep pace with the wall clock, each of which waits for it.
-
-    Parameters
-    ----------
-    windows : Windows
-    pacer : Pacer
-    ticks_per_s : int
-    """
-
-    def __init__(self, windows: Windows, pacer: Pacer, ticks_per_s: int) -> None:
-        self._windows, self._pacer, self._ticks_per_s = windows, pacer, ticks_per_s
-        self._under_way = False
-        windows.limit(int(pacer.longest_window_s * ticks_per_s))
-
-    def limit(self, longest_ticks: int) -> None:
-        """Let no window be longer than this."""
-        self._windows.limit(longest_ticks)
-
-    def next(self) -> Window | None:
-        """Return the next window; simulated time 0 is when the first is asked for."""
-        if self._pacer.stopped:
-            return None
-        if not self._under_way:
-            self._pacer.start()
-        self._under_way = True
-        return self._windows.next()
-
-    def heard(self, window: Window, failure: Failure | None) -> int | None:
-        """Wait for the instant up to which all is final."""
-        final = self._windows.heard(window, failure)
-        if final is not None and failure is None:
-            self._pacer(final / self._ticks_per_s)
-        return final

@@ -19,7 +19,7 @@ from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, attempt
 from dsa_des.record.version import __version__
-from dsa_des.running.pacing import PacedWindows, Pacer
+from dsa_des.running.pacing import Pacer
 from dsa_des.running.reports import draw_all, load_reports, notes_of_scene, say_if_long
 from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.scene.scene import Scene
@@ -89,8 +89,6 @@ def record_run(
     noted = notes_of_scene(simulation)
     if noted and notes_command is not None:
         say(f"{len(noted)} note{'s' * (len(noted) > 1)}: {notes_command}", err=True)
-    if pacer is not None:
-        simulation.windows = PacedWindows(simulation.windows, pacer, simulation.ticks_per_s)
     reports = load_reports()
     notes: list[str] = []
     observers = ObserverSink(
@@ -108,7 +106,7 @@ def record_run(
         started = time.perf_counter()
         try:
             with _progress(simulation, silent=silent) as bar:
-                outcome = simulation.run(progress or bar)
+                outcome = simulation.run(progress or bar, pacer)
         finally:
             tables.release()
         summary = summary_of(observers, outcome, target.path, notes)

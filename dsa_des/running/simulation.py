@@ -29,9 +29,10 @@ from dsa_des.running.nodes import (
     build_nodes,
     check_reach,
     connect,
-    lookahead_ticks,
+    horizon_ticks,
     start_processors,
 )
+from dsa_des.running.pacing import Pacer
 from dsa_des.running.processors import Processing
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Failure, Rewinder, RunningBlock, Window, Windows
@@ -128,7 +129,7 @@ class Simulation:
         self.trace = trace
         self.ticks_per_s = scene.ticks_per_s
         self.env = simpy.Environment(initial_time=0)
-        self.window = Window(0, 0)
+        self.window = Window(0, 0, 0)
         #: What a block raised in the window that runs now.
         self.failure: Failure | None = None
         self._has_run = False
@@ -160,7 +161,7 @@ class Simulation:
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(
-            longest, lookahead_ticks(self.nodes, grain.cut_edges), rewinder
+            longest, horizon_ticks(self.nodes, grain.cut_edges), rewinder
         )
 
     @property
@@ -173,13 +174,17 @@ class Simulation:
         """First tick that is no longer simulated: runs cover [0, T)."""
         return self.time.run_ticks
 
-    def run(self, progress: Callable[[float], None] | None = None) -> Outcome:
+    def run(
+        self, progress: Callable[[float], None] | None = None, pacer: Pacer | None = None
+    ) -> Outcome:
         """Run the scene to its end.
 
         Parameters
         ----------
         progress : callable, optional
             Called with the simulated time in s after each window.
+        pacer : Pacer, optional
+            Waits for the wall clock after each window, which it keeps short, and may stop the run.
 
         Raises
         ------
@@ -194,7 +199,12 @@ class Simulation:
         started = time.process_time()
         self._open_recorder()
         runs = range(0)
+        if pacer is not None:
+            self.windows.limit(int(pacer.longest_window_s * self.ticks_per_s))
+            pacer.start()
         while (window := self.windows.next()) is not None:
+            if pacer is not None and pacer.stopped:
+                break
             if self.time.runs != runs:
                 runs = self.time.runs
                 self._start(runs)
@@ -211,6 +221,8 @@ class Simulation:
                 self._raise(failure)
             if self.recorder is not None:
                 self.recorder.advance(*self.time.final_before(runs, final))
+            if pacer is not None:
+                pacer(final / self.ticks_per_s)
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:

@@ -13,13 +13,7 @@ from dsa_des.block.component import Component
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
-from dsa_des.running.windows import (
-    EqualWindows,
-    Rewinder,
-    RewindingWindows,
-    SureWindows,
-    Windows,
-)
+from dsa_des.running.windows import Rewinder, RewindingWindows, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ClockSpec
@@ -116,23 +110,21 @@ class Timeline:
         return component
 
     def windows(
-        self, longest_ticks: int, lookahead_ticks: int | None, rewinder: Rewinder | None
+        self, longest_ticks: int, horizon_ticks: int | None, rewinder: Rewinder | None
     ) -> Windows:
         """Return the windows of all runs.
 
         Parameters
         ----------
         longest_ticks : int
-        lookahead_ticks : int, optional
+        horizon_ticks : int, optional
             If feedback loops are run in windows: before so long, nothing that is sent comes back.
         rewinder : Rewinder, optional
             If windows may be undone.
         """
         if rewinder is not None:
             return RewindingWindows(self.time, longest_ticks, rewinder)
-        if lookahead_ticks is not None:
-            return SureWindows(self.time, longest_ticks, lookahead_ticks)
-        return EqualWindows(self.time, longest_ticks)
+        return Windows(self.time, longest_ticks, horizon_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""

@@ -1,15 +1,15 @@
 """Windows: what of a run is simulated at a time.
 
 A run asks its windows which one comes next, runs it, and tells them what came of it. They decide
-whether it stands or is to be run otherwise; nothing that is recorded depends on them. What waits
-for the wall clock (`dsa_des.running.pacing`) wraps windows of any kind.
+whether it stands or is to be run otherwise; nothing that is recorded depends on them. `Windows` end
+where something that was sent in them could come back.
 
-In a loop every way back has a delay. A window is run with its feedback wires cut: blocks see what
-had come back before the window began. If then a message turns out to arrive inside the window,
-everything from that instant on was wrong; the run goes back to the window's start and runs it
-again up to that instant, where it was right. Windows start small after such a message and double
-while nothing comes back; they are never shorter than the delay of what comes back, as within it
-nothing can.
+`RewindingWindows` look farther. In a loop every way back has a delay. A window is run with its
+feedback wires cut: blocks see what had come back before the window began. If then a message turns
+out to arrive inside the window, everything from that instant on was wrong; the run goes back to the
+window's start and runs it again up to that instant, where it was right. Windows start small after
+such a message and double while nothing comes back; they are never shorter than the delay of what
+comes back, as within it nothing can.
 """
 
 from collections import deque
@@ -33,13 +33,13 @@ class Window(NamedTuple):
 
     All of a provisional window runs at its start, and may be undone: what a block raises in it
     counts only when the windows let it stand. Blocks that no loop leads to run from its start up to
-    `ahead`, not at all where that is the start: they have come farther. None is the end.
+    `ahead`, not at all where that is the start: they have come farther.
     """
 
     start: int
     end: int
+    ahead: int
     provisional: bool = False
-    ahead: int | None = None
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,61 @@ class RunningBlock(Protocol):
         """The wires into it, by input."""
 
 
-class Windows(Protocol):
-    """Which window comes next."""
+class Windows:
+    """Windows up to the horizon, from the start of some runs to their end, then of the next runs.
+
+    Nothing that is sent in a window comes back in it. The horizon is the lookahead of conservative
+    parallel simulation (Chandy and Misra, "Distributed simulation: a case study in design and
+    verification of distributed programs", IEEE Transactions on Software Engineering SE-5, 1979).
+    Blocks that no loop leads to have none: they run ahead, in windows of full length.
+
+    Parameters
+    ----------
+    time : ReplicaTime
+        Knows which runs have their time.
+    longest_ticks : int
+    horizon_ticks : int, optional
+        The least delay around the loops of the scene; none where it has no loop.
+    together : int, optional
+        How many runs go through windows together; by default as many whole ones as one may hold.
+    """
+
+    def __init__(
+        self,
+        time: ReplicaTime,
+        longest_ticks: int,
+        horizon_ticks: int | None = None,
+        together: int | None = None,
+    ) -> None:
+        self.time, self.end_tick, self.longest_ticks = time, time.run_ticks, longest_ticks
+        self._horizon = self.end_tick if horizon_ticks is None else max(1, horizon_ticks)
+        self._together = together
+        self._begin(0)
+
+    def _begin(self, first: int) -> None:
+        together = self._together or max(1, self.longest_ticks // self.end_tick)
+        self.time.runs = range(first, min(first + together, self.time.replicas))
+        self.start = 0
+        self._ahead = 0  # up to when blocks before the loops have run
 
     def limit(self, longest_ticks: int) -> None:
         """Let no window be longer than this; called before the first."""
+        self.longest_ticks = min(self.longest_ticks, max(1, longest_ticks))
+        if self.start == 0:
+            self._begin(self.time.runs.start)
+
+    def end_after(self, length_ticks: int) -> int:
+        """Return where a window of this length from `start` on ends."""
+        return min(self.start + length_ticks, self.end_tick)
 
     def next(self) -> Window | None:
         """Return the window to run now, or None when the run has come to its end."""
+        if self.start >= self.end_tick:
+            return None
+        length, ahead = min(self.longest_ticks, self._horizon), self.start
+        if self._ahead <= self.start:  # whole windows lie in what is run ahead
+            ahead = self._ahead = self.end_after(self.longest_ticks // length * length)
+        return Window(self.start, min(self.end_after(length), self._ahead), ahead)
 
     def heard(self, window: Window, failure: Failure | None) -> int | None:
         """Take note that a window has run, and what a block raised in it.
@@ -87,48 +134,6 @@ class Windows(Protocol):
             The tick before which everything is final, also the failure; None if the window does
             not stand, and what `next` gives is to be run instead.
         """
-
-
-class EqualWindows:
-    """Windows of one length from the start of some runs to their end, then of the next runs.
-
-    Parameters
-    ----------
-    time : ReplicaTime
-        Knows which runs have their time.
-    longest_ticks : int
-    together : int, optional
-        How many runs go through windows together; by default as many whole ones as one may hold.
-    """
-
-    def __init__(self, time: ReplicaTime, longest_ticks: int, together: int | None = None) -> None:
-        self.time, self.end_tick, self.longest_ticks = time, time.run_ticks, longest_ticks
-        self._together = together
-        self._begin(0)
-
-    def _begin(self, first: int) -> None:
-        together = self._together or max(1, self.longest_ticks // self.end_tick)
-        self.time.runs = range(first, min(first + together, self.time.replicas))
-        self.start = 0
-
-    def limit(self, longest_ticks: int) -> None:
-        """Let no window be longer than this."""
-        self.longest_ticks = min(self.longest_ticks, max(1, longest_ticks))
-        if self.start == 0:
-            self._begin(self.time.runs.start)
-
-    def end_after(self, length_ticks: int) -> int:
-        """Return where a window of this length from `start` on ends."""
-        return min(self.start + length_ticks, self.end_tick)
-
-    def next(self) -> Window | None:
-        """Return the next window."""
-        if self.start >= self.end_tick:
-            return None
-        return Window(self.start, self.end_after(self.longest_ticks))
-
-    def heard(self, window: Window, failure: Failure | None) -> int | None:
-        """Go on where a window ended."""
         self.start = window.end
         if self.start >= self.end_tick and self.time.runs.stop < self.time.replicas:
             self._begin(self.time.runs.stop)
@@ -138,38 +143,6 @@ class EqualWindows:
 # At the start, and after something came back, a window has this part of its full length.
 _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
-
-
-class SureWindows(EqualWindows):
-    """Windows of a loop in which nothing that is sent comes back.
-
-    Blocks before the loops run ahead of them, in windows of full length. The length is the
-    lookahead of conservative parallel simulation (Chandy and Misra, "Distributed simulation: a
-    case study in design and verification of distributed programs", IEEE Transactions on Software
-    Engineering SE-5, 1979).
-
-    Parameters
-    ----------
-    time, longest_ticks
-        As for `EqualWindows`.
-    lookahead_ticks : int
-        The shortest delay over which something comes back.
-    """
-
-    def __init__(self, time: ReplicaTime, longest_ticks: int, lookahead_ticks: int) -> None:
-        super().__init__(time, longest_ticks)
-        self._lookahead = lookahead_ticks
-        self._ahead = 0  # up to when blocks before the loops have run
-
-    def next(self) -> Window | None:
-        """Return the next window, which does not reach beyond what is there of those before."""
-        if self.start >= self.end_tick:
-            return None
-        ahead = self.start
-        if self._ahead <= self.start:
-            ahead = self._ahead = self.end_after(self.longest_ticks)
-        end = self.end_after(min(self.longest_ticks, self._lookahead))
-        return Window(self.start, min(end, self._ahead), False, ahead)
 
 
 class Rewinder:
@@ -236,13 +209,13 @@ class Rewinder:
         return min((tick for tick in ticks if tick is not None), default=None)
 
 
-class RewindingWindows(EqualWindows):
+class RewindingWindows(Windows):
     """Windows in which nothing came back unseen.
 
     Parameters
     ----------
     time, longest_ticks
-        As for `EqualWindows`.
+        As for `Windows`.
     rewinder : Rewinder
     """
 
@@ -253,7 +226,6 @@ class RewindingWindows(EqualWindows):
         self._least = rewinder.sure_ticks
         self._came = 0  # when something came back last
         self._right: Window | None = None  # what is right of a window that was undone
-        self._ahead = 0  # up to when blocks before the loops have run
         self._careful = False  # whether they run no farther than the rest, after a failure
 
     def next(self) -> Window | None:
@@ -267,13 +239,13 @@ class RewindingWindows(EqualWindows):
         if self._ahead > self.start:
             # A window does not reach beyond what is there of them.
             end, ahead = min(end, self._ahead), self.start
-        return Window(self.start, end, True, ahead)
+        return Window(self.start, end, ahead, True)
 
     def heard(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
         back = self._rewinder.came_back()
         early = window.end if back is None else back
-        if failure is not None and window.ahead is not None and window.ahead > window.end:
+        if failure is not None and window.ahead > window.end:
             # Perhaps it lies beyond the window: again, and nobody runs ahead.
             self._rewinder.restore()
             self._right, self._careful = None, True
@@ -287,10 +259,10 @@ class RewindingWindows(EqualWindows):
                 return None
         elif self._right is None and early < window.end:
             self._rewinder.restore()
-            self._right = Window(self.start, early, True, window.ahead)
+            self._right = Window(self.start, early, window.ahead, True)
             return None
         self._right, self._least = None, self._rewinder.sure_ticks
-        self._ahead = max(self._ahead, window.end if window.ahead is None else window.ahead)
+        self._ahead = max(self._ahead, window.ahead)
         self._careful = False
         if back is None:
             self._length = min(2 * (self._length or self._small()), self.longest_ticks)

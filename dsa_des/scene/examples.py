@@ -1,4 +1,4 @@
-"""Scenes and studies that packages ship, found by name: ``first_light``."""
+"""Scenes, studies and cases that packages ship, found by name: ``first_light``."""
 
 import os
 from dataclasses import dataclass
@@ -10,9 +10,12 @@ from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, nearest
 from dsa_des.scene.scene_file import read_scene_file
 
+#: What a shipped file may be; a case asks by studies whether requirements are met.
+Kind = Literal["scene", "study", "case"]
 
-def chosen_file(asked: Path | str, kind: Literal["scene", "study"] | None = None) -> Path:
-    """Return the file of a scene or study: a path that exists, or else that of a shipped one.
+
+def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
+    """Return the file of a scene, study or case: a path that exists, or else a shipped one's.
 
     A name that is neither is returned as a path, for its reader to say what is wrong with it.
 
@@ -20,13 +23,13 @@ def chosen_file(asked: Path | str, kind: Literal["scene", "study"] | None = None
     ----------
     asked : path or str
         Such as ``mine/scene.toml`` or ``first_light``.
-    kind : {"scene", "study"}, optional
-        Which of the two is wanted where both have the name.
+    kind : {"scene", "study", "case"}, optional
+        Which of them is wanted where several have the name.
 
     Raises
     ------
     SceneError
-        If there is no such file and a shipped scene or study has nearly this name.
+        If there is no such file, and what was written is a name rather than a path.
     """
     path = Path(asked)
     if not str(asked) or "\0" in str(asked) or os.path.lexists(path):
@@ -36,9 +39,14 @@ def chosen_file(asked: Path | str, kind: Literal["scene", "study"] | None = None
         return found
     if len(path.parts) == 1 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
-        if close := nearest(path.name.removesuffix(".toml"), names):
-            message = f"there is no such file; did you mean the shipped {close!r}? "
-            message += "(dsa-des examples lists them all)"
+        close = nearest(path.name.removesuffix(".toml"), names)
+        if close or not path.suffix:
+            message = (
+                f"there is no such file, nor a shipped {kind or 'scene or study'} of that name"
+            )
+            if close:
+                message = f"there is no such file; did you mean the shipped {close!r}?"
+            message += " (dsa-des examples lists them all)"
             raise SceneError([Problem(str(asked), "", message)])
     return path
 
@@ -54,7 +62,7 @@ def _has_neighbour(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Example:
-    """A scene or a study that a package ships.
+    """A scene, a study or a case that a package ships.
 
     Parameters
     ----------
@@ -62,18 +70,18 @@ class Example:
         As it is asked for: its path in the folder without ``.toml``, or shorter, its file's stem
         where no other example has the same.
     path : Path
-    kind : {"scene", "study"}
+    kind : {"scene", "study", "case"}
     title : str
     """
 
     name: str
     path: Path
-    kind: Literal["scene", "study"]
+    kind: Kind
     title: str
 
 
 def examples() -> list[Example]:
-    """Return all shipped scenes and studies, sorted by kind and name.
+    """Return all shipped scenes, studies and cases, sorted by kind and name.
 
     Files that are only parts of scenes (aircraft, sensors, obstacles) are not among them.
 
@@ -102,15 +110,15 @@ def examples() -> list[Example]:
     )
 
 
-def find_example(name: str, kind: Literal["scene", "study"] | None = None) -> Path | None:
-    """Return the file of a shipped scene or study; None if there is none of that name.
+def find_example(name: str, kind: Kind | None = None) -> Path | None:
+    """Return the file of a shipped scene, study or case; None if there is none of that name.
 
     Parameters
     ----------
     name : str
         ``first_light``, ``systems/oasys``, with ``.toml`` or without.
-    kind : {"scene", "study"}, optional
-        Which of the two is wanted where both have the name.
+    kind : {"scene", "study", "case"}, optional
+        Which of them is wanted where several have the name.
 
     Raises
     ------
@@ -125,7 +133,7 @@ def find_example(name: str, kind: Literal["scene", "study"] | None = None) -> Pa
 
 
 @cache
-def _kind_and_title(path: Path) -> tuple[Literal["scene", "study"], str] | None:
+def _kind_and_title(path: Path) -> tuple[Kind, str] | None:
     """Return what a file is, and its title; None for a part of a scene."""
     try:
         data = read_scene_file(path).data
@@ -134,6 +142,8 @@ def _kind_and_title(path: Path) -> tuple[Literal["scene", "study"], str] | None:
     title = str(data.get("title", path.stem))
     if "scene" in data:
         return "study", title
+    if "study" in data and "requirements" in data:
+        return "case", title
     return ("scene", title) if _is_whole(data) else None
 
 

@@ -92,6 +92,41 @@ def names_of(items: list[Any]) -> list[str]:
     return [name for item in items if (name := _name(item))]
 
 
+def in_words(tables: Any, text: str) -> str:
+    """Return a dotted key with items of lists by their names; empty where it holds no item.
+
+    ``wires[4].delay_s`` is ``wire from radar to fusion:.delay_s``.
+    """
+    words: list[str] = []
+    named = False
+    for part in key_in(tables, text):
+        inside = isinstance(part, int) and isinstance(tables, list) and part < len(tables)
+        if isinstance(part, int):
+            kind = words.pop() if words else ""
+            ends = _ends(tables[part]) if inside else None
+            name = (
+                f"from {ends[0]} to {ends[-1]}:" if ends else _name(tables[part]) if inside else ""
+            )
+            words.append(f"{kind.removesuffix('s')} {name or part + 1}".strip())
+            named = True
+        else:
+            words.append(part)
+            inside = isinstance(tables, dict) and part in tables
+        tables = tables[part] if inside else {}
+    return ".".join(words) if named else ""
+
+
+def _ends(item: Any) -> list[str]:
+    """Return the blocks that a wire connects; none of what is no wire."""
+    if isinstance(item, str) and "->" in item:
+        ends = item.split("->")
+    elif isinstance(item, dict) and {"from", "to"} <= set(item):
+        ends = [str(item["from"]), str(item["to"])]
+    else:
+        return []
+    return [end.partition(".")[0].strip() for end in ends]
+
+
 def _name(item: Any) -> str:
     found = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
     return str(found) if isinstance(found, str) else ""

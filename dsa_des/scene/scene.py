@@ -261,9 +261,10 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     """
     problems = [] if problems is None else problems
     data = scene_file.data
-    if "scene" in data and "blocks" not in data:
-        message = "is a study, not a scene: dsa-des study takes it"
-        raise SceneError([Problem(str(scene_file.path), "", message)])
+    for key, what, command in (("scene", "study", "study"), ("study", "case", "evidence")):
+        if key in data and "blocks" not in data:
+            message = f"is a {what}, not a scene: dsa-des {command} takes it"
+            raise SceneError([Problem(str(scene_file.path), "", message)])
     known = (*_TOP_LEVEL, *section_models())
     for key in data:
         if key not in known:

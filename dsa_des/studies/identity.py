@@ -16,6 +16,7 @@ from dsa_des.files.input_files import resolve_home
 from dsa_des.files.output_folder import RUN_JSON
 from dsa_des.record.version import __version__
 from dsa_des.results.record import Result, StudyRecord, draw_column
+from dsa_des.scene.keys import in_words
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
@@ -178,6 +179,7 @@ def record_text(study: Study, digest: str) -> str:
         "axes": [
             {
                 "column": axis.column,
+                "words": in_words(study.base.data, axis.key).removeprefix("blocks."),
                 "values": axis.labels,
                 "over": axis.column in study.over,
                 "numeric": axis.numeric,

@@ -125,9 +125,15 @@ class _StudyReader:
         self.problems.append(self.file.problem(key, message, *value))
 
     def study(self, swaps: Iterable[tuple[str, list[str]]]) -> Study:
-        if self._base is None and "scene" not in self.data and "blocks" in self.data:
-            message = "is a scene, not a study: dsa-des run takes it, dsa-des compare runs it often"
-            raise SceneError([Problem(str(self.file.path), "", message)])
+        for key, message in (
+            (
+                "blocks",
+                "is a scene, not a study: dsa-des run takes it, dsa-des compare runs it often",
+            ),
+            ("study", "is a case, not a study: dsa-des evidence takes it"),
+        ):
+            if self._base is None and "scene" not in self.data and key in self.data:
+                raise SceneError([Problem(str(self.file.path), "", message)])
         for key in self.data:
             if key not in KEYS:
                 self.add((key,), f"unknown key of a study{did_you_mean(key, KEYS)}")

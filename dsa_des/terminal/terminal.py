@@ -63,6 +63,15 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     return found if known else SafeConsole(stderr=err, width=width)
 
 
+def text_of(show: Callable[[Any], None], width: int = 110) -> str:
+    """Return what a function prints on a console, as plain text for ``print``."""
+    from dsa_des.terminal.safe_console import SafeConsole
+
+    file = io.StringIO()
+    show(SafeConsole(file=file, width=width, color_system=None, force_jupyter=False))
+    return "\n".join(line.rstrip() for line in file.getvalue().splitlines())
+
+
 def html_of(show: Callable[[Any], None]) -> str:
     """Return what a function prints on a console, as HTML for a notebook."""
     from dsa_des.terminal.safe_console import SafeConsole

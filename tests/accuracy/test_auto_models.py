@@ -19,7 +19,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # Of 500 (seeds 0 to 499, run once by hand): none off by more than allowed, 83 % cheaper.
-SEEDS = range(60)
+SEEDS = range(40)
 
 
 def tolerance(seed: int) -> dict[str, float]:
@@ -75,12 +75,12 @@ def at_an_edge(sensor: Any, row: dict[str, float], allowed: dict[str, float]) ->
     return any(abs(value - limit) <= slack for value, limits, slack in sides for limit in limits)
 
 
-def test_detections_differ_by_no_more_than_allowed_over_200_scenes(tmp_path: Path) -> None:
+def test_detections_differ_by_no_more_than_allowed_over_80_scenes(tmp_path: Path) -> None:
     """Exact models give way where angle, range and Pd allow it; the Pd budget is a shared one."""
     draw = Random(7)
     cheaper = compared = at_edges = 0
     lost = gained = budget = 0.0
-    for seed in range(1000, 1200):
+    for seed in range(1000, 1080):
         allowed = {
             "angle_deg": 10.0 ** draw.uniform(-1.5, 0.3),
             "range_m": 10.0 ** draw.uniform(0, 2.5),
@@ -112,8 +112,8 @@ def test_detections_differ_by_no_more_than_allowed_over_200_scenes(tmp_path: Pat
             if row["detection_probability"] is not None:
                 change = abs(row["detection_probability"] - other["detection_probability"])
                 assert change <= allowed["detection_probability"], (seed, rung)
-    assert cheaper > 40
-    assert compared > 1000
+    assert cheaper > 16
+    assert compared > 400
     assert 0 < at_edges < 0.005 * compared
     assert max(lost, gained) <= budget < 0.02 * compared
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from components.flights.bounds import attitude_extremes_rad, traffic_envelope
-from components.flights.fleet import SampledFleet, ScriptedFleet
 from components.flights.legs import Climb, Straight, Turn
-from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.sampled_flight import SampledFleet, SampledTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.reach import FarthestLook, Reach, farthest_look
 from components.sensor.mounting import MountedAxes
@@ -48,7 +47,7 @@ def test_a_dense_look_stays_inside(seed: int, count: int) -> None:
     few = [flight(draw, f"t{i}") for i in range(3)]
     targets = few * (count // 3)
     reach_m, duration_s = 6000.0, 90.0
-    found = traffic_envelope(own, targets, ScriptedFleet(targets), duration_s, reach_m)
+    found = traffic_envelope(own, ScriptedFleet(targets), duration_s, reach_m)
     times = np.linspace(0.0, duration_s, 4001)
     me, them = own.at(times), ScriptedFleet(few).at(times)
     _, elevation, range_m = line_of_sight(
@@ -70,8 +69,8 @@ def test_a_dense_look_stays_inside(seed: int, count: int) -> None:
 def test_nobody_in_reach_leaves_nothing_to_judge() -> None:
     own = ScriptedTrajectory("own", lat_deg=0, lon_deg=0, alt_m=500)
     far = [ScriptedTrajectory("far", lat_deg=1, lon_deg=0, alt_m=500)]
-    assert traffic_envelope(own, far, ScriptedFleet(far), 60.0, 1000.0).range_m == 0.0
-    seen = traffic_envelope(own, far, ScriptedFleet(far), 60.0, math.inf)
+    assert traffic_envelope(own, ScriptedFleet(far), 60.0, 1000.0).range_m == 0.0
+    seen = traffic_envelope(own, ScriptedFleet(far), 60.0, math.inf)
     # A degree of latitude at the equator: WGS 84's radius there, 500 m up.
     assert seen.range_m == pytest.approx(math.radians(1.0) * (6335439.0 + 500.0), rel=1e-3)
 

@@ -1,10 +1,15 @@
 """Alert levels behind a filter, against the rule in plain loops."""
 
+import numpy as np
 import pytest
 from covering import covers
 from wired import rows, run
 
 import dsa_des
+from components.alerting.m_of_n import MOfNAlerts, MOfNParameters
+from components.messages.alerts import AlertLevels
+from dsa_des.arrays.run_ticks import RunTicks
+from dsa_des.block.wake import Wake
 from dsa_des.errors import SceneError
 
 KIND = ("alerting.m_of_n",)
@@ -73,3 +78,30 @@ def test_every_key_changes_what_passes():
 def test_more_than_there_are_is_refused():
     with pytest.raises(SceneError, match=r"m = 5: it must be at most n, 4"):
         dsa_des.load_scene(scene(m=5))
+
+
+def test_each_run_has_its_own_last_levels():
+    """Windows that hold instants of two runs with other levels, as runs in lock step give them."""
+    random = np.random.default_rng(7)
+    raw = random.integers(0, 4, size=(2, 12))
+    block = object.__new__(MOfNAlerts)
+    block.p = MOfNParameters(hold_s=1.5)
+    block.setup()
+    shown = [[], []]
+    for window in np.split(np.arange(12), 4):
+        tick, run = np.tile(window, 2), np.repeat([0, 1], len(window))
+        alerts = AlertLevels(
+            tick=tick, run=run, offsets=np.arange(len(tick) + 1), target=np.zeros(len(tick), int),
+            level=raw[:, window].ravel(), times={}, time_to_closest_s=np.zeros(len(tick)),
+            closest_horizontal_m=np.zeros(len(tick)), closest_vertical_m=np.zeros(len(tick)),
+            numbers={}, deviations={}, relative={}, own_motion={}, roster=None,
+        )  # fmt: skip
+        held = {"alerts": (alerts, np.arange(len(tick)))}
+        found = block.run(Wake(RunTicks(run, tick), np.full(len(tick), -1), 1, held, {}))
+        for number in (0, 1):
+            shown[number] += found.level[run == number].tolist()
+    alone = [
+        [level for _, level in plain(list(enumerate(levels)), 2, 4, 1.5, 5.0)]
+        for levels in raw.tolist()
+    ]
+    assert shown == alone and alone[0] != alone[1]

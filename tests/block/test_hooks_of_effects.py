@@ -1,13 +1,16 @@
 """An effect that nothing would call is an error when the scene is checked."""
 
+from inspect import signature
+
 import engine_blocks as blocks
 import pytest
 from click.testing import CliRunner
 from engine_blocks import Relay
 
 from components.radar.threshold_radar import ThresholdRadar
+from components.radar.weather import SNR
 from dsa_des.block.component import Context
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.cli import main
@@ -73,9 +76,7 @@ def test_every_slip_of_a_scene_is_in_one_report(lab, monkeypatch):
 
 
 def test_a_block_that_asks_for_an_undeclared_hook_is_told_so():
-    block = type("Asking", (Relay,), {"hooks": {"SNR": "(cells) -> factor"}})(
-        "a", None, Context(Streams(1))
-    )
+    block = type("Asking", (Relay,), {"hooks": (SNR,)})("a", None, Context(Streams(1)))
     assert block.built("SNR") == []
     with pytest.raises(ValueError, match=r"'snr'.*did you mean 'SNR'"):
         block.built("snr")
@@ -85,6 +86,24 @@ def test_a_block_that_asks_for_an_undeclared_hook_is_told_so():
 def test_every_effect_of_a_registered_block_acts_on_a_hook(name):
     cls = find(name)
     assert {effect.acts_on for effect in cls.effects} <= set(cls.all_hooks())
+    assert all(isinstance(effect.acts_on, Hook) for effect in cls.effects)
+
+
+@pytest.mark.parametrize("scene", ["first_light", "tracking/cueing"])
+def test_what_is_built_can_be_called_as_its_hook_says(lab, scene):
+    simulation = Simulation(load_scene(lab.configs / f"{scene}.toml"), simulate_everything=True)
+    called = set()
+    for block in simulation.components.values():
+        for hook in block.all_hooks():
+            for built in block.built(hook):
+                if getattr(hook.contract, "_is_protocol", False):
+                    signature(built).bind(
+                        *signature(hook.contract.__call__).parameters.keys() - {"self"}
+                    )
+                    called.add(hook)
+                else:
+                    assert isinstance(built, hook.contract)
+    assert "SNR" in called
 
 
 def test_the_description_of_a_block_lists_its_hooks_and_their_effects():

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from dsa_des.block.entry_points import COMPONENTS, registered
 from dsa_des.block.registry import find
-from dsa_des.evidence.inputs import verified_of
+from dsa_des.evidence.case import read_case
+from dsa_des.evidence.inputs import models_of, verified_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -18,6 +19,11 @@ def test_every_claim_names_a_test_that_is_there():
         assert (ROOT / one.test).is_file(), one
         assert all(text and text == text.strip() for text in one), one
     assert {"line of sight", "errors of measured values"} <= {what for _, what in claims}
+
+
+def test_the_shipped_case_states_something_of_every_block():
+    case = read_case(ROOT / "configs" / "evidence" / "noncooperative.toml")
+    assert all(model["verified"] for model in models_of(case.assessed))
 
 
 def test_a_sensor_is_held_to_what_all_sensors_are():

@@ -106,6 +106,7 @@ def test_a_path_that_exists_wins(call: Call, tmp_path: Path) -> None:
         (("check", "first_ligth.toml"), "'first_light'"),
         (("study", "radar_scanrate"), "'radar_scan_rate'"),
         (("compare", "frist_light", "--swap", "gate=gate"), "'first_light'"),
+        (("evidence", "noncoperative", "--out", "pack"), "'noncooperative'"),
     ],
 )
 def test_a_misspelt_name_gets_the_nearest(
@@ -115,6 +116,35 @@ def test_a_misspelt_name_gets_the_nearest(
     done = call(*words)
     assert done.exit_code == 2
     assert f"did you mean the shipped {meant}?" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [
+        (("run",), "scene"),
+        (("study",), "study"),
+        (("compare", "--swap", "gate=gate"), "scene or study"),
+        (("evidence", "--out", "pack"), "case"),
+    ],
+)
+def test_a_name_like_no_other_gets_the_list(call: Call, words: tuple[str, ...], kind: str) -> None:
+    done = call(*words, "nonexist")
+    assert (done.exit_code, done.output) == (
+        2,
+        f"error: nonexist: there is no such file, nor a shipped {kind} of that name "
+        "(dsa-des examples lists them all)\n",
+    )
+    # A path is no name.
+    assert call(*words, "nonexist.toml").output == "error: nonexist.toml: there is no such file\n"
+
+
+def test_cases_stand_under_their_command(call: Call) -> None:
+    lines = call("examples").output.splitlines()
+    heads = [line for line in lines if not line.startswith(" ")]
+    assert [head.rpartition("dsa-des ")[2] for head in heads] == [
+        "run NAME", "study NAME", "evidence NAME",
+    ]  # fmt: skip
+    assert lines[lines.index(heads[2]) + 1].split()[0] == "noncooperative"
 
 
 def test_a_misspelt_file_gets_the_nearest_file(call: Call, tmp_path: Path) -> None:

@@ -35,11 +35,19 @@ def test_measuring_shows_a_share_for_every_effect_that_calculates() -> None:
 
 
 def test_a_sentence_is_one_line_for_who_reads_a_pipe() -> None:
-    lines = call("explain", SCENE).stdout.splitlines()
+    title, *lines = call("explain", SCENE).stdout.splitlines()
     assert any("rain: not simulated, [weather] rain_rate_mm_h is 0" in line for line in lines)
     table = lines[: lines.index("")]
     first = {"block", "eo", "ir", "radar", "fusion", "transform", "traffic", "every"}
     assert all(line.split()[0] in first for line in table)
+    # No column is so wide that what stands right of it is out of sight, and none is padded.
+    assert table[0].split() == ["block", "effect"]
+    assert all(line == line.rstrip() for line in table)
+    simulated = [": simulated, " in line for line in table if "simulated, " in line]
+    assert simulated == sorted(simulated, reverse=True)
+    assert title == (
+        f"First light: {simulated.count(True)} effects simulated, {simulated.count(False)} not"
+    )
 
 
 def rows_told(*arguments: object) -> set[str]:

@@ -110,6 +110,24 @@ def test_bad_places_are_refused_before_anything_runs(
     assert everything_in(places) == before
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a file system without folders")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "first_light"),
+        ("study", "radar_scan_rate"),
+        ("compare", "first_light", "--swap", "tracker=tracking.ekf"),
+        ("cost", "first_light"),
+        ("reproduce", "table-4.1"),
+    ],
+)
+def test_a_file_system_that_takes_no_folder_is_said_to_take_none(words: tuple[str, ...]) -> None:
+    done = call(*words, "--out", "/proc/x/y")
+    assert (done.exit_code, done.output) == (
+        2, "error: --out /proc/x/y: cannot be written: no folder can be made in /proc\n"
+    )  # fmt: skip
+
+
 def test_nothing_of_an_earlier_run_is_touched_from_inside_it(
     places: Path, first_light: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

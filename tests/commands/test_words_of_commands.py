@@ -55,10 +55,13 @@ def test_a_slip_is_one_line_with_the_nearest_name(words, says):
         ("run", "radar_scan_rate", "is a study, not a scene: dsa-des study takes it"),
         ("study", "first_light", "is a scene, not a study: dsa-des run takes it, "
          "dsa-des compare runs it often"),
+        ("run", "noncooperative", "is a case, not a scene: dsa-des evidence takes it"),
+        ("study", "noncooperative", "is a case, not a study: dsa-des evidence takes it"),
+        ("evidence", "first_light", "is no case: dsa-des run takes it"),
     ],
 )  # fmt: skip
-def test_a_study_is_no_scene_and_a_scene_no_study(command, name, says):
-    done = call(command, name)
+def test_what_another_command_takes_says_which(command, name, says):
+    done = call(command, name, *(("--out", "pack") if command == "evidence" else ()))
     assert done.exit_code == 2 and done.stderr.endswith(f"{name}.toml: {says}\n")
 
 
@@ -109,6 +112,7 @@ def test_a_kind_of_blocks_and_one_key():
         (["run"], "first_li", ["first_light"]),
         (["study"], "sh", ["show"]),
         (["study"], "radar_scan", ["radar_scan_rate"]),
+        (["evidence"], "noncoop", ["noncooperative"]),
         (["run", "first_light", "--set"], "blocks.radar.scan_r", ["blocks.radar.scan_rate_hz="]),
         (["run", "first_light", "--swap"], "rad", ["radar="]),
         (["run", "first_light", "--swap"], "radar=radar.th", ["radar=radar.threshold"]),

@@ -15,6 +15,7 @@ from components.line_of_sight.transform import EARTH
 from components.radar.detection.ladder import DETECTION
 from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
+from dsa_des.commands import cost
 from dsa_des.commands.cost import ladders_to_climb
 from dsa_des.costs.climb import climb
 from dsa_des.costs.replay import run_rung
@@ -41,6 +42,20 @@ def rows(tmp_path_factory):
     )
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout), out
+
+
+def test_who_waits_is_told_what_is_measured(monkeypatch, capsys):
+    now_s = iter([0.0, 1.0, 11.0, 12.0, 22.0])
+    monkeypatch.setattr(cost.time, "monotonic", lambda: next(now_s))
+    progress = cost.Progress(silent=False)
+    for step in ("a", "b", "c", "d"):
+        progress.say(step)  # standard error is no terminal: a line every ten seconds
+    assert capsys.readouterr() == ("", "b\nd\n")
+    monkeypatch.setattr(cost.time, "monotonic", lambda: 0.0)
+    monkeypatch.setattr(cost.sys.stderr, "isatty", lambda: True, raising=False)
+    cost.Progress(silent=True).say("nothing")
+    cost.Progress(silent=False).say("at once")
+    assert capsys.readouterr() == ("", "at once\n")
 
 
 def test_rows_and_files(rows):

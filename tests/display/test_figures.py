@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from components.display.flights import Flights
 from components.display.recorded_rows import Detected, SensorScans, read_scans
@@ -102,6 +103,24 @@ def test_every_kind_of_run_is_drawn(tmp_path, name):
         assert width > 800
         assert height > 400
         assert path.stat().st_size > 8000
+
+
+def test_without_sensors_ranges_have_the_figure_for_themselves(tmp_path, monkeypatch):
+    """An empty row of scans, and the whole run shaded for it, would say nothing."""
+    monkeypatch.setattr("components.display.timeline.read_scans", lambda folder: {})
+    found = []
+    print_png = FigureCanvasAgg.print_png
+    monkeypatch.setattr(
+        FigureCanvasAgg,
+        "print_png",
+        lambda canvas, *given, **more: (
+            found.append(canvas.figure) or print_png(canvas, *given, **more)
+        ),
+    )
+    draw(*run(tmp_path, a_target("solo"), 10))
+    (axes,) = found[-1].axes
+    assert axes.get_title(loc="left").endswith(": no sensor scans")
+    assert not list(axes.patches)
 
 
 def test_the_same_run_is_the_same_picture(tmp_path):

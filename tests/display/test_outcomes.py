@@ -139,6 +139,7 @@ def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
         for level, found in levels.items():
             times = [row["time_s"] for row in mine if str(row["level"]) == level]
             assert (found["first_s"], found["last_s"]) == (min(times), max(times))
+    assert summary["alerts_of"] == {"alerting": ["tracker"], "true_alerting": ["the truth"]}
     flown = pq.read_table(folder / "manoeuvres.parquet")["time_s"].to_pylist()
     assert summary["manoeuvres"]["pilot"] == {
         "count": len(flown), "first_s": flown[0], "last_s": flown[-1]
@@ -170,7 +171,7 @@ def test_alerts_come_piece_by_piece_and_keep_each_level_and_target():
         ("y", 2.0, None, 1), ("x", 5.0, "a", 1), ("x", 6.0, "b", 1),
     ]  # fmt: skip
     for cuts in ([], [1], [2, 4], range(1, 7)):
-        summary = AlertSummary(["x", "y", "z"])
+        summary = AlertSummary({"x": ["ekf"], "y": ["the truth"], "z": ["a", "b"]})
         for part in np.split(np.arange(len(rows)), cuts):
             some = [rows[row] for row in part]
             summary.update("alerts", {

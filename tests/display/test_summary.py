@@ -175,6 +175,7 @@ def test_a_line_for_each_block():
             },
             "true": {},
         },
+        "alerts_of": {"alerting": ["ekf", "eo"]},
         "manoeuvres": {
             "a": {"count": 0, "first_s": None, "last_s": None},
             "b": {"count": 1, "first_s": 22.0, "last_s": 22.0},
@@ -188,8 +189,9 @@ def test_a_line_for_each_block():
         "(3.00 km away) and 2 more",
         "eo: 1 confirmed track; first confirmed at 4.0 s",
         "ir: no confirmed track",
-        "alerting: level 1 from 12.0 s to 30.0 s (b from 12.0 s to 30.0 s, a at 14.2 s)",
-        "alerting: level 3 at 14.2 s (a)",
+        "alerting (by ekf and eo): level 1 from 12.0 s to 30.0 s "
+        "(b from 12.0 s to 30.0 s, a at 14.2 s)",
+        "alerting (by ekf and eo): level 3 at 14.2 s (a)",
         "true: no alert",
         "a: no manoeuvre",
         "b: 1 manoeuvre, at 22.0 s",

@@ -10,20 +10,25 @@ from matplotlib.collections import PathCollection, QuadMesh
 from scipy.stats import chi2
 
 import dsa_des
+from components.display.consistency import draw_consistency, errors_squared
 from components.display.outcomes import distances
-from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
+from components.display.tracks import DrawnTracks, draw_tracks
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
 
 EKF = "blocks.tracker.type='tracking.ekf'"
 
 
-def told(tmp_path, *sets):
-    scene = dsa_des.load_scene(
+def near(*sets):
+    return dsa_des.load_scene(
         "first_light",
         sets=["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
               "blocks.traffic.intruders.0.north_m=3000", *sets],
     )  # fmt: skip
+
+
+def told(tmp_path, *sets):
+    scene = near(*sets)
     dsa_des.run(scene, out=tmp_path / "run")
     return DrawnTracks.read(Simulation(scene), tmp_path / "run")
 
@@ -98,6 +103,50 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
         assert word == f"{block}: {values.mean():.3g}, {share:.0f} % inside"
     assert [text.get_text()[:4] for text in innovations.get_legend().get_texts()] == [
         "hone", "sure"]  # fmt: skip
+
+
+def test_tracks_of_whatever_numbers_have_colours_of_their_own(shown):
+    """Numbers 2 and 8 once had the same of six colours."""
+    one = shown.tracks[0]
+    columns = {name: np.concatenate([values] * 2) for name, values in one.columns.items()}
+    columns["track"] = np.repeat([2, 8], len(one.columns["state_s"]))
+    columns["block"] = np.array(["tracker"] * len(columns["track"]))
+    origin = {
+        f"origin_{name}": np.full(len(columns["track"]), value)
+        for name, value in zip(("lat_deg", "lon_deg", "alt_m"), shown.origin, strict=True)
+    }
+    drawn = DrawnTracks(Simulation(near()), columns | origin)
+    assert [track.number for track in drawn.tracks] == [2, 8]
+    assert len({track.colour for track in drawn.tracks}) == 2
+
+
+@pytest.mark.parametrize("many", [40, 60])
+def test_of_many_tracks_their_median_is_drawn(tmp_path, monkeypatch, shown, many):
+    """Sixty lines would cover each other: at each time half of the tracks are below the middle."""
+    crowd, one = copy(shown), shown.tracks[0]
+    scales = np.geomspace(0.1, 10.0, many)
+    crowd.tracks = [
+        replace(
+            one,
+            number=number,
+            columns=one.columns | {name: one.columns[name] / k for name in COVARIANCE.values()},
+        )
+        for number, k in enumerate(scales.tolist())
+    ]
+    figure = drawn_figure(monkeypatch, draw_consistency, tmp_path / "x.png", crowd)
+    errors = figure.axes[0]
+    drawn = [line for line in errors.lines if len(line.get_xdata()) > 2]
+    if many == 40:
+        assert len(drawn) == many
+        return
+    (median,) = drawn
+    (spread,) = (band for band in errors.collections if len(band.get_paths()[0].vertices) > 20)
+    found, _ = errors_squared(one.columns, shown.targets.states(one.columns["state_s"]))
+    assert found.min() - 1e-9 < median.get_ydata().min() < median.get_ydata().max() < found.max()
+    top = spread.get_paths()[0].vertices[:, 1].max()
+    assert top / found.max() == pytest.approx(np.quantile(scales, 0.975), rel=0.3)
+    words = [text.get_text() for text in errors.get_legend().get_texts()]
+    assert words == ["95 % of 60 tracks", "median"]
 
 
 @pytest.mark.parametrize("many", [3, 100])

@@ -35,19 +35,6 @@ EXTRAS = {
 LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
 
 
-def desk(folder: Path) -> Path:
-    """Lay out what stands for a reader's own: a scene, encounters and a table of areas."""
-    (folder / "SCENE").write_text('extends = "first_light"\n')
-    recorded = (ROOT / "configs/encounters/crossing.daa").read_bytes()
-    (folder / "ENCOUNTER.daa").write_bytes(recorded)
-    (folder / "ENCOUNTERS").mkdir()
-    (folder / "ENCOUNTERS/one.daa").write_bytes(recorded)
-    rows = ["az_deg,el_deg,area_m2"]
-    rows += [f"{az},{el},10" for az in range(-180, 181, 30) for el in range(-90, 91, 30)]
-    (folder / "AREAS.csv").write_text("\n".join(rows) + "\n")
-    return folder
-
-
 #: What only a shell understands.
 _SHELL = re.compile(r"[|<>&;$*?`(){}~!#\n\\]")
 
@@ -98,7 +85,7 @@ def play(parts: list[Snippet], folder: Path) -> None:
 def test_page_runs_as_written(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for package in EXTRAS.get(page, ()):
         pytest.importorskip(package, reason=f"{page} needs the package {package}")
-    monkeypatch.chdir(desk(tmp_path))
+    monkeypatch.chdir(tmp_path)  # empty: a reader has what the pages give, and no more
     play(read_snippets(page), tmp_path)
 
 
@@ -179,17 +166,22 @@ def test_a_page_that_fails_is_seen(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("page", "scene"), [("README.md", "first_light"), ("docs/tutorial.md", "mine.toml")]
+    ("page", "command", "block"),
+    [
+        ("README.md", "run first_light", 0),
+        ("docs/tutorial.md", "run mine.toml", 1),
+        ("docs/tutorial.md", "study rates.toml --workers 1", 2),
+    ],
 )
-def test_what_a_page_says_a_run_prints_is_printed(
-    page: str, scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_a_page_says_a_command_prints_is_printed(
+    page: str, command: str, block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / page).read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for part in text.split("<!-- file: mine.toml -->\n```toml\n")[1:]:
-        Path("mine.toml").write_text(part.partition("```")[0], encoding="utf-8")
-    done = CliRunner().invoke(main, ["run", scene, "--no-figures"])
+    parts = read_snippets(page)
+    for part in parts:
+        if file := file_of(part):
+            Path(file[0]).write_text(file[1] + part.text, encoding="utf-8")
+    done = CliRunner().invoke(main, [*command.split(), "--no-figures"])
     printed = [line.rstrip() for line in done.stdout.splitlines()]
-    *_, said = (part.partition("```")[0] for part in text.split("```text\n")[1:])
-    lines = [line.rstrip() for line in said.splitlines()]
-    assert lines and all(line in printed for line in lines), lines
+    lines = [part.text for part in parts if part.language == "text"][block].splitlines()
+    assert lines and all(line.rstrip() in printed for line in lines), lines

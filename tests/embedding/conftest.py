@@ -37,7 +37,7 @@ class Host:
     def at(self, time_s):
         """Return the arrays of `simulate` at a time."""
         time = np.array([time_s])
-        own, others = self.traffic.own.at(time), self.traffic.fleet.at(time)
+        own, others = self.traffic.own.at(time), self.traffic.targets.at(time)
         lla, att = [], []
         for state in (own, others):
             lat, lon = radians_of(state.lat_deg), radians_of(state.lon_deg)

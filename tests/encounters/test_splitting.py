@@ -50,10 +50,10 @@ def airspace(random, count):
 def test_split_sets_agree_with_plain_ones_and_know_how_wrong_they_are() -> None:
     """The same truth from as many runs, over many sets: no bias, 95 % held, and narrower."""
     truth_of = np.random.default_rng(1)
-    score, w, n, fails = airspace(truth_of, 2_000_000)
+    score, w, n, fails = airspace(truth_of, 1_000_000)
     truth = (w * fails).sum() / (w * n).sum()
     random = np.random.default_rng(2)
-    ratios, held, widths, plain_widths, rounds = [], 0, [], [], 300
+    ratios, held, widths, plain_widths, rounds = [], 0, [], [], 200
     for seed in range(rounds):
         score, w, n, fails = airspace(random, 1500)
         expected = expected_copies(score, np.array([4.0]), np.array([0.15, 2.5]))

@@ -3,13 +3,24 @@
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from dsa_des.cli import main
 from tests.evidence.small_case import CASE, evidence, write_case
 
 BAD = {
     'unit = "of what is lost without"\n': ("", "requirements[0].unit: is required"),
     'unit = "of the encounters"': ('unit = " "', "requirements[1].unit = ' ': must not be empty"),
     "most = 2\n": ("", "requirements[0]: a requirement has one limit"),
+    "most = 2": (
+        "most = -2",
+        "requirements[0].most = -2.0: no value of well_clear_lost_risk_ratio lies there; allowed:",
+    ),
+    "least = 0.01\nunit": (
+        "least = 10\nunit",
+        "requirements[1].least = 10.0: no value of manoeuvred lies there; allowed: between 0 and 1",
+    ),
+    "share = 1\n": ("share = -0.1\n", "convergence.share = -0.1"),
     "least = 0.01": ("least = 0.01\nmost = 3", "requirements[1]: a requirement has one limit"),
     'result = "manoeuvred"': ('result = "manoeuverd"', "did you mean 'manoeuvred'?"),
     'study = "study.toml"': ('study = "studi.toml"', "did you mean"),
@@ -48,6 +59,18 @@ def test_bad_calls(tmp_path):
     output, code = evidence(case, "--out", tmp_path / "full")
     assert code == 2 and "is not empty; --resume continues a pack" in output
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
+
+
+def test_where_no_folder_can_be_made(tmp_path):
+    """Linux takes no folder in /proc, and calls it missing."""
+    if not Path("/proc/self").exists():
+        pytest.skip("there is no /proc")
+    case = write_case(tmp_path)
+    output, code = evidence(case, "--out", "/proc/x")
+    said = "error: --out /proc/x: cannot be written: no folder can be made in /proc"
+    assert (output, code) == (said, 2)
+    result = CliRunner().invoke(main, ["study", str(tmp_path / "study.toml"), "--out", "/proc/x"])
+    assert (" ".join(result.output.split()), result.exit_code) == (said, 2)
 
 
 @pytest.mark.parametrize(("name", "takes_it"), [("first_light", "run"), ("swerling", "study")])

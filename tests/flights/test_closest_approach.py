@@ -8,15 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.flights import closest_approach
-from components.flights.closest_approach import closest_approaches
-from components.flights.fleet import SampledFleet, ScriptedFleet
+from components.flights.closest_approach import (
+    OwnTimes,
+    RegularTimes,
+    SharedTimes,
+    closest_approaches,
+)
 from components.flights.legs import Straight, Turn
-from components.flights.sample_times import OwnTimes, RegularTimes, SharedTimes
-from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.sampled_flight import SampledFleet, SampledTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-
-ENDLESS = (0.0, np.inf)
 
 
 def brute_force(own, target, times):

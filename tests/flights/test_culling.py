@@ -9,10 +9,9 @@ import pytest
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.flights.culling import Culling
-from components.flights.fleet import ScriptedFleet
 from components.flights.legs import Straight, Turn, Waypoint, Waypoints
 from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.targets import TrafficStates
 from dsa_des.record.recording import Recorder
@@ -64,7 +63,7 @@ def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
 def test_whoever_comes_in_reach_is_active(seed: int) -> None:
     targets = flights(60, seed)
     fleet = ScriptedFleet(targets)
-    culling = Culling(OWN, targets, fleet, 15_000.0, 320.0)
+    culling = Culling(OWN, fleet, 15_000.0, 320.0)
     left_out = 0
     for start in np.arange(0, 300, 7.3):
         times = np.linspace(start, start + 13.0, 60)
@@ -84,7 +83,7 @@ def test_whoever_comes_in_reach_is_active(seed: int) -> None:
 
 def test_intervals_are_those_of_entry_and_exit() -> None:
     targets, reach = flights(80, 11), 15_000.0
-    found = Culling(OWN, targets, ScriptedFleet(targets), reach, 400.0).intervals
+    found = Culling(OWN, ScriptedFleet(targets), reach, 400.0).intervals
     times = np.arange(0, 400, 0.05)
     own, states = OWN.at(times), ScriptedFleet(targets).at(times)
     _, _, range_m = line_of_sight(
@@ -113,10 +112,10 @@ def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
         )
 
     targets = [flight("early", 0, 20), flight("late", 70, None), flight("always", 0, None)]
-    culling = Culling(flight("own", 0, 60), targets, ScriptedFleet(targets), 1000.0, 100.0)
+    culling = Culling(flight("own", 0, 60), ScriptedFleet(targets), 1000.0, 100.0)
     assert culling.intervals.target.tolist() == [0, 2]
     assert culling.intervals.end_s == pytest.approx([20, 60], abs=0.6)
-    none = Culling(OWN, [], ScriptedFleet([]), 1000.0, 100.0)
+    none = Culling(OWN, ScriptedFleet([]), 1000.0, 100.0)
     assert len(none.active(0, 100)[0]) == 0 == none.intervals.most_at_once()
 
 
@@ -124,7 +123,7 @@ def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:
     beside = ScriptedTrajectory.from_offset(
         "beside", east_m=15_000, north_m=0, up_m=0, reference=(52.0, 4.0, 1000.0), speed_mps=50
     )
-    culling = Culling(OWN, [beside], ScriptedFleet([beside]), 15_000.0, 86_400.0)
+    culling = Culling(OWN, ScriptedFleet([beside]), 15_000.0, 86_400.0)
     assert len(culling.intervals.target) < 200
     assert culling.active(40_000, 40_001)[0].tolist() == [0]
 

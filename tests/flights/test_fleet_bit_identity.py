@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from components.flights.fleet import SampledFleet, ScriptedFleet
 from components.flights.legs import Straight, Turn
-from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.sampled_flight import SampledFleet, SampledTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 
 
 def scripted(count):
@@ -34,11 +33,11 @@ def scripted(count):
 
 def assert_same(fleet, times):
     together = fleet.at(times)
-    for k, trajectory in enumerate(fleet.trajectories):
+    for k, trajectory in enumerate(fleet):
         alone = trajectory.at(times)
         for a, b in zip(together.arrays(), alone.arrays(), strict=True):
             assert (a[:, k] == b).all()
-            assert a.shape == (len(times), len(fleet.trajectories))
+            assert a.shape == (len(times), len(fleet))
         one = trajectory.at(times[-1])
         assert all(a[-1, k] == b for a, b in zip(together.arrays(), one.arrays(), strict=True))
 
@@ -76,7 +75,7 @@ def test_times_need_one_axis():
 
 def assert_each_same(fleet, low, high):
     rng = np.random.default_rng(3)
-    aircraft = rng.integers(0, len(fleet.trajectories), 3000)
+    aircraft = rng.integers(0, len(fleet), 3000)
     times = rng.uniform(low, high, 3000)
     times[:200] = np.round(times[:200])  # some right at the start of a leg or at a sample
     pairs = fleet.each(aircraft, times)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.flights.legs import Straight, Turn
-from components.flights.many_flights import ManyFlights
+from components.flights.many_flights import MixedFleet
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.flights.steered_flight import SteeredFlight
@@ -76,7 +76,7 @@ def test_flights_of_all_kinds_are_asked_together():
     flights = [sampled[0], *steered, scripted[1], Still(sampled[1]), sampled[1], scripted[0]]
     rng = np.random.default_rng(2)
     which, time_s = rng.integers(0, len(flights), 300), rng.uniform(0.0, 40.0, 300)
-    found = ManyFlights(flights).each(which, time_s)
+    found = MixedFleet(flights).each(which, time_s)
     for k, flight in enumerate(flights):
         rows = which == k
         same(type(found)(*(part[rows] for part in found.arrays())), flight.at(time_s[rows]))

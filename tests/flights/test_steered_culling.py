@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from components.flights.culling import SHORTEST_EPOCH_S, SteeredCulling
-from components.flights.fleet import ScriptedFleet
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.flights.steered_flight import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.steering import Manoeuvre
@@ -37,7 +36,7 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
     ]  # fmt: skip
     fleet = ScriptedFleet(targets)
     own = SteeredFlight(flight("own", 52.0, 4.0, 20.0, 70.0))
-    culling = SteeredCulling(own.max_speed_mps, targets, fleet, reach_m)
+    culling = SteeredCulling(own.max_speed_mps, fleet, reach_m)
     assert culling.epoch_s >= SHORTEST_EPOCH_S
     in_reach = left_out = 0
     now = 0.0
@@ -109,7 +108,7 @@ def test_whoever_comes_in_reach_of_an_ownship_that_was_told_to_fly_faster_is_nea
             for i in range(200)
         ]  # fmt: skip
         fleet, own = ScriptedFleet(targets), SteeredFlight(flight("own", 52.0, 4.0, 20.0, 40.0))
-        culling = SteeredCulling(own.max_speed_mps, targets, fleet, 3000.0)
+        culling = SteeredCulling(own.max_speed_mps, fleet, 3000.0)
         own = own.steered(5.0, Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0))
         times = np.arange(6.0, 200.0, 0.5)
         _, columns, _, near = culling.cut(own, times)

@@ -5,15 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.flights.bounds import intervals_present_s, max_speeds_mps
-from components.flights.fleet import ScriptedFleet
 from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_parameters
-from components.flights.scripted_flights import (
-    ScriptedTrajectory,
-    Starts,
-    StraightFlights,
-    flights_of,
-)
+from components.flights.many_flights import Starts
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 
 latitudes = st.floats(-90, 90) | st.sampled_from([90.0, -90.0, 0.0, -0.0, 52.0])
 headings = st.floats(-720, 720) | st.sampled_from([0.0, 90.0, 180.0, 270.0, 360.0])
@@ -56,13 +50,14 @@ def test_flights_together_fly_as_each_alone(drawn, data):
         )
         for i, (row, (yaw, pitch, roll), start, end) in enumerate(drawn)
     ]  # fmt: skip
-    together = flights_of(starts_of(drawn))
-    assert isinstance(together, StraightFlights)
+    starts = starts_of(drawn)
+    assert starts.are_plain()
+    together, each = starts.fleet(), ScriptedFleet(alone)
     assert [flight.name for flight in together] == [flight.name for flight in alone]
-    assert max_speeds_mps(together).tolist() == max_speeds_mps(alone).tolist()
-    assert intervals_present_s(together).tolist() == intervals_present_s(alone).tolist()
+    assert together.max_speeds_mps.tolist() == [f.max_speed_mps for f in alone]
+    assert together.intervals_present_s.tolist() == [[*f.interval_present()] for f in alone]
     times = np.array([-1.0, 0.0, 49.5, 77.7, 5000.0])
-    fleets = [ScriptedFleet(together), ScriptedFleet(alone)]
+    fleets = [together, each]
     pairs = [(one.at(times), other.at(times)) for one, other in zip(together, alone, strict=True)]
     pairs.append(tuple(fleet.at(times) for fleet in fleets))
     which = np.array(data.draw(st.lists(st.integers(0, len(alone) - 1), max_size=8)), dtype=int)
@@ -76,8 +71,12 @@ def test_flights_together_fly_as_each_alone(drawn, data):
 
 def plain(**changes):
     columns = {"lat_deg": 52.0, "lon_deg": 4.0, "alt_m": 100.0, "heading_deg": 10.0,
-               "speed_mps": 50.0} | changes  # fmt: skip
-    return Starts(["a", "b"], **{k: np.array([v, v]) for k, v in columns.items()})
+               "speed_mps": 50.0, "climb_mps": 0.0, "start_time_s": 0.0,
+               "end_time_s": np.inf} | changes  # fmt: skip
+    return Starts(
+        ["a", "b"], **{k: np.array([v, v]) for k, v in columns.items()},
+        fixed_deg=np.full((3, 2), np.nan),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -88,8 +87,10 @@ def plain(**changes):
 )  # fmt: skip
 def test_what_one_flight_refuses_is_refused_of_many(changes, said):
     with pytest.raises(ValueError, match=said):
-        flights_of(plain(**changes))
+        plain(**changes).fleet()
 
 
 def test_flights_that_stand_still_are_made_one_by_one():
-    assert [type(flight) for flight in flights_of(plain(speed_mps=0.0))] == [ScriptedTrajectory] * 2
+    still = plain(speed_mps=0.0)
+    assert not still.are_plain()
+    assert [flight.segments[0].kind for flight in still.fleet()] == ["hold"] * 2

@@ -53,6 +53,24 @@ def test_together_they_put_the_target_where_it_is(fusion):
         assert off_m < (0.05 if row["updated_by"] == "radar+eye" else 400.0)
 
 
+def test_what_passes_through_alone_is_where_its_target_is():
+    sensors = {"radar": {**HEARS_ALL, **FINE, "scan_rate_hz": 4}, "eye": {**SEES_ALL, **FINE}}
+    found = run(chain(sensors, fusion={"type": "fusion.pass_through"}, duration_s=2))
+    by_name = {target["name"]: target for target in crooked.TARGETS}
+    count = {"radar": 0, "eye": 0}
+    for row in rows(found, "fused"):
+        truth = crooked.position(by_name[row["target"]], row["time_s"])
+        count[row["sensors"]] += 1
+        if row["sensors"] == "radar":
+            assert np.linalg.norm(place(row, row["time_s"]) - truth) < 0.05
+        else:  # a camera gives the direction alone
+            own = place({**row, "range_m": 0.0}, row["time_s"])
+            far_m = float(np.linalg.norm(truth - own))
+            beside = place({**row, "range_m": far_m}, row["time_s"]) - truth
+            assert np.linalg.norm(beside) < 0.05
+    assert min(count.values()) >= 4
+
+
 @pytest.mark.parametrize("fusion", ["fusion.pick_best", "fusion.gated"])
 def test_angles_are_of_the_sensor_whose_coarser_step_is_the_finest(fusion):
     """One camera is fine in azimuth only, one in neither; of the radars the finer gives ranges."""

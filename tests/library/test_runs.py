@@ -70,6 +70,9 @@ def test_runs_are_shown_in_at_most_ten_lines(both):
     for run in both[1:]:
         assert len(repr(run).splitlines()) <= 10
         assert "First light" in repr(run) and "detections" in repr(run)
+        shown = str(run).splitlines()
+        assert shown[: len(repr(run).splitlines())] == repr(run).splitlines()
+        assert any(line.split()[:1] == ["radar"] for line in shown) and "\x1b" not in str(run)
 
 
 def test_nothing_is_printed(short, capfd):

@@ -7,15 +7,11 @@ from dsa_des.scene.examples import examples, find_example
 from dsa_des.studies.study_file import read_study
 
 
-@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
-def test_every_example_is_found_by_its_name(example):
-    assert find_example(example.name, example.kind) == example.path
-
-
-def test_scenes_are_whole_and_studies_can_be_read():
+def test_each_is_found_by_its_name_and_scenes_are_whole():
     kinds = {example.kind for example in examples()}
     assert kinds == {"scene", "study"}
     for example in examples():
+        assert find_example(example.name, example.kind) == example.path
         if example.kind == "scene":
             assert dsa_des.load_scene(example.name).title == example.title
 

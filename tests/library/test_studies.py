@@ -59,6 +59,9 @@ def test_a_result_is_tables_and_figures(both):
     assert set(result.summary["result"].to_pylist()) >= {"detected.radar"}
     assert result.differences is not None and result.differences.num_rows
     assert len(repr(result).splitlines()) <= 10
+    printed = str(result).splitlines()  # as `dsa-des study` has it
+    assert any("detected.radar" in line.split() for line in printed)
+    assert all(line == line.rstrip() and line.isprintable() for line in printed)
     with pytest.raises(dsa_des.UsageError, match="no figure"):
         result.figure("nix")
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from components.alerting.daidalus import DaidalusAlerting
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
@@ -130,14 +131,13 @@ def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
     ticks, run = np.array([3, 5, 3, 5], dtype=np.int64), np.array([0, 0, 1, 1])
     message = Message(np.array([2, 4], dtype=np.int64), run=np.array([0, 1]))
     held = {"cue": (message, np.array([0, 0, -1, 1]))}
-    wake = Wake(ticks, np.full(4, -1), 1, held, {}, None, run)
+    wake = Wake(RunTicks(run, ticks), np.full(4, -1), 1, held, {})
     of_first, rows = _part(wake, slice(0, 2), 0).held("cue")
     assert of_first.tick.tolist() == [2] and rows.tolist() == [0, 0]
     of_second, rows = _part(wake, slice(2, 4), 1).held("cue")
     assert of_second.tick.tolist() == [4] and rows.tolist() == [-1, 0]
-    nothing = Wake(
-        ticks[2:3], np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {}, None, run[2:3]
-    )
+    last = RunTicks(run[2:3], ticks[2:3])
+    nothing = Wake(last, np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {})
     assert _part(nothing, slice(0, 1), 1).held("cue") is None
 
 

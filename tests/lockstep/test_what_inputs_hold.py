@@ -6,7 +6,7 @@ import pytest
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
-from dsa_des.running.windows import EqualWindows
+from dsa_des.running.windows import Windows
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
@@ -16,7 +16,7 @@ RUN_TICKS = 60
 def as_held(time, ends, sent, asked, longest, together=None):
     """Whether every replica holds at each tick that it asks about what came there last."""
     channel = Channel("source", 0, None, time, ends)
-    windows = EqualWindows(time, longest, together)
+    windows = Windows(time, longest, together)
     told = 0
 
     def inside(ticks, start, end):

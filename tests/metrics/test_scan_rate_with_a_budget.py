@@ -41,7 +41,7 @@ def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():
     rates = {"1/10": 0.1, "1/2": 0.5, "5": 5.0}
     result = dsa_des.study(
         page.STUDY, workers=1, sets=[
-            "replicas=120", "figures=[]", 'metrics=[{metric="declaration",m=3,n=5,'
+            "replicas=40", "figures=[]", 'metrics=[{metric="declaration",m=3,n=5,'
             'sensors=["radar"],target="head_on"}]',
             'axes={"blocks.radar.budget"=["free","dwell"],'
             '"blocks.radar.scan_rate_hz"=["1/10","1/2",5]}',
@@ -60,8 +60,8 @@ def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():
         expected = page.of_budget(approach, budget, rate)
         there = ranges[~np.isnan(ranges)]
         share = min(1.0, float(expected[1].sum()))
-        assert len(there) / 120 == pytest.approx(
-            share, abs=3.3 * math.sqrt(share * (1 - share) / 120) + 1e-9
+        assert len(there) / 40 == pytest.approx(
+            share, abs=3.3 * math.sqrt(share * (1 - share) / 40) + 1e-9
         )
         spread = 3.3 * float(np.std(there, ddof=1)) / math.sqrt(len(there))
         assert np.mean(there) == pytest.approx(mean_range_m(*expected), abs=spread)

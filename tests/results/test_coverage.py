@@ -31,9 +31,11 @@ def coverage(
     return sum(e.low <= truth <= e.high for e in told) / len(told)
 
 
-@pytest.mark.parametrize("method", ["t", "bootstrap"])
-@pytest.mark.parametrize("count", [10, 40])
-@pytest.mark.parametrize("shape", ["normal", "uniform", "skewed"])
+@pytest.mark.parametrize(
+    ("method", "count", "shape"),
+    [*(("t", count, shape) for count in (10, 40) for shape in ("normal", "uniform", "skewed")),
+     ("bootstrap", 10, "uniform"), ("bootstrap", 40, "skewed")],
+)  # fmt: skip
 def test_means(method: str, count: int, shape: str) -> None:
     draw = {
         "normal": lambda r: r.normal(3.0, 2.0, count),
@@ -95,8 +97,7 @@ def test_units_that_go_one_way_as_a_whole_count_once() -> None:
     assert share(np.array([1.0]), np.array([1.0]), LEVEL).low == pytest.approx(0.2065, abs=1e-4)
 
 
-@pytest.mark.parametrize("method", ["t", "bootstrap"])
-@pytest.mark.parametrize("count", [10, 40])
+@pytest.mark.parametrize(("method", "count"), [("t", 10), ("t", 40), ("bootstrap", 10)])
 def test_paired_differences(method: str, count: int) -> None:
     def pairs(random: Random) -> tuple[np.ndarray, np.ndarray]:
         first = random.normal(0.0, 5.0, count)
@@ -231,7 +232,7 @@ def covered(rounds: int, *, files: int, replicas: int, same_draws: bool) -> dict
     return {name: count / rounds for name, count in held.items()}
 
 
-@pytest.mark.parametrize(("files", "replicas"), [(12, 5), (60, 2), (40, 1)])
+@pytest.mark.parametrize(("files", "replicas"), [(12, 5), (40, 1)])
 def test_a_folder_speaks_of_encounters_like_these(files: int, replicas: int) -> None:
     found = covered(1000, files=files, replicas=replicas, same_draws=False)
     assert len(found) == 6
@@ -240,7 +241,7 @@ def test_a_folder_speaks_of_encounters_like_these(files: int, replicas: int) -> 
 
 
 def test_encounters_that_shared_their_draws_would_be_found_out() -> None:
-    found = covered(300, files=60, replicas=2, same_draws=True)
+    found = covered(100, files=60, replicas=2, same_draws=True)
     assert found["time_s"] < 0.5 and found["seen"] < 0.5
 
 

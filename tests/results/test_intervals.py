@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsa_des.results import statistics
-from dsa_des.results.labels import axis_label, readable, unit_of, value_label
+from dsa_des.results.labels import AxisName, axis_label, readable, unit_of, value_label
+from dsa_des.results.printing import rounded
 
 
 @pytest.mark.parametrize(
@@ -100,6 +101,29 @@ def test_few_values_are_marked() -> None:
     assert statistics.share(np.array([3.0]), np.array([5.0]), 0.95).few
 
 
+@pytest.mark.parametrize(
+    ("value", "low", "high", "shown"),
+    [
+        (8842.9, 8211.5, 9474.2, ("8,840", "8,210 to 9,470")),
+        (-0.30771, -0.5131, -0.1023, ("-0.31", "-0.51 to -0.10")),
+        (1.0, 0.83887, 1.0, ("1.000", "0.839 to 1.000")),
+        (-1e-4, -0.0092155, 0.0092155, ("-0.0001", "-0.0092 to 0.0092")),
+        (0.0, -0.0092155, 0.0092155, ("0.0000", "-0.0092 to 0.0092")),
+        # Equal ratios, whose difference is how they were rounded.
+        (5.6e-17, -3e-17, 1.4e-16, ("0", "0 to 0")),
+        (0.25, 0.25 - 1e-16, 0.25 + 1e-16, ("0.25", "0.25 to 0.25")),
+        (math.nan, math.nan, math.nan, ("-", "")),
+        (3.25, 2.0, math.inf, ("3.25", "2 to inf")),
+    ],
+)
+def test_values_are_rounded_to_what_is_known(
+    value: float, low: float, high: float, shown: tuple[str, str]
+) -> None:
+    assert rounded(statistics.Estimate(value, low, high, 20, False)) == shown
+    starred = (shown[0], f"{shown[1]} *" if shown[1] else "")
+    assert rounded(statistics.Estimate(value, low, high, 3, True)) == starred
+
+
 def test_axes_of_figures_carry_units() -> None:
     assert readable("declaration_range_m.radar") == "Declaration range, radar (m)"
     assert readable("track_breaks") == "Track breaks"
@@ -110,6 +134,11 @@ def test_axes_of_figures_carry_units() -> None:
     assert axis_label("weather.rain_mm_per_h") == "Weather rain (mm/h)"
     assert axis_label("traffic.intruders[0].rcs_dbsm") == "Traffic intruder 1 RCS (dBsm)"
     assert axis_label("wires[4].drop_probability") == "Wire 5 drop probability"
+    lost = AxisName("wires[4].drop_probability", "wire from radar to fusion:.drop_probability")
+    assert axis_label(lost) == "Wire from radar to fusion: drop probability"
+    assert value_label(lost, 0.1) == "wire from radar to fusion: drop probability 0.1"
+    assert value_label("x" * 80, 5.0).endswith("… 5")
+    assert axis_label(AxisName("radar.scan_rate_hz")) == "Radar scan rate (Hz)"
     assert value_label("bearing_deg", 30.0) == "bearing 30°"
     assert value_label("ir.rate_error_ppm", 100) == "IR rate error 100 ppm"
     assert value_label("swap.fusion", "fusion.gated") == "fusion.gated"

@@ -81,7 +81,7 @@ def test_runs_of_a_family_count_as_one_of_all_their_weight() -> None:
 def test_differences_of_ratios_hold_what_they_share_once() -> None:
     """Two conditions on the same encounters, again and again: the paired interval holds 95 %."""
     random = np.random.default_rng(11)
-    held, widths, truth, rounds = 0, [], 0.3 - 0.5, 400
+    held, widths, truth, rounds = 0, [], 0.3 - 0.5, 200
     for _ in range(rounds):
         w = random.choice([1.0, 2.0], 1500)
         n = random.random(1500) < 0.2
@@ -105,10 +105,52 @@ def test_differences_of_ratios_hold_what_they_share_once() -> None:
     assert sure.difference.paired.value == 1.0 and sure.difference.paired.half_width > 0.01
 
 
+def compared(n, first, second, w=None):
+    """Return the difference of the ratios of two conditions on the same encounters."""
+    rows = rows_of(
+        np.tile(n, 2), np.concatenate([first, second]), None if w is None else np.tile(w, 2),
+        axis=np.repeat([0.0, 1.0], len(n)), replica=np.tile(np.arange(len(n)), 2),
+    )  # fmt: skip
+    of = ratio() if w is None else ratio(weight="w")
+    return compare_axis(rows, "x", 0.0, [of], 0.95, "t")[0].difference
+
+
+@pytest.mark.parametrize("left", [0.0, 0.3, 1.0])
+def test_runs_that_all_agree_leave_open_what_one_more_of_either_would_do(left: float) -> None:
+    """By hand: 1.96 standard errors of one event gained and one lost, of 40 events below."""
+    n = np.repeat([1.0, 0.0], [40, 160])
+    m = n * (np.arange(200) < 40 * left)
+    d = compared(n, m, m)
+    assert d.paired.value == 0.0 and d.unpaired.half_width > d.paired.half_width
+    assert d.paired.half_width == pytest.approx(1.959964 * math.sqrt(2.0) / 40.0, rel=1e-5)
+    # The same events, a tenth as heavy half of the time: those that weigh count.
+    w = np.where(np.arange(200) % 2, 0.1, 1.0)
+    x = (w * n)[:40]
+    one_more = (x**3).sum() / x.sum() / x.sum() ** 2
+    assert compared(n, m, m, w).paired.half_width == pytest.approx(
+        1.959964 * math.sqrt(2.0 * one_more), rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.004, 0.05])
+def test_few_runs_that_differ_are_held_by_the_interval(apart: float) -> None:
+    """Of some 200 events, few or none of which go otherwise, in 1,000 encounters each time."""
+    random = np.random.default_rng(29)
+    held, widths, rounds = 0, [], 200
+    for _ in range(rounds):
+        n = random.random(1000) < 0.2
+        u, changed = random.random(1000), random.random(1000) < apart
+        first = n & (u < 0.3)
+        d = compared(n, first, np.where(changed, n & ~first, first)).paired
+        held += d.low <= apart * (0.7 - 0.3) <= d.high
+        widths.append(d.half_width)
+    assert held / rounds >= 0.935 and max(widths) < 0.06
+
+
 @pytest.mark.parametrize("method", ["t", "bootstrap"])
 def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
     random = np.random.default_rng(23)
-    chance, left, new, kept, rounds = 0.3, 0.25, 0.01, 0, 300
+    chance, left, new, kept, rounds = 0.3, 0.25, 0.01, 0, 160
     truth = left + (1 - chance) / chance * new
     for _ in range(rounds):
         n = np.repeat(random.random(700) < chance, 3)

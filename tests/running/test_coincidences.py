@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from components.fusion.pick_best import PickBest, PickBestParameters
 from components.messages.detections import Detections, SensorOffer
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.component import Context, Producer
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.time.randomness import Streams
@@ -117,11 +118,18 @@ def fuse(clocks, gate_ticks, hits, cuts):
         for name, ticks in zip(names, clocks, strict=True):
             inside = np.array([t for t in ticks if start <= t < end], dtype=np.int64)
             if len(inside):
-                arrivals.append(Arrivals(name, inside, detections(name, inside, hits)))
+                seen = detections(name, inside, hits)
+                arrivals.append(Arrivals(name, seen.instants, seen))
         if not arrivals:
             continue
         instants = np.unique(np.concatenate([new.tick for new in arrivals]))
-        wake = Wake(instants, np.full(len(instants), -1), 1, {}, {"detections": arrivals})
+        wake = Wake(
+            RunTicks.of_run(0, instants),
+            np.full(len(instants), -1),
+            1,
+            {},
+            {"detections": arrivals},
+        )
         message = fusion.run(wake)
         rows = np.repeat(message.tick, np.diff(message.offsets))
         for i, (tick, target) in enumerate(zip(rows, message.target, strict=True)):

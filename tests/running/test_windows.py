@@ -9,10 +9,10 @@ from click.testing import CliRunner
 from dsa_des.cli import main
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.running.pacing import PacedWindows, Pacer
+from dsa_des.running.pacing import Pacer
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import EqualWindows, SureWindows, Window
+from dsa_des.running.windows import Window, Windows
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.timeline import ReplicaTime
 
@@ -32,8 +32,8 @@ def all_of(windows):
     ("longest", "expected"), [(4, [(0, 4), (4, 8), (8, 10)]), (10, [(0, 10)]), (99, [(0, 10)])]
 )
 def test_equal_windows_cover_a_run_once(longest, expected):
-    assert all_of(EqualWindows(ReplicaTime(1, 10), longest)) == expected
-    windows = EqualWindows(ReplicaTime(1, 10), longest)
+    assert all_of(Windows(ReplicaTime(1, 10), longest)) == expected
+    windows = Windows(ReplicaTime(1, 10), longest)
     windows.limit(0)  # no window is shorter than a tick
     assert all_of(windows) == [(k, k + 1) for k in range(10)]
 
@@ -41,7 +41,7 @@ def test_equal_windows_cover_a_run_once(longest, expected):
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
 def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
     time, ran, count = ReplicaTime(4, 10), [], 0
-    windows = EqualWindows(time, longest)
+    windows = Windows(time, longest)
     while (window := windows.next()) is not None:
         ran += [(run, tick) for tick in range(*window[:2]) for run in time.runs]
         assert len(time.runs) == 1 or window[:2] == (0, 10)
@@ -53,7 +53,7 @@ def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
 
 def test_windows_of_runs_together_come_back_to_each_of_them():
     time = ReplicaTime(4, 10)
-    windows = EqualWindows(time, 4, together=3)
+    windows = Windows(time, 4, together=3)
     found = []
     while (window := windows.next()) is not None:
         found.append((time.runs, *window[:2]))
@@ -107,19 +107,19 @@ def test_a_loop_that_cannot_be_rewound_runs_in_windows_that_nothing_comes_back_i
 
 
 def test_blocks_before_a_loop_run_ahead_of_it():
-    windows, found = SureWindows(ReplicaTime(1, 100), 40, 15), []
+    windows, found = Windows(ReplicaTime(1, 100), 40, 15), []
     while (window := windows.next()) is not None:
         assert windows.heard(window, None) == window.end
         found.append((window.start, window.end, window.ahead))
-    assert found == [(0, 15, 40), (15, 30, 15), (30, 40, 30), (40, 55, 80), (55, 70, 55),
-                     (70, 80, 70), (80, 95, 100), (95, 100, 95)]  # fmt: skip
+    assert found == [(0, 15, 30), (15, 30, 15), (30, 45, 60), (45, 60, 45), (60, 75, 90),
+                     (75, 90, 75), (90, 100, 100)]  # fmt: skip
 
 
 class Wilful(Timeline):
     """One run in windows of lengths that a die throws."""
 
-    def windows(self, longest_ticks, lookahead_ticks, rewinder):
-        inner = super().windows(longest_ticks, lookahead_ticks, rewinder)
+    def windows(self, longest_ticks, horizon_ticks, rewinder):
+        inner = super().windows(longest_ticks, horizon_ticks, rewinder)
         self.made = WilfulWindows(inner)
         return self.made
 
@@ -159,23 +159,36 @@ def test_windows_of_ones_own_need_no_other_simulation(sets):
 
 def test_a_pacer_waits_for_what_is_final_only():
     """It starts with the first window; one that does not stand is waited for by none."""
-    waits = []
+    waits, ran = [], []
 
-    class Undecided(EqualWindows):
+    class Undecided(Windows):
         tries = 0
 
         def heard(self, window, failure):
             self.tries += 1
+            ran.append(window.end)
             return super().heard(window, failure) if self.tries % 2 == 0 else None
 
     now = [50.0]
     pacer = Pacer(2.0, lambda: now[0], lambda s: (waits.append(s), now.__setitem__(0, now[0] + s)))
-    windows = PacedWindows(Undecided(ReplicaTime(1, 40), 99), pacer, ticks_per_s=100)
-    now[0] = 70.0  # until the first window is asked for, no time goes by
-    ran = []
-    while (window := windows.next()) is not None:
-        ran.append(window.end)
-        windows.heard(window, None)
-    assert ran == [20, 20, 40, 40]  # 0.1 s of wall time at twice its speed
-    assert waits == pytest.approx([0.1, 0.1])
+    scene = load_scene("configs/first_light.toml", duration_s="0.4")
+    simulation = Simulation(scene)
+    simulation.windows = Undecided(simulation.time, simulation.end_tick)
+    now[0] = 70.0  # until the run begins, no time goes by
+    simulation.run_window = lambda window: None
+    simulation.run(pacer=pacer)
+    assert np.array(ran) / simulation.ticks_per_s == pytest.approx([0.2, 0.2, 0.4, 0.4])
+    assert waits == pytest.approx([0.1, 0.1])  # 0.1 s of wall time at twice its speed
     assert pacer.windows == 2
+
+
+def test_a_pacer_that_was_stopped_ends_the_run():
+    pacer = Pacer(1e6)
+    simulation = Simulation(load_scene("configs/first_light.toml", duration_s="3"))
+    simulation.windows.limit(simulation.ticks_per_s)
+
+    def stop(time_s):
+        pacer.stopped = time_s >= 2.0
+
+    simulation.run(stop, pacer)
+    assert pacer.time_s == 2.0

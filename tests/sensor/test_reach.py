@@ -8,6 +8,8 @@ import pytest
 from covering import SENSORS, covers
 from wired import alone, rows
 
+from components.messages.reach import Reach
+
 ROLLING, DIVING = (crooked.body(target) for target in crooked.TARGETS)
 RANGES_KM = [float(np.linalg.norm(vector)) / 1000 for vector in (ROLLING, DIVING)]
 
@@ -135,3 +137,14 @@ def test_targets_are_there_from_start_to_end():
     left_out = ("skipped_absent", "skipped_culled")
     absent = [sum(row[key] for key in left_out) for row in rows(found, "scans")]
     assert absent == [1, 1, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("azimuth_deg", "width_deg"),
+    [((-30, 40), 70), ((170, -170), 20), ((-180, 180), 360), ((10, 370), 360)],
+)
+def test_width_of_a_field_runs_clockwise(azimuth_deg, width_deg):
+    reach = Reach(tuple(np.radians(azimuth_deg).tolist()), (-0.25, 0.5))
+    across, upward = reach.width_rad
+    assert across == pytest.approx(np.radians(width_deg), rel=1e-15) and across <= 2 * np.pi
+    assert upward == 0.75

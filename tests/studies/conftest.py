@@ -109,12 +109,3 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     # An earlier test's module would be taken for this folder's: its path is part of a study.
     monkeypatch.delitem(sys.modules, "fragile", raising=False)
     return tmp_path
-
-
-def part_bytes(folder: Path) -> dict[str, bytes]:
-    """Return everything a study's folder holds except its figures, by name."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != ".lock"
-    }

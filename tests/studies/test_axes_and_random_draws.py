@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
+from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import beat_period_s, flatten_axes, parse_axis
 from dsa_des.studies.draws import exact, parse_draw, replica_seed
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.study_file import read_study
 
 
@@ -126,6 +128,29 @@ def test_an_axis_whose_name_holds_dots_and_brackets_can_be_changed(
     assert study.axes[1].labels == (0, 0.3)
     added = read_study(name, sets=["axes.wires[4].jitter_s=[0, 0.01]"])
     assert added.axes[2].key == "wires[4].jitter_s"
+
+
+def test_axes_of_what_a_scene_counts_are_named_in_words(configs: Path, tmp_path: Path) -> None:
+    (tmp_path / "chains.toml").write_text(
+        f'scene = "{configs / "first_light.toml"}"\nmetrics = ["first_detection"]\n'
+        'axes."wires[1].delay_s" = [0, 1]\naxes.blocks.radar.scan_rate_hz = [1, 2]\n'
+        'axes."blocks.traffic.intruders[crossing].speed_mps" = [50, 60]\n'
+        'axes."blocks.traffic.intruders[0].speed_mps" = [50, 60]\n'
+        'axes."loss"={values=["none"], set."wires[4].drop_probability" = [0]}\n'
+    )
+    wires = read_scene_file(configs / "first_light.toml").data["wires"]
+    begins, ends = (end.strip() for end in wires[1].split("->"))
+    record = record_of(read_study(tmp_path / "chains.toml"))
+    assert {axis.column: axis.words for axis in record.axes} == {
+        "wires[1].delay_s": f"wire from {begins} to {ends}:.delay_s",
+        "radar.scan_rate_hz": "",
+        "traffic.intruders[crossing].speed_mps": "traffic.intruder crossing.speed_mps",
+        "traffic.intruders[0].speed_mps": "traffic.intruder head_on.speed_mps",
+        "loss": "",
+    }
+    # A wire that is a table, in the shipped study.
+    shipped = record_of(read_study(configs / "studies/latency_and_loss.toml"))
+    assert shipped.axes[1].words == "wire from radar to fusion:.drop_probability"
 
 
 STUDY = """

@@ -265,16 +265,6 @@ class NoteSource(Component):
         return Note(wake.ticks)
 
 
-class Sink(Component):
-    """Triggered; keeps nothing."""
-
-    inputs = {"in": Input(Beat, "trigger")}
-    windowed = True
-
-    def run(self, wake):
-        return None
-
-
 class OwnParameters(Parameters):
     """Parameters of the block with its own process."""
 

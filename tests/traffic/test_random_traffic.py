@@ -15,7 +15,7 @@ def starts(count, seed="1", **sets):
     more = [f"blocks.traffic.{key}={value}" for key, value in sets.items()]
     scene = load_scene(SCENE, sets=[f"blocks.traffic.intruders={count}", f"seed={seed}", *more])
     traffic = Simulation(scene).components["traffic"]
-    state = traffic.fleet.at(np.zeros(1))
+    state = traffic.targets.at(np.zeros(1))
     own = traffic.own.at(np.zeros(1))
     _, _, range_m = line_of_sight(
         own.lat_deg, own.lon_deg, own.alt_m, state.lat_deg[0], state.lon_deg[0], state.alt_m[0]

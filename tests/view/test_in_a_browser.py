@@ -159,7 +159,8 @@ def test_words_stand_out_from_their_ground(browser, recorded, scheme):
     context = browser.new_context(color_scheme=scheme)
     opened = context.new_page()
     opened.goto(f"file://{recorded}.html")
-    names = ("ink", "faint", "level1", "level2", "level3", "track")
+    names = ("ink", "faint", "level1", "level2", "level3")
+    names += ("track", "track2", "track3", "track4")
     script = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
     ground, panel = (luminance(opened.evaluate(script, name)) for name in ("ground", "panel"))
     for name in names:
@@ -168,6 +169,27 @@ def test_words_stand_out_from_their_ground(browser, recorded, scheme):
             light, dark = max(mine, under), min(mine, under)
             assert (light + 0.05) / (dark + 0.05) >= 4.5, name
     context.close()
+
+
+def test_each_tracker_is_shown_in_its_colour_and_by_itself(browser, tmp_path):
+    scene = dsa_des.load_scene(folder() / "tracking" / "architectures.toml", sets=["duration_s=8"])
+    dsa_des.run(scene, out=tmp_path / "run")
+    assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
+    opened = browser.new_page()
+    opened.goto(f"file://{tmp_path / 'run.html'}")
+    trackers = sorted({row["block"] for row in rows(tmp_path / "run", "state_tracks", -1, 99)})
+    assert len(trackers) > 1
+    opened.evaluate("App.seek(7)")
+
+    def shown():
+        return {one["label"].split()[0] for one in opened.evaluate("App.state().tracks")}
+
+    assert shown() == set(trackers)
+    colours = [opened.evaluate("n => Symbols.tracker(n)", k) for k in range(len(trackers[:4]))]
+    assert len(set(colours)) == len(colours)
+    opened.get_by_label(trackers[0], exact=True).uncheck()
+    assert shown() == set(trackers[1:])
+    opened.close()
 
 
 def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):

@@ -65,7 +65,7 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
     if message.believed is not None:
         found[: len(POSE)] = [message.believed[name] for name in _STATE_OF_OWN]
     if moves:
-        state: IntArray = message.tick if message.state_tick is None else message.state_tick
+        state: IntArray = message.picture_tick
         time_s = state / wake.ticks_per_s
         found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
     return found

@@ -34,7 +34,7 @@ from components.arguments.checks import (
 )
 from components.radar.detection.probability import required_snr
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 
 FEWEST_CELLS, MOST_CELLS = 4, 1000
 
@@ -241,32 +241,6 @@ def _required(wanted: float, cells: int, pfa: float, pulses: int, model: str) ->
     return math.exp(0.5 * (low + high))
 
 
-class CellAveraging(Effect):
-    """Cell-averaging CFAR: the threshold is known from ``cfar_reference_cells`` cells only.
-
-    The cells hold what the cell under test holds but the target: noise, and ground clutter of the
-    same power that fluctuates like noise. So the probability of false alarm stays what it is, and
-    a target needs the CFAR loss more SNR. A calibrated range is that of a threshold known exactly.
-    """
-
-    lockstep = True
-    name = "CFAR"
-    acts_on = "threshold from reference cells"
-    neutral = False
-    outside_the_proof = "no number of cells is as good as a threshold that is known"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``cfar_reference_cells``."""
-        cells = block.p.cfar_reference_cells
-        if cells is None:
-            return Verdict(False, "cfar_reference_cells is not given")
-        return Verdict(True, f"cfar_reference_cells is {cells}")
-
-    def build(self, block: Any) -> Averaging:
-        """Return the detector of this radar."""
-        return Averaging(block.p)
-
-
 class Averaging:
     """A cell-averaging detector with one radar's pulses and probability of false alarm."""
 
@@ -289,3 +263,33 @@ class Averaging:
     def loss_db(self, pd: float, model: str) -> float:
         """Return what the SNR must be more for Pd `pd` than with a known threshold, dB."""
         return cfar_loss_db(pd, model=model, **self._settings)
+
+
+REFERENCE_CELLS = Hook(
+    "threshold from reference cells", Averaging, "Pd, required SNR and loss of a CFAR detector"
+)
+
+
+class CellAveraging(Effect[Averaging]):
+    """Cell-averaging CFAR: the threshold is known from ``cfar_reference_cells`` cells only.
+
+    The cells hold what the cell under test holds but the target: noise, and ground clutter of the
+    same power that fluctuates like noise. So the probability of false alarm stays what it is, and
+    a target needs the CFAR loss more SNR. A calibrated range is that of a threshold known exactly.
+    """
+
+    lockstep = True
+    name = "CFAR"
+    acts_on = REFERENCE_CELLS
+    outside_the_proof = "no number of cells is as good as a threshold that is known"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``cfar_reference_cells``."""
+        cells = block.p.cfar_reference_cells
+        if cells is None:
+            return Verdict(False, "cfar_reference_cells is not given")
+        return Verdict(True, f"cfar_reference_cells is {cells}")
+
+    def build(self, block: Any) -> Averaging:
+        """Return the detector of this radar."""
+        return Averaging(block.p)

@@ -10,7 +10,7 @@ from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
 from dsa_des.block.wake import Wake
 
@@ -144,13 +144,15 @@ TABLE_ERROR = 1e-6
 GRAM_CHARLIER_ERROR = {1: 0.025, 2: 0.010, 5: 0.003, 10: 0.001, 100: 5e-5}
 
 
-class ExactDetection(Effect):
+PD_METHOD = Hook("method of Pd", str, "name of what gives the probability of detection")
+
+
+class ExactDetection(Effect[str]):
     """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
 
     lockstep = True
     name = "exact Pd"
-    acts_on = "method of Pd"
-    neutral = False
+    acts_on = PD_METHOD
     outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:

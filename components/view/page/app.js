@@ -6,9 +6,11 @@ const App = (() => {
   const state = { t: 0, playing: false, speed: 1, steps: -1, dirty: true, keepsTime: true };
   const options = {
     sensors: new Set(Data.sensors.map((_, number) => number)),
-    truth: Boolean(Data.tables.truth), tracks: true, fields: true, bands: Boolean(Data.tables.bands),
+    trackers: new Set(Data.trackers.map((_, number) => number)),
+    truth: Boolean(Data.tables.truth), fields: true, bands: Boolean(Data.tables.bands),
     follow: true, headingUp: false, fade: 4,
   };
+  const swatches = [];
   let drawn = {};
   let frames = { count: 0, spent_ms: 0 };
 
@@ -40,6 +42,7 @@ const App = (() => {
     theme(name) {
       root.dataset.theme = name;
       Symbols.readTheme();
+      swatches.forEach((paint) => paint());
       Timeline.forget();
     },
   };
@@ -123,30 +126,35 @@ const App = (() => {
     if (parts.get("up") === "heading") tell("headingUp", true);
   }
 
-  // A sensor's marker as it stands on the plan; its colour holds in both themes.
-  function swatch(sensor) {
+  // A marker as it stands on the plan: a sensor's colour holds in both themes, a tracker's is the theme's.
+  function swatch(marker, colour, filled) {
     const canvas = document.createElement("canvas");
     canvas.className = "swatch";
     canvas.width = canvas.height = 32;
     const c = canvas.getContext("2d");
-    c.scale(2, 2);
-    Symbols.mark(c, sensor.marker, 8, 8, 6, sensor.colour, true);
+    const paint = () => {
+      c.setTransform(2, 0, 0, 2, 0, 0);
+      c.clearRect(0, 0, 16, 16);
+      Symbols.mark(c, marker, 8, 8, 6, colour(), filled);
+    };
+    swatches.push(paint);
     return canvas;
   }
-  function layer(text, on, change, sensor) {
+  function layer(text, on, change, mark) {
     const label = document.createElement("label");
     const box = document.createElement("input");
     box.type = "checkbox";
     box.checked = on;
     box.addEventListener("change", () => { change(box.checked); state.dirty = true; });
     label.appendChild(box);
-    if (sensor) label.appendChild(swatch(sensor));
+    if (mark) label.appendChild(mark);
     label.appendChild(document.createTextNode(text));
     get("layers").appendChild(label);
   }
   Data.sensors.forEach((sensor, number) => layer(sensor.name, true,
-    (on) => options.sensors[on ? "add" : "delete"](number), sensor));
-  if (Data.tables.tracks) layer("tracks", true, (on) => { options.tracks = on; });
+    (on) => options.sensors[on ? "add" : "delete"](number), swatch(sensor.marker, () => sensor.colour, true)));
+  Data.trackers.forEach((tracker, number) => layer(Data.trackers.length > 1 ? tracker : "tracks", true,
+    (on) => options.trackers[on ? "add" : "delete"](number), swatch("D", () => Symbols.tracker(number), false)));
   if (Data.tables.truth) layer("truth", true, (on) => { options.truth = on; });
   if (Data.tables.bands) layer("bands", true, (on) => { options.bands = on; });
   layer("fields of view", true, (on) => { options.fields = on; });

@@ -134,9 +134,11 @@ const Data = (() => {
     }
     return found.reverse();
   }
+  // Tracks that do not say whose they are, are those of one tracker.
+  const trackers = (raw.trackers || []).length ? raw.trackers : tables.tracks ? ["tracks"] : [];
   // What a track is called, and which tracker's it is where there are several.
   function trackName(number, source) {
-    const who = raw.trackers && raw.trackers.length > 1 && source >= 0 ? raw.trackers[source] : "track";
+    const who = trackers.length > 1 && source >= 0 ? trackers[source] : "track";
     return `${who} ${number}`;
   }
   // The highest level of each aircraft with an alert, whoever alerts.
@@ -207,7 +209,7 @@ const Data = (() => {
   const scanTimes = scans.map((rows) => Float64Array.from(rows, (i) => tables.scans.time_s[i]));
 
   return {
-    ...raw, tables, after, ownship, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
+    ...raw, tables, trackers, after, ownship, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
     looks, scanTimes, reach: { near_m: nearReach() },
     scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
   };

@@ -195,36 +195,39 @@ const Plan = (() => {
   }
 
   // A track without a range: a dashed line with its name a third of the way to the edge.
-  function directionOnly(c, k, i, label) {
+  function directionOnly(c, k, i, label, colour) {
     if (!Number.isFinite(k.bearing_rad[i])) return;
     const far = view.perPixel * Math.hypot(view.width, view.height);
     const at = (away) => place(k.from_east_m[i] + away * Math.sin(k.bearing_rad[i]),
       k.from_north_m[i] + away * Math.cos(k.bearing_rad[i]));
     const [x, y] = at(0), [u, v] = at(far), [p, q] = at(0.16 * far);
+    c.strokeStyle = colour;
     c.setLineDash([8, 4]);
     c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
     c.setLineDash([]);
-    if (label) name(label, p, q, Infinity, Symbols.colours.track);
+    if (label) name(label, p, q, Infinity, colour);
   }
 
-  function tracks(c, t, own, drawn) {
+  function tracks(c, t, own, trackers, drawn) {
     const k = Data.tables.tracks;
-    c.strokeStyle = Symbols.colours.track;
     c.lineWidth = 1.5;
-    const sure = new Path2D(), tentative = new Path2D();
+    const sure = new Symbols.Batch(), tentative = new Symbols.Batch();
     for (const i of Data.standing("tracks", t)) {
+      const source = k.source ? Math.max(k.source[i], 0) : 0;
+      if (!trackers.has(source)) continue;
+      const colour = Symbols.tracker(source);
       const label = k.number ? Data.trackName(k.number[i], k.source ? k.source[i] : -1) : Data.targets[k.target[i]];
       if (drawn.tracks) {
         drawn.tracks.push({ label, time_s: k.time_s[i], east_m: k.east_m[i],
           north_m: k.north_m[i] });
       }
       if (!Number.isFinite(k.east_m[i])) {
-        directionOnly(c, k, i, label);
+        directionOnly(c, k, i, label, colour);
         continue;
       }
       const [x, y] = place(k.east_m[i], k.north_m[i]);
       if (!inside(x, y)) continue;
-      const path = k.tentative && k.tentative[i] ? tentative : sure;
+      const path = (k.tentative && k.tentative[i] ? tentative : sure).path(colour, 1, false);
       Symbols.outline(path, "D", x, y, 8);
       if (k.variance_east_m2) {
         ellipse(path, x, y, { xx: k.variance_east_m2[i], yy: k.variance_north_m2[i],
@@ -236,11 +239,11 @@ const Plan = (() => {
         path.lineTo(u, v);
       }
       const far = away({ east: k.east_m[i], north: k.north_m[i] }, own);
-      if (label) name(label, x, y, far, Symbols.colours.track);
+      if (label) name(label, x, y, far, colour);
     }
-    c.stroke(sure);
+    sure.draw(c);
     c.setLineDash([3, 3]);
-    c.stroke(tentative);
+    tentative.draw(c);
     c.setLineDash([]);
   }
 
@@ -294,7 +297,7 @@ const Plan = (() => {
     if (options.bands) bands(c, t, own, drawn);
     if (options.truth) truth(c, t, own, drawn);
     detections(c, t, options, drawn);
-    if (options.tracks) tracks(c, t, own, drawn);
+    if (options.trackers.size) tracks(c, t, own, options.trackers, drawn);
     alerts(c, t, own, drawn);
     ringWords(c, own, step);
     drawn.named = writeNames(own);

@@ -1,8 +1,8 @@
 "use strict";
 // Colours of the theme, markers of the sensors, and text on a canvas.
 const Symbols = (() => {
-  const names = ["ground", "ink", "faint", "line", "truth", "track", "own",
-    "level1", "level2", "level3", "recovery"];
+  const names = ["ground", "ink", "faint", "line", "truth", "own",
+    "track", "track2", "track3", "track4", "level1", "level2", "level3", "recovery"];
   let colours = {};
   function readTheme() {
     colours = Canvas.theme(names);
@@ -10,6 +10,11 @@ const Symbols = (() => {
 
   function level(number) {
     return colours[`level${Math.min(Math.max(number, 1), 3)}`];
+  }
+
+  // Tracks are in the colour of their tracker.
+  function tracker(number) {
+    return colours[["track", "track2", "track3", "track4"][Math.max(number, 0) % 4]];
   }
 
   // Regions of guidance, by their number: colour and words.
@@ -118,6 +123,6 @@ const Symbols = (() => {
     return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
   }
 
-  return { get colours() { return colours; }, readTheme, level, region, mark, outline, Batch, aircraft,
+  return { get colours() { return colours; }, readTheme, level, tracker, region, mark, outline, Batch, aircraft,
     niceStep };
 })();

@@ -40,7 +40,7 @@ def test_neither_glint_nor_navigation_is_averaged_away(sets):
     say: unsaid, two targets were eleven tracks.
     """
     scene = dsa_des.load_scene("first_light", sets=[*FIRST_COMMAND, *sets])
-    result = dsa_des.study(scene, metrics=["tracking"], replicas=2, workers=1)
+    result = dsa_des.study(scene, metrics=["tracking"], replicas=1, workers=1)
     found = {row["result"]: row["value"] for row in result.summary.to_pylist()}
     assert 2.0 < found["track_nees_mean"] < 7.0
     assert found["track_ambiguity"] < 1.05 and found["track_spuriousness"] == 0.0

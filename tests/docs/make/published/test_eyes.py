@@ -5,9 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from components.encounters.model_file import read_model
+from components.encounters.pair_densities import PairingRules
+from components.encounters.pairing import PairSampler
 from components.formats.set_file import read_set
 from docs.make.published import eyes
-from docs.make.published.volumes import MODELS
+from docs.make.published.seen_in_time import Eyes, shares_unseen
+from docs.make.published.volumes import MODELS, VOLUMES, violates
 
 
 def test_the_closed_form_gives_all_of_the_table():
@@ -37,9 +41,31 @@ def test_a_rate_gives_another_table():
     )
 
 
-def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path):
-    files = eyes.sets_of_both(tmp_path, MODELS / "light_aircraft.txt", 12)
-    either = [eyes.flags_of(file, 12, 3, 1) for file in files]
+@pytest.fixture(scope="module")
+def few():
+    return eyes.chosen_pairs(MODELS / "light_aircraft.txt", 300)
+
+
+def test_all_nmacs_are_flown_and_some_of_the_others_weigh_as_much(few):
+    pairs, hit = few
+    known = read_model(MODELS / "light_aircraft.txt")
+    every = PairSampler(known, known, 1, PairingRules()).pairs(range(300))
+    nmac, lost = violates(VOLUMES["nmac"], every), violates(eyes._LOST, every)
+    assert sum(len(some.weight) for some in hit) == nmac.sum() > 4
+    assert violates(VOLUMES["nmac"], pairs).sum() == nmac.sum()
+    assert len(pairs.weight) < 60 < lost.sum()
+    # Weights of those that were taken stand for all.
+    taken = np.isin(every.horizontal_ft, pairs.horizontal_ft)
+    assert taken.sum() == len(pairs.weight)
+    times = pairs.weight / every.weight[taken]
+    expected = np.where(nmac, 1, np.where(lost, eyes.LOST_EVERY, eyes.OTHERS_EVERY))[taken]
+    assert times == pytest.approx(expected)
+
+
+def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path, few):
+    pairs = few[0].take(np.arange(5))
+    files = eyes.sets_of_both(tmp_path, pairs)
+    either = [eyes.flags_of(file, 5, 3, 1) for file in files]
     for name in ("nmac_nominal", "well_clear_lost_nominal", "encounter_weight"):
         assert either[0][name].tolist() == either[1][name].tolist(), name
     own, other = (read_set(file) for file in files)
@@ -47,7 +73,39 @@ def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path
     assert own.state["speed_mps"][1] == other.state["speed_mps"][0] != own.state["speed_mps"][0]
 
 
-def test_the_rows_of_the_risk_stand_in_their_order(monkeypatch):
+def test_other_assumptions_reach_the_flights(few, monkeypatch):
+    # Who never looks out prevents nothing; one who takes half a minute to turn, less than one who
+    # turns in half a second; and another block may decide.
+    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:6])
+    changes = {
+        "blind": ("blocks.pilot.left_looking=0",),
+        "quick": ("wires[4].delay_s=0.5",),
+        "ground": ("avoidance=operator.stochastic", "wires[4].delay_s=0.1"),
+    }
+    monkeypatch.setattr(eyes, "_OTHERWISE", changes)
+    lines = eyes.other_pilots(pairs, 1).splitlines()[2:]
+    ratio = {line.split(" | ")[0][2:]: float(line.split(" | ")[1].split()[0]) for line in lines}
+    assert ratio["blind"] == 1.0
+    assert ratio["quick"] < 0.7 and ratio["quick"] <= ratio["ground"] <= 1.0
+
+
+def test_the_time_that_the_published_numbers_leave(few):
+    _, hit = few
+    one_s, both_s = eyes.needed_s(hit)
+    found = shares_unseen(hit, Eyes(), 150, [one_s, both_s])
+    assert found[0, 0] == pytest.approx(eyes.ONE[0], abs=0.01)
+    assert found[1, 1] == pytest.approx(eyes.BOTH[0], abs=0.01)
+    shares = [
+        [float(cell) for cell in line.split(" | ")[1:-1]]
+        for line in eyes.not_seen(hit).splitlines()[2:]
+    ]
+    assert all(row == sorted(row) for row in shares)
+    # Each pair of rows: by neither no more than by one; seldom looking, more than always.
+    assert all(both <= one for i in (0, 2, 4) for one, both in zip(*shares[i : i + 2], strict=True))
+    assert shares[4][2] > shares[0][2] > shares[2][2]
+
+
+def test_the_rows_of_the_risk_stand_in_their_order(monkeypatch, few):
     flown = iter([
         {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [1.0, 0.0, 0.0]},
         {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [0.0, 0.0, 1.0]},
@@ -60,7 +118,7 @@ def test_the_rows_of_the_risk_stand_in_their_order(monkeypatch):
         return {**flags, **lost, "encounter_weight": weight}
 
     monkeypatch.setattr(eyes, "flags_of", flags_of)
-    rows = eyes.risk_rows(MODELS / "light_aircraft.txt", encounters=3)
+    rows = eyes.risk_rows(few[0].take(np.arange(3)))
     assert [row.published for row in rows] == [*eyes.ONE, *eyes.BOTH]
     # By hand: 3 of 4 by the one, 2 of 4 by the other; neither leaves what both do.
     assert [row.ours for row in rows] == pytest.approx([5.0 / 8.0, 5.0 / 8.0, 0.0, 0.0])

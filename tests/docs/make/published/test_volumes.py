@@ -9,6 +9,7 @@ from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import PairSampler
 from docs.make.published.volumes import (
+    CYLINDERS,
     EVEN,
     GAS,
     MODELS,
@@ -17,6 +18,7 @@ from docs.make.published.volumes import (
     gas_share,
     sampled,
     uncrewed_at,
+    variants,
 )
 
 CREWED = MODELS / "light_aircraft.txt"
@@ -44,10 +46,16 @@ def looked_at(pairs, radius_ft, half_ft, factor):
 
 
 @pytest.mark.parametrize(
-    ("name", "radius_ft", "half_ft"), [("nmac", 500.0, 100.0), ("2000 ft by 250 ft", 2000.0, 250.0)]
+    ("name", "radius_ft", "half_ft"),
+    [
+        ("nmac", 500.0, 100.0),
+        ("2000 ft by 250 ft", 2000.0, 250.0),
+        ("0.5 nmi", 3038.06, 1000.0),
+    ],
 )
 def test_who_violates_a_cylinder_is_inside_at_some_time(pairs, name, radius_ft, half_ft):
-    found = sampled(UNCREWED, CREWED, COUNT, {name: VOLUMES[name]}).violated[name]
+    volume = {**VOLUMES, **CYLINDERS}[name]
+    found = sampled(UNCREWED, CREWED, COUNT, {name: volume}).violated[name]
     inside, nearly = (looked_at(pairs, radius_ft, half_ft, factor) for factor in (0.98, 1.02))
     assert inside.sum() > 3 and nearly.sum() < COUNT
     assert not (inside & ~found).any() and not (found & ~nearly).any()
@@ -84,3 +92,13 @@ def test_a_gas_flows_into_both_volumes():
     assert gas_share(1000.0, 0.0, 5.0) == pytest.approx(0.25)
     assert math.isclose(gas_share(500.0, 200.0, 5.0) * (4e8 + math.pi * 1.25e6),
                         4e7 + math.pi * 1.25e6)  # fmt: skip
+
+
+def test_the_table_says_what_the_share_depends_on():
+    lines = variants(CREWED, 60).splitlines()
+    assert len(lines) == 2 + 9 and lines[0].count("|") == lines[2].count("|") == 6
+    for line in lines[2:]:
+        shares = [float(cell.split()[0]) for cell in line.split(" | ")[1:] if "to" in cell]
+        # Two of them are larger in every way than the first.
+        assert len(shares) == 3 and all(0.0 <= share <= 1.0 for share in shares)
+        assert shares[0] >= shares[2]

@@ -1,40 +1,13 @@
-"""``python -m docs.make.track_consistency``: are covariances of tracks honest?
+"""The cases: who flies, what is measured with which errors, and which tracker is asked."""
 
-Scenes with stated errors, a banked ownship on the southern hemisphere and many replicas; at some
-instants the mean normalised error squared (NEES) of the tracks' position and velocity, 6 where
-they are honest, with its 95 % bounds by chi-square for as many tracks as there are
-(Bar-Shalom, Li, Kirubarajan (2001), §5.4.2).
-"""
-
-import argparse
 import math
-import sys
-import tempfile
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from itertools import cycle, pairwise
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import dsa_des
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, Motion
-from components.geometry.ellipsoid import enu_to_geodetic
-from components.messages.state_tracks import COVARIANCE
-from components.metrics.separation import traffic_of
-from components.metrics.true_states import states_in_frame
 from components.optical.sensors import OpticalRangeBoundary as CameraBoundary
 from components.radar.radar import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
-from dsa_des.arrays.types import FloatArray
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.running.simulation import Simulation
-from dsa_des.terminal.interruption import plain_ending
-from dsa_des.terminal.terminal import say
 
 OWNSHIP = {
     "lat_deg": -41.3, "lon_deg": 173.2, "alt_m": 2400.0, "heading_deg": 217.0, "speed_mps": 70.0,
@@ -81,7 +54,7 @@ NOISY = {
     "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 8.0, "range_resolution_m": 100.0,
 }  # fmt: skip
 _MISSED = 0.3
-_CLASS = f"{__name__ if __name__ != '__main__' else 'docs.make.track_consistency'}:"
+_CLASS = f"{__name__}:"
 #: Straight flights have no noise of their own, but level flight follows the Earth: 60 m/s bend by
 #: a = v²/R = 0.57 mm/s² from a straight line of the frame. White acceleration of intensity a² T
 #: makes velocities as uncertain within the T = 37 s of a scene as they become wrong by, a T.
@@ -121,9 +94,8 @@ class Case:
     #: The model that flights are drawn from, ten in a scene.
     drawn: Motion | None = None
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
-    #: What the drawn ones are, in turn, and how many there are in a scene.
+    #: What the drawn ones are, in turn.
     aircraft: list[dict[str, Any]] = field(default_factory=list)
-    flights: int = 10
     #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
     #: How near a track must be to be a target's: coarse bearings err by more than that of others.
@@ -257,200 +229,3 @@ CASES = {
                  sensors={"active": ACTIVE, "ads_b": ADS_B}, within_m=3000.0),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip
-
-_DURATION_S = 37
-INSTANTS_S = np.arange(12.0, 37.0, 4.0)
-_AHEAD_S = 5.0
-#: A NEES of an honest track is above this once in 10^10.
-_LOST_ABOVE = 60.0
-_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
-
-
-def scene_of_case(case: Case, traffic: dict[str, Any]) -> dict[str, Any]:
-    """Return a scene as a table."""
-    wires: list[Any] = ["traffic -> transform -> gate", "fusion -> tracker"]
-    for name in case.sensors:
-        wires += [f"gate -> {name}", {"from": name, "to": "fusion", **case.wire}]
-    return {
-        "duration_s": _DURATION_S, "seed": 1, "wires": wires,
-        "blocks": {
-            "traffic": traffic, "transform": {"type": "geometry.ellipsoid"},
-            "gate": {"type": "gate"}, **case.sensors, "fusion": {"type": "fusion.pass_through"},
-            "tracker": case.tracker,
-        },
-    }  # fmt: skip
-
-
-def drawn_flights(path: Path, model: Motion, number: int, flights: int) -> None:
-    """Write a CSV file with the ownship and flights drawn from a motion model, all around it."""
-    step_s, rng = 0.1, np.random.default_rng(number)
-    own = np.radians(OWNSHIP["heading_deg"])
-    course = np.array([np.cos(own), np.sin(own)]) * OWNSHIP["speed_mps"]
-    around = (np.arange(flights) + rng.uniform()) * 2.0 * np.pi / flights
-    heading = rng.uniform(0.0, 2.0 * np.pi, flights)
-    state = np.zeros((model.size, flights))
-    state[:2] = 5000.0 * np.stack([np.cos(around), np.sin(around)])
-    state[2] = -rng.uniform(100.0, 500.0, flights)
-    state[3:5] = 60.0 * np.stack([np.cos(heading), np.sin(heading)])
-    if model.size > 6:
-        state[6] = 3.0 * _DEGREE * rng.choice([-1.0, 1.0], flights)
-    step = np.full(flights, step_s)
-    root = np.linalg.cholesky(model.noise(step)[:, :, 0] + 1e-20 * np.eye(model.size))
-    rows = ["time_s,id,lat_deg,lon_deg,alt_m,yaw_deg,pitch_deg,roll_deg"]
-    for k in range(int((_DURATION_S + 1) / step_s)):
-        t = k * step_s
-        north, east, down = np.column_stack([[*(course * t), -OWNSHIP["climb_mps"] * t], state[:3]])
-        lat, lon, alt = enu_to_geodetic(
-            east, north, -down, reference_lat_deg=OWNSHIP["lat_deg"],
-            reference_lon_deg=OWNSHIP["lon_deg"], reference_alt_m=OWNSHIP["alt_m"],
-        )  # fmt: skip
-        turned = [tuple(OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll"))]
-        turned += [(0.0, 0.0, 0.0)] * flights
-        rows += [
-            f"{t:.1f},{'own' if i == 0 else f't{i}'},{lat[i]:.14g},{lon[i]:.14g},{alt[i]:.12g},"
-            + ",".join(f"{angle:g}" for angle in turned[i])
-            for i in range(1 + flights)
-        ]
-        state = model.move(state, step) + root @ rng.normal(size=state.shape)
-    path.write_text("\n".join(rows) + "\n")
-
-
-def _scenes(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
-    """Yield scenes that may run in lock step together."""
-    if case.drawn is None:
-        traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": case.targets}
-        scene = dsa_des.load_scene(scene_of_case(case, traffic))
-        yield [scene_of(scene, Replica(1 + i, {})) for i in range(replicas)]
-        return
-    for number in range(-(-replicas // case.flights)):
-        path = folder / f"flights{number}.csv"
-        drawn_flights(path, case.drawn, number, case.flights)
-        read: dict[str, Any] = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
-        for i, craft in zip(range(1, 1 + case.flights), cycle(case.aircraft), strict=False):
-            read.setdefault("aircraft", {})[f"t{i}"] = craft
-        scene = dsa_des.load_scene(scene_of_case(case, read))
-        yield [scene_of(scene, Replica(1 + number, {}))]
-
-
-def _tracks(scenes: list[Any]) -> list[Any]:
-    """Return each replica's table of tracks."""
-    sink = MemorySink()
-    try:
-        lock_step(scenes, recorder=Recorder([sink])).run()
-    except NotInLockStep:
-        tables = []
-        for scene in scenes:
-            sink = MemorySink()
-            Simulation(scene, recorder=Recorder([sink])).run()
-            tables.append(sink.tables()["state_tracks"])
-        return tables
-    table = sink.tables()["state_tracks"].combine_chunks()
-    replica = table["replica"].to_numpy()
-    cuts = np.searchsorted(replica, np.arange(len(scenes) + 1))
-    return [table.slice(a, b - a) for a, b in pairwise(cuts.tolist())]
-
-
-def nees_of(case: Case, replicas: int) -> FloatArray:
-    """Return the NEES of every target's track, (targets of all replicas, instants).
-
-    NaN where no confirmed track with a range lies within `Case.within_m`, 300 m but for coarse
-    bearings, now and 5 s ahead in the mean.
-    """
-    found: list[FloatArray] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for scenes in _scenes(case, replicas, Path(folder)):
-            targets = traffic_of(scenes[0])[0].targets
-            for table in _tracks(scenes):
-                found.append(_of_run(table, targets, case.within_m))
-    return np.concatenate(found)
-
-
-def _of_run(table: Any, targets: list[Any], within_m: float) -> FloatArray:
-    columns: Callable[[str], Any] = lambda name: table[name].to_numpy(zero_copy_only=False)  # noqa: E731
-    time_s = columns("time_s")
-    # A track is taken as it is told by the first message at or after the instant.
-    firsts = np.searchsorted(time_s, INSTANTS_S)
-    status, ranged = columns("track_status"), columns("has_range")
-    nees = np.full((len(targets), len(INSTANTS_S)), np.nan)
-    for k, first in enumerate(firsts.tolist()):
-        if first == len(time_s):
-            continue
-        rows = np.flatnonzero(time_s == time_s[first])
-        rows = rows[np.isin(status[rows], ("confirmed", "coasted")) & ranged[rows]]
-        if len(rows) == 0:
-            continue
-        part = {n: columns(n)[rows] for n in (*_STATE, *COVARIANCE.values(), "state_s")}
-        origin = np.stack([columns(f"origin_{n}")[rows] for n in ("lat_deg", "lon_deg", "alt_m")])
-        known, _ = states_in_frame(targets, part["state_s"], origin)
-        error = np.stack([part[n] for n in _STATE]) - known
-        # Where two meet, who flies on elsewhere is another one.
-        ahead = error[:, :3] + _AHEAD_S * error[:, 3:]
-        away = np.sqrt((error[:, :3] ** 2).sum(axis=1)) + np.sqrt((ahead**2).sum(axis=1))
-        spread = np.empty((len(rows), 6, 6))
-        for (i, j), name in COVARIANCE.items():
-            spread[:, i, j] = spread[:, j, i] = part[name]
-        for target, near in enumerate(away.argmin(axis=1).tolist()):
-            if away[target, near] < 2.0 * within_m:
-                e = error[target, :, near]
-                nees[target, k] = e @ np.linalg.solve(spread[near], e)
-    return nees
-
-
-def bounds(count: int) -> tuple[float, float]:
-    """Return the 95 % bounds of the mean NEES of so many independent tracks."""
-    from scipy.stats import chi2
-
-    low, high = chi2.ppf([0.025, 0.975], 6 * count) / count
-    return float(low), float(high)
-
-
-def summary(nees: FloatArray) -> dict[str, float]:
-    """Return the mean over instants, its bounds, the means' range, and the shares inside.
-
-    What is so far off that it cannot be chance is counted as lost, and is not in the means.
-    """
-    lost = np.isnan(nees) | (nees > _LOST_ABOVE)
-    nees = np.where(lost, np.nan, nees)
-    count = int((~np.isnan(nees)).sum(axis=0).min())
-    low, high = bounds(max(count, 1))
-    means = np.nanmean(nees, axis=0)
-    single = bounds(1)
-    there = nees[~np.isnan(nees)]
-    return {
-        "tracks": count, "mean": float(np.nanmean(nees)), "low": low, "high": high,
-        "least": float(means.min()), "most": float(means.max()),
-        "inside": float(((means >= low) & (means <= high)).mean()),
-        "share": float(((there >= single[0]) & (there <= single[1])).mean()),
-        "median": float(np.median(there)), "lost": float(lost.mean()),
-    }  # fmt: skip
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m docs.make.track_consistency",
-        description="Print the mean normalised error squared of tracks, with its bounds.",
-    )
-    parser.add_argument("cases", nargs="*", metavar="case", help=f"of {', '.join(CASES)}")
-    parser.add_argument("--replicas", type=int, default=200)
-    options = parser.parse_args(arguments)
-    unknown = [name for name in options.cases if name not in CASES]
-    if unknown:
-        parser.error(f"no case {unknown[0]!r}; allowed: {', '.join(CASES)}")
-    say(
-        "| case | tracks | mean | 95 % bounds | instants | inside | single inside | median | lost |"
-    )
-    say("|---|---|---|---|---|---|---|---|---|")
-    for name in options.cases or CASES:
-        s = summary(nees_of(CASES[name], options.replicas))
-        say(
-            f"| {CASES[name].says} | {s['tracks']} | {s['mean']:.2f} | {s['low']:.2f} to "
-            f"{s['high']:.2f} | {s['least']:.2f} to {s['most']:.2f} | {s['inside']:.0%} | "
-            f"{s['share']:.1%} | {s['median']:.2f} | {s['lost']:.2%} |"
-        )
-    return 0
-
-
-if __name__ == "__main__":
-    with plain_ending():
-        sys.exit(main())

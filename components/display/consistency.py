@@ -1,0 +1,177 @@
+"""``consistency.png``: errors of tracks and innovations beside the bounds that they should keep."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.display.outcomes import NEAR_M, distances
+from components.display.tracks import COLOURS, MOST_SPREADS, STATE, DrawnTracks
+from components.messages.state_tracks import full_covariance
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.results.statistics import chi_square_bounds
+
+_MOST_ERRORS = 2000
+_LOWEST, _HIGHEST = 0.02, 1000.0
+#: Stretches of time over which innovations are averaged.
+_STRETCHES = 40
+
+
+def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return normalised errors squared of a track to the nearest target, and where it has one.
+
+    States (targets, 6, rows) are those of the targets at the same times.
+    """
+    count = len(one["state_s"])
+    if len(states) == 0:
+        return np.full(count, np.nan), np.zeros(count, dtype=bool)
+    apart = distances(one, slice(None), states[:, :3])
+    apart = np.where(np.isnan(apart), np.inf, apart)
+    nearest: IntArray = apart.argmin(axis=0)
+    rows = np.arange(count)
+    known = apart[nearest, rows] < NEAR_M
+    error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
+    spread = np.moveaxis(full_covariance(one, slice(None)), -1, 0).copy()
+    found = np.full(count, np.nan)
+    solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
+    found[known] = (error.T[known] * solved).sum(axis=1)
+    return found, known
+
+
+def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
+    """Draw normalised errors squared of tracks, and of what they expected of detections.
+
+    A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
+    drawn where no track is near a target.
+    """
+    shown: list[tuple[Any, FloatArray, FloatArray]] = []
+    for track in drawn.tracks:
+        count = len(track.columns["state_s"])
+        one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
+        found, known = errors_squared(one, drawn.targets.states(one["state_s"]))
+        if known.any():
+            shown.append((track, one["state_s"], found))
+    if not shown:
+        return None
+    of_block = {
+        block: np.concatenate([values[~np.isnan(values)] for _, _, values in told])
+        for block in drawn.blocks
+        if (told := [one for one in shown if one[0].block == block])
+    }
+    low, high = chi_square_bounds(6)
+    said = {
+        block: f"{every.mean():.3g}, {_percent((every >= low) & (every <= high))} inside"
+        for block, every in of_block.items()
+    }
+    with drawing(9.0, 6.4, path) as figure:
+        errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        names = {block: f"{figure_text(block, 16)}: {words}" for block, words in said.items()}
+        if len(shown) > MOST_SPREADS:
+            _draw_shares(errors, drawn, shown, names)
+        else:
+            labelled: set[str] = set()
+            for track, time_s, values in shown:
+                label = f"track {track.number}"
+                if len(drawn.blocks) > 1:
+                    label = "" if track.block in labelled else names[track.block]
+                    labelled.add(track.block)
+                errors.plot(time_s, values, color=track.colour, linewidth=0.9, label=label or None)
+        errors.axhspan(low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0)
+        errors.axhline(6.0, color="#666666", linewidth=0.8, zorder=0)
+        # Trackers are not pooled: each has its own mean, in the legend.
+        pooled = "" if len(drawn.blocks) > 1 else f": mean {next(iter(said.values()))}"
+        errors.set_title(
+            f"Error squared by its covariance (NEES){pooled} (honest: 6, 95 %)", loc="left"
+        )
+        if len(shown) <= 6 or len(drawn.blocks) > 1 or len(shown) > MOST_SPREADS:
+            errors.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        _draw_innovations(innovations, drawn)
+        errors.set_yscale("log")
+        bottom, top = errors.get_ylim()
+        errors.set_ylim(max(bottom, _LOWEST), min(max(top, 20.0), _HIGHEST))
+        plain_log_ticks(errors.yaxis)
+        innovations.set_ylim(bottom=0.0)
+        innovations.set_xlabel("time (s)")
+        tight(figure)
+    return path
+
+
+def _draw_shares(
+    axes: Any,
+    drawn: DrawnTracks,
+    shown: list[tuple[Any, FloatArray, FloatArray]],
+    names: dict[str, str],
+) -> None:
+    """Draw the median of all tracks and where 95 % of them lie: single lines cover each other."""
+    edges = np.linspace(drawn.time_s[0], drawn.time_s[1] + 1e-9, _STRETCHES + 1)
+    for place, block in enumerate(drawn.blocks):
+        held = [(time_s, values) for track, time_s, values in shown if track.block == block]
+        if not held:
+            continue
+        time_s, values = (np.concatenate(parts) for parts in zip(*held, strict=True))
+        time_s, values = time_s[~np.isnan(values)], values[~np.isnan(values)]
+        stretch = np.digitize(time_s, edges) - 1
+        used = np.unique(stretch)
+        low, median, high = np.array(
+            [np.quantile(values[stretch == one], (0.025, 0.5, 0.975)) for one in used.tolist()]
+        ).T
+        middle = 0.5 * (edges[1:] + edges[:-1])[used]
+        colour, several = COLOURS[place % len(COLOURS)], len(drawn.blocks) > 1
+        axes.fill_between(middle, low, high, color=colour, alpha=0.2, linewidth=0,
+                          label=None if several else f"95 % of {len(held)} tracks")  # fmt: skip
+        axes.plot(middle, median, color=colour, marker=".", linewidth=1.2,
+                  label=names[block] if several else "median")  # fmt: skip
+
+
+def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
+    for place, block in enumerate(drawn.blocks):
+        held = [one.columns for one in drawn.tracks if one.block == block]
+        label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
+        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[place % len(COLOURS)], label)
+    if drawn.blocks[1:]:
+        axes.set_title(
+            "Innovation squared by its covariance (NIS) per quantity, stretches inside "
+            "(honest: 1, 95 %)", loc="left",
+        )  # fmt: skip
+    if axes.get_legend_handles_labels()[1]:
+        axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def _draw_innovations_of(
+    axes: Any,
+    held: list[dict[str, Any]],
+    span_s: tuple[float, float],
+    colour: str,
+    tracker: str,
+) -> None:
+    time_s, nis, freedom = (
+        np.concatenate([columns[name] for columns in held])
+        for name in ("state_s", "nis", "nis_freedom")
+    )
+    mine = freedom > 0
+    time_s, nis, freedom = time_s[mine], nis[mine], freedom[mine]
+    if len(nis) == 0:
+        axes.set_title("Innovation squared (NIS): this tracker tells none", loc="left")
+        return
+    edges = np.linspace(span_s[0], span_s[1] + 1e-9, _STRETCHES + 1)
+    total, many = (np.histogram(time_s, edges, weights=values)[0] for values in (nis, freedom))
+    middle = 0.5 * (edges[1:] + edges[:-1])[many > 0]
+    total, many = total[many > 0], many[many > 0]
+    low, high = np.array([chi_square_bounds(n) for n in many.tolist()]).T / many
+    axes.fill_between(middle, low, high, color=colour if tracker else "#999999",
+                      alpha=0.15 if tracker else 0.3, linewidth=0, zorder=0,
+                      label=None if tracker else "95 %")  # fmt: skip
+    inside = (total / many >= low) & (total / many <= high)
+    said = f"{nis.sum() / freedom.sum():.3g}, {_percent(inside)}"
+    axes.plot(middle, total / many, color=colour, marker=".", linewidth=0.9,
+              label=f"{tracker}: {said}" if tracker else "mean per quantity")  # fmt: skip
+    axes.set_title(
+        f"Innovation squared by its covariance (NIS) per quantity: {said} of stretches inside "
+        "(honest: 1, 95 %)", loc="left",
+    )  # fmt: skip
+
+
+def _percent(inside: BoolArray) -> str:
+    return f"{100.0 * np.mean(inside):.0f} %"

@@ -1,0 +1,87 @@
+"""The latest turn that clears a disc, from geometry alone, and how NRC's search would count it.
+
+Flat, and in closed form but for one integral: with roll rate p the bank is p t until it is φ, so
+the heading has turned by -g / (v p) · ln cos(p t) until then and by g tan φ / v a second after it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import FloatArray
+
+OWN_MPS = 60.0 * 1852.0 / 3600.0
+DISC_M = 500.0 * FOOT_M
+GRAVITY_MPS2 = 9.80665
+BANK_RAD, ROLL_RATE_RAD_S = math.radians(45.0), math.radians(10.0)
+#: Their simulations begin so long before the collision, go by such a step, and count a turn two
+#: steps later than the state that it begins from; they halve the time so many times.
+BEFORE_S, TIME_STEP_S, STEPS_LATE, HALVINGS = 190.0, 0.1, 2, 10
+
+_FINE_S, _UNTIL_S = 0.002, 40.0
+
+
+def turned_rad(time_s: FloatArray) -> FloatArray:
+    """Return by how much the heading has turned so long after the turn began, if it never ends."""
+    full_s = BANK_RAD / ROLL_RATE_RAD_S
+    scale = GRAVITY_MPS2 / OWN_MPS
+    rolling = (
+        -scale / ROLL_RATE_RAD_S * np.log(np.cos(ROLL_RATE_RAD_S * np.minimum(time_s, full_s)))
+    )
+    turned: FloatArray = rolling + scale * math.tan(BANK_RAD) * np.maximum(time_s - full_s, 0.0)
+    return turned
+
+
+def least_range_m(
+    azimuth_deg: float,
+    closing_mps: float,
+    turns_deg: Iterable[float],
+    sides: Sequence[float] = (-1.0, 1.0),
+) -> float:
+    """Return the range at which the latest of some turns clears the disc, to the better side.
+
+    Sides are -1 (to the left) and 1. The intruder closes in from an azimuth on a collision course.
+    What it has to be clear of is |R line + off(t)| = D with off the way of the intruder less the
+    own one since the turn began, so R is the largest root of all times.
+    """
+    time_s = np.arange(0.0, _UNTIL_S, _FINE_S)
+    azimuth = math.radians(azimuth_deg)
+    line = np.array([math.sin(azimuth), math.cos(azimuth)])
+    intruder = np.array([0.0, OWN_MPS]) - closing_mps * line
+    least = math.inf
+    for turn_deg in turns_deg:
+        turned = np.minimum(turned_rad(time_s), math.radians(turn_deg))
+        for side in sides:
+            velocity = OWN_MPS * np.stack([np.sin(side * turned), np.cos(turned)])
+            middle = 0.5 * (velocity[:, 1:] + velocity[:, :-1]) * _FINE_S
+            own = np.concatenate([np.zeros((2, 1)), np.cumsum(middle, axis=1)], axis=1)
+            off = intruder[:, np.newaxis] * time_s - own
+            along = line @ off
+            root = along**2 - (off**2).sum(axis=0) + DISC_M**2
+            met = root >= 0.0
+            least = min(least, float((np.sqrt(root[met]) - along[met]).max()))
+    return least
+
+
+def as_searched_m(range_m: float, closing_mps: float) -> float:
+    """Return what NRC's search makes of a least range.
+
+    It halves the time from the start to where the disc's modified tau ends ten times, takes the
+    last of these instants, to the next tenth of a second, at which a turn still clears the disc,
+    and counts the range from modified tau: D² / (190 s v) less than what is left to the collision.
+    """
+    short_s = DISC_M**2 / (BEFORE_S * closing_mps**2)
+    end_s = _to_next_step(np.array([BEFORE_S - short_s]))[0]
+    instants_s = _to_next_step(end_s * np.arange(2**HALVINGS + 1) / 2**HALVINGS)
+    latest_s = BEFORE_S - range_m / closing_mps + STEPS_LATE * TIME_STEP_S
+    turn_s = float(instants_s[instants_s <= latest_s + 1e-9].max())
+    return float((BEFORE_S - short_s - turn_s) * closing_mps)
+
+
+def _to_next_step(time_s: FloatArray) -> FloatArray:
+    steps: FloatArray = np.ceil(np.round(time_s / TIME_STEP_S, 6)) * TIME_STEP_S
+    return steps
