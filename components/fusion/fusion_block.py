@@ -194,7 +194,7 @@ class Fusion(Component):
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
-            told=None if told is None else dict(zip(TOLD, told, strict=True)),
+            told_by_target=None if told is None else dict(zip(TOLD, told, strict=True)),
             **values,
         )
 
@@ -223,9 +223,9 @@ def velocities(message: Detections) -> FloatArray:
 
 def told_columns(message: Detections) -> FloatArray:
     """Return what each entry is told, (`TOLD`, entries); NaN for nothing."""
-    if message.told is None:
+    if message.told_by_target is None:
         return np.full((len(TOLD), len(message.target)), np.nan)
-    return np.stack([message.told[name] for name in TOLD])
+    return np.stack([message.told_by_target[name] for name in TOLD])
 
 
 def _copy(

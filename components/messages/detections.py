@@ -117,7 +117,7 @@ class ToldError:
     ----------
     way : int
         Which way it goes (`components.estimation.carried_errors`).
-    told : str
+    deviation : str
         Which of `TOLD` is its deviation.
     lasts_s : float
         Infinite for what stays the same, 0 for what is new at every instant.
@@ -126,7 +126,7 @@ class ToldError:
     """
 
     way: int
-    told: str
+    deviation: str
     lasts_s: float
     of_aircraft: bool = True
 
@@ -166,10 +166,10 @@ class SensorOffer:
         Variance of the ownship's own place across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
     tells : bool
-        Whether its detections may have something that is `told`.
+        Whether its detections may have something that is `told_by_target`.
     told_errors : tuple of ToldError
-        Errors whose deviations differ from detection to detection, as `told` has them. What carries
-        them needs no `lasting` of the same.
+        Errors whose deviations differ from detection to detection, as `told_by_target` has them.
+        What carries them needs no `lasting` of the same.
     """
 
     measures_range: bool
@@ -249,7 +249,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
-    told : dict of (entries,), or None
+    told_by_target : dict of (entries,), or None
         What aircraft tell (`TOLD`): velocity over ground, along the axes of the horizon where the
         ownship believes to be, and how much errs of it and of the place; NaN where nothing is told.
     looks : dict of (rows, targets), or None
@@ -292,7 +292,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     )
     own_velocity_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
-    told: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
+    told_by_target: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
     def tables(self) -> dict[str, Columns]:

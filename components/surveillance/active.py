@@ -338,7 +338,7 @@ class Active(CooperativeSensor):
             "range_variance_m2": variances[2],
         }
         if self._errs:
-            beside["told"] = self._told(cells, found, altitude, deviation)
+            beside["told_by_target"] = self._told(cells, found, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
 
     def _told(

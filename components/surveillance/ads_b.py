@@ -370,7 +370,7 @@ class AdsB(CooperativeSensor):
             "range_variance_m2": variances[2],
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
-            "told": stated.told(
+            "told_by_target": stated.told(
                 moving, cells.state_ns[found] / NANOSECONDS - said["velocity_s"], age_s
             ),
         }
@@ -388,5 +388,5 @@ class AdsB(CooperativeSensor):
             some = np.flatnonzero(np.isfinite(velocity[0]))
             moves[:, row[some]] = velocity[:, some]
         own = dict(zip(OWN_VELOCITY, moves, strict=True))
-        told = report.told or {name: np.zeros(0) for name in TOLD}
-        return replace(report, own_velocity=own, told=told)
+        told = report.told_by_target or {name: np.zeros(0) for name in TOLD}
+        return replace(report, own_velocity=own, told_by_target=told)

@@ -207,8 +207,8 @@ def scans_of(fused: FusedDetections) -> Scans:
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
     told = np.full((len(TOLD), len(mask)), np.nan)
-    if fused.told is not None:
-        told = np.stack([fused.told[name] for name in TOLD])
+    if fused.told_by_target is not None:
+        told = np.stack([fused.told_by_target[name] for name in TOLD])
     measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *told[:3]])
     variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *told[3:6]])
     seen_from = selected(poses, begins)
@@ -224,7 +224,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
         measured=selected(measured, entries),
         variance=selected(variance, entries),
-        told=None if fused.told is None else selected(told, entries),
+        told=None if fused.told_by_target is None else selected(told, entries),
         contributors=mask[entries],
         source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )

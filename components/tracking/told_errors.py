@@ -49,7 +49,7 @@ class CarriedErrors:
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
         return cls(
             tuple(one.way for one, _ in errors),
-            np.array([TOLD.index(one.told) for one, _ in errors]),
+            np.array([TOLD.index(one.deviation) for one, _ in errors]),
             mine, (mine & ranging[:, np.newaxis]).any(axis=0),
         )  # fmt: skip
 
