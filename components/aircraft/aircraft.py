@@ -27,11 +27,7 @@ _PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
 class TableFile:
     """A table that was read while the scene was checked, so that a bad file stops no run half-way.
 
-    Parameters
-    ----------
-    path : Path
-    table : object
-        `components.aircraft.aspect_tables.RcsTable`, or `SilhouetteTable`.
+    It is an `RcsTable` or a `SilhouetteTable` of `components.aircraft.aspect_tables`.
     """
 
     path: Path

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Configuration, Deviations, largest, margins
 from components.alerting.levels import AlertPairs
-from components.formats.daa_file import EXTRA_HEADERS, read_daa_samples
+from components.formats.daa_file import EXTRA_COLUMNS, read_daa_samples
 from components.formats.text_rows import Problems
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
@@ -79,7 +79,7 @@ def read_encounter(
     Targets count at the ownship's times: a sample at another instant is left out, as the reference
     leaves it out.
     """
-    samples = read_daa_samples(path, tuple(EXTRA_HEADERS))
+    samples = read_daa_samples(path, tuple(EXTRA_COLUMNS))
     problems = Problems(str(path))
     names = tuple(samples)
     own = samples[names[0]]

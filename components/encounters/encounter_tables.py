@@ -31,15 +31,9 @@ _MOST = 20
 
 @dataclass(frozen=True)
 class EncounterTable:
-    """Columns of texts, and where each row stands.
+    """Columns of texts, or of numbers where the file has types, None where a cell is empty.
 
-    Parameters
-    ----------
-    path : Path
-    columns : dict of str to list
-        Texts, or numbers where the file has types; None where a cell is empty.
-    lines : list of int
-        The line of each row in the file, from 1; for Parquet its row.
+    `lines` says where each row stands in the file, from 1.
     """
 
     path: Path

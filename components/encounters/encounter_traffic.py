@@ -205,13 +205,7 @@ class ModelParameters(OneEncounter):
         return self
 
     def pairing_rules(self) -> PairingRules:
-        """Return how tracks become encounters.
-
-        Raises
-        ------
-        ValueError
-            Where edges and proportions do not fit.
-        """
+        """Return how tracks become encounters; ValueError where edges or proportions do not fit."""
         changes: dict[str, Any] = {}
         for name, make in (("horizontal", horizontal_density), ("vertical", vertical_density)):
             if (given := getattr(self, name)) is not None:

@@ -229,13 +229,7 @@ def _is_number(value: Any) -> bool:
 
 
 def read_made(path: Path) -> EncounterSet:
-    """Return the encounters of a table; those of one that was read before, if it is the same.
-
-    Raises
-    ------
-    EncounterSetError
-        Of whatever is wrong with the table.
-    """
+    """Return the encounters of a table; those of one that was read before, if it is the same."""
     try:
         return _read_made(path, path.stat().st_mtime_ns)
     except (UsageError, OSError) as error:

@@ -69,26 +69,14 @@ FARTHEST_FT = 1e6
 
 
 def horizontal_density(edges_ft: FloatArray, shares: FloatArray) -> StepDensity:
-    """Return the density of signed horizontal miss distances with these shares between edges.
-
-    Raises
-    ------
-    ValueError
-        Where they do not fit.
-    """
+    """Return the density of signed horizontal miss distances with these shares between edges."""
     wide = np.diff(edges_ft) if len(edges_ft) == len(shares) + 1 else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
         return _about_zero(edges_ft, shares / wide)
 
 
 def vertical_density(edges_ft: FloatArray, chances: FloatArray) -> StepDensity:
-    """Return the chances with which vertical miss distances between edges are accepted.
-
-    Raises
-    ------
-    ValueError
-        Where they do not fit.
-    """
+    """Return the chances with which vertical miss distances between edges are accepted."""
     if not (chances <= 1.0).all():
         raise ValueError("chances must lie above 0 and be 1 at most")
     return _about_zero(edges_ft, chances)

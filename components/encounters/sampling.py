@@ -80,17 +80,8 @@ _BELOW_1 = float(np.nextafter(1.0, 0.0))
 class SampledTracks:
     """What the networks gave for some tracks, before anything is rejected.
 
-    Parameters
-    ----------
-    numbers : (tracks,)
-    initial : (variables, tracks)
-        Values at time 0, in the file's units.
-    initial_bins : (variables, tracks)
-        From 0.
-    left : (variables, tracks)
-        Where in its bin each value lies, [0, 1).
-    changing : (seconds + 1, dynamic variables, tracks)
-        Values of the dynamic variables, in the order of `EncounterModel.dynamic`.
+    Values at time 0, their bins from 0 on, and where in its bin each lies, [0, 1), are (variables,
+    tracks); `changing` is (seconds + 1, dynamic variables, tracks), as `EncounterModel.dynamic`.
     """
 
     numbers: IntArray

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ def convert_sets(
     try:
         found = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
         if weights is not None:
-            found = EncounterSet(**{**vars(found), "weights": _weights(weights, found)})
+            found = replace(found, weights=_weights(weights, found))
         if path.suffix.lower() == SET:
             with set_writer(path, {"made_by": "conversion"}) as writer:
                 writer.write(found)
@@ -81,16 +81,8 @@ _DRAWN = 12
 class Closest:
     """Closest approaches (of the nearest intruder); arrays over encounters.
 
-    Parameters
-    ----------
-    weight : (n,)
-    horizontal_m, vertical_m : (n,)
-        Apart, then; vertical is intruder above ownship.
-    time_s : (n,)
-    closing_mps : (n,)
-        Relative speed then.
-    course_deg : (n,)
-        The intruder's against the ownship's.
+    Vertical is intruder above ownship, closing the relative speed, the course that of the intruder
+    against the ownship's, all at that time.
     """
 
     weight: FloatArray
@@ -108,17 +100,10 @@ def closest_approaches(found: EncounterSet, places: Sequence[int]) -> Closest:
 
 
 def _closest(found: EncounterSet, place: int) -> tuple[float, ...]:
-    first, end = (int(found.first_rows[place + k]) for k in (0, 1))
-    own = np.stack(found.path(first))
     best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
-    for row in range(first + 1, end):
-        other = np.stack(found.path(row))
-        low, high = max(own[0, 0], other[0, 0]), min(own[0, -1], other[0, -1])
-        both = np.union1d(own[0], other[0])
-        both = both[(both >= low) & (both <= high)]
+    for both, a, b in found.together(place):
         if len(both) < 2:
             continue
-        a, b = (np.array([np.interp(both, p[0], p[k]) for k in (1, 2, 3)]) for p in (own, other))
         apart, step = b - a, np.diff(b - a)
         length = (step * step).sum(axis=0)
         share = -(apart[:, :-1] * step).sum(axis=0) / np.where(length > 0.0, length, 1.0)

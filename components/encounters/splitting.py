@@ -12,6 +12,8 @@ Standards AMS 12, 1951; P. Glasserman, P. Heidelberger, P. Shahabuddin & T. Zaji
 splitting for estimating rare event probabilities", Operations Research 47, 1999.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from components.encounters.sampling import EncounterDraws
@@ -54,29 +56,14 @@ def split_set(found: EncounterSet, expected: FloatArray, seed: int) -> Encounter
     """Return a set of copies, numbered from 0, that know their family."""
     many = drawn_copies(found.numbers, expected, seed)
     places = np.repeat(np.arange(len(found)), many)
-    counts = np.diff(found.first_rows)
-    rows = _runs(found.first_rows[:-1][places], counts[places])
-    lengths = np.diff(found.starts)
-    entries = _runs(found.starts[:-1][rows], lengths[rows])
     family: AnyArray = found.extra.get(FAMILY, found.numbers)
-    return EncounterSet(
-        found.source, found.kind, np.arange(len(places)), (found.weights / expected)[places],
-        np.concatenate([[0], np.cumsum(counts[places])]),
-        tuple(found.names[row] for row in rows.tolist()),
-        {name: values[rows] for name, values in found.state.items()},
-        np.concatenate([[0], np.cumsum(lengths[rows])]),
-        {name: values[entries] for name, values in found.lists.items()},
-        found.reference_deg,
-        {n: v[places] for n, v in found.extra.items()} | {FAMILY: family[places]}, found.skipped,
-    )  # fmt: skip
-
-
-def _runs(firsts: IntArray, lengths: IntArray) -> IntArray:
-    """Return first, first + 1, ... of every run, one run after the other."""
-    ends = np.cumsum(lengths)
-    total = int(ends[-1]) if len(ends) else 0
-    found: IntArray = np.arange(total) + np.repeat(firsts - (ends - lengths), lengths)
-    return found
+    made = found.take(places)
+    return replace(
+        made,
+        numbers=np.arange(len(places)),
+        weights=(found.weights / expected)[places],
+        extra=made.extra | {FAMILY: family[places]},
+    )
 
 
 def nearness(found: EncounterSet, place: int) -> float:
@@ -86,20 +73,10 @@ def nearness(found: EncounterSet, place: int) -> float:
     distance over 500 ft and vertical distance over 100 ft; below 1 there is an NMAC. What happens
     between two samples is left out: it is a score, and no estimate rests on it.
     """
-    first, end = (int(found.first_rows[place + k]) for k in (0, 1))
-    own = found.path(first)
     best = np.inf
-    for row in range(first + 1, end):
-        other = found.path(row)
-        times = np.union1d(own[0], other[0])
-        times = times[(times >= max(own[0][0], other[0][0]))
-                      & (times <= min(own[0][-1], other[0][-1]))]  # fmt: skip
-        if not len(times):
-            continue
-        apart = [
-            np.interp(times, other[0], other[k]) - np.interp(times, own[0], own[k])
-            for k in (1, 2, 3)
-        ]
-        horizontal = np.hypot(apart[0], apart[1]) / _NMAC.horizontal_m
-        best = min(best, float(np.maximum(horizontal, np.abs(apart[2]) / _NMAC.vertical_m).min()))
+    for times, own, other in found.together(place):
+        if len(times):
+            north, east, up = other - own
+            horizontal = np.hypot(north, east) / _NMAC.horizontal_m
+            best = min(best, float(np.maximum(horizontal, np.abs(up) / _NMAC.vertical_m).min()))
     return best

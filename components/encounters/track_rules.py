@@ -29,11 +29,10 @@ from components.encounters.model import (
     EncounterModel,
 )
 from components.encounters.sampling import SampledTracks, TrackSampler
-from components.flights.point_mass import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
+from components.flights.point_mass import DYNAMICS, FT_S_PER_KT, FlownTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 
-DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
 _SHARES = (0.01, 0.99)
 _SLOWEST_FIXED_WING_FT_S = 30.0
 _MOST_ATTEMPTS = 2000
@@ -49,13 +48,7 @@ class TrackError(ValueError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What sampled tracks command, ready to be flown.
-
-    Parameters
-    ----------
-    altitude_ft, speed_ft_s : (tracks,)
-    acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
-    """
+    """What sampled tracks command, ready to be flown: (tracks,), and (seconds + 1, tracks)."""
 
     altitude_ft: FloatArray
     speed_ft_s: FloatArray

@@ -194,13 +194,7 @@ def _held(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind that is the same everywhere and always.
-
-    Parameters
-    ----------
-    east_mps, north_mps : float
-        Where the air goes.
-    """
+    """A wind that is the same everywhere and always: where the air goes."""
 
     east_mps: float
     north_mps: float

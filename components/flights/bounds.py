@@ -39,15 +39,8 @@ _POSITION_MARGIN_M = 1.0
 class TrafficEnvelope:
     """What the targets that come in reach, and the ownship, can do over a run.
 
-    Parameters
-    ----------
-    range_m : float
-        Longest line of sight within reach; 0 if no target ever comes in reach.
-    own_lat_deg, own_alt_m, target_alt_m : (low, high)
-    elevation_rad : float
-        Largest size of an elevation above the ownship's horizon, of targets in reach.
-    pitch_rad, roll_rad : float
-        Largest sizes of the ownship's pitch and roll.
+    Sizes of angles are the largest, elevations above the ownship's horizon; `range_m` is the
+    longest line of sight within reach, 0 if no target ever comes in reach.
     """
 
     range_m: float
@@ -124,11 +117,14 @@ def _moves_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
 
 
+def _once_a_second(own_at: FlightAt, duration_s: float) -> tuple[FloatArray, TrajectoryState]:
+    times = np.linspace(0.0, duration_s, min(math.ceil(duration_s), _MOST_SAMPLES) + 1)
+    return times, own_at(times)
+
+
 def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
     """Refuse terrain that the ownship does not fly above."""
-    count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
-    times = np.linspace(0.0, duration_s, count)
-    state = own_at(times)
+    times, state = _once_a_second(own_at, duration_s)
     hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
     if len(hit):
         first = hit[0]
@@ -142,9 +138,7 @@ def check_on_raster(
     own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
     """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
-    count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
-    times = np.linspace(0.0, duration_s, count)
-    state = own_at(times)
+    times, state = _once_a_second(own_at, duration_s)
     there = np.flatnonzero(state.present)
     ground, inside = raster.height(state.lat_deg[there], state.lon_deg[there])
     if len(there) and not inside.any():

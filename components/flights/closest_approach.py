@@ -52,14 +52,7 @@ class SampleTimes(Protocol):
 
 @dataclass(frozen=True)
 class RegularTimes:
-    """Every target's times are one grid: 0, step, 2 step, ...
-
-    Parameters
-    ----------
-    step_s : float
-    duration_s : float
-        The last time does not lie after it by more than rounding.
-    """
+    """Every target's times are one grid: 0, step, 2 step, ... to the duration, up to rounding."""
 
     step_s: float
     duration_s: float
@@ -86,13 +79,7 @@ class RegularTimes:
 
 @dataclass(frozen=True, eq=False)
 class SharedTimes:
-    """Every target has the same times.
-
-    Parameters
-    ----------
-    times_s : (samples,)
-        Ascending.
-    """
+    """Every target has the same times (samples,), ascending."""
 
     times_s: FloatArray
 
@@ -138,14 +125,9 @@ MOST_AT_ONCE = 32_768
 
 @dataclass(frozen=True, eq=False)
 class Approaches:
-    """The closest approach of each of many targets.
+    """The closest approach of each target: its time, and its slant range.
 
-    Parameters
-    ----------
-    time_s : (targets,)
-        NaN where target and ownship are never there together at any of the times.
-    range_m : (targets,)
-        Slant range; infinite there.
+    Where two are never there together at any of the times these are NaN and infinite.
     """
 
     time_s: FloatArray

@@ -23,18 +23,10 @@ _ROUNDS = 6
 
 @dataclass(frozen=True)
 class Approach:
-    """What two aircraft do at their closest approach; arrays over encounters.
+    """What two aircraft do at their closest approach; arrays (2, encounters), the ownship's first.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg : float
-        Where the ownship is then.
-    altitude_m, heading_rad, speed_mps, climb_mps : (2, n)
-        Ownship first: altitude of the ownship only counts.
-    horizontal_m, vertical_m : (n,)
-        Miss distances: to the right of the intruder's relative way where positive, seen from
-        above, and intruder above ownship.
-    sense : {"slant", "horizontal"}
+    The place is the ownship's, and its altitude alone counts. Miss distances (encounters,): to the
+    right of the intruder's relative way where positive, seen from above; intruder above ownship.
     """
 
     lat_deg: float

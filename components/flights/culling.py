@@ -15,7 +15,6 @@ import numpy as np
 
 from components.flights.fleet import Fleet
 from components.geometry.ellipsoid import line_of_sight
-from components.geometry.state import TrajectoryState
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5
@@ -170,15 +169,9 @@ class Culling:
     """
 
     def __init__(
-        self,
-        own: Any,
-        fleet: Fleet,
-        reach_m: float,
-        end_s: float,
-        lasts_s: float = 0.0,
+        self, own: Any, fleet: Fleet, reach_m: float, end_s: float, lasts_s: float = 0.0
     ) -> None:
-        self._fleet, self.lasts_s = fleet, lasts_s
-        self.reach_m = reach_m
+        self.reach_m, self.lasts_s = reach_m, lasts_s
         there = fleet.intervals_present_s
         first, last = own.interval_present()
         self.intervals: NearIntervals = near_intervals(
@@ -188,19 +181,10 @@ class Culling:
             reach_m=reach_m,
             end_s=end_s + lasts_s,
         )
-        self._last: tuple[IntArray, Any] | None = None
 
-    def active(self, first_s: float, last_s: float) -> tuple[IntArray, Any]:
-        """Return the targets that may come in reach between two times, and a fleet of them."""
-        columns = self.intervals.during(first_s, last_s + self.lasts_s)
-        if self._last is None or not np.array_equal(columns, self._last[0]):
-            self._last = columns, self._fleet.subset(columns)
-        return self._last
-
-    def cut(self, time_s: FloatArray) -> tuple[IntArray, Any, BoolArray]:
-        """Return the targets that may come in reach, a fleet of them, and when (rows, n)."""
-        columns, fleet = self.active(float(time_s.min()), float(time_s.max()))
-        return columns, fleet, self.near(columns, time_s)
+    def active(self, first_s: float, last_s: float) -> IntArray:
+        """Return the targets that may come in reach between two times, ascending."""
+        return self.intervals.during(first_s, last_s + self.lasts_s)
 
     def near(self, columns: IntArray, time_s: FloatArray) -> BoolArray:
         """Return which targets may come in reach during a look from each time on.
@@ -224,83 +208,74 @@ _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
 # Steering keeps the speed to 1e-4 unless another one is told.
 _OWN_SPEED_MARGIN = 1.05
-# Targets are placed for so many epochs at once that it takes about this many cells.
-_CELLS_AT_ONCE = 8192
-
-
-def closing_speeds_mps(targets_mps: FloatArray, own_mps: Any) -> FloatArray:
-    """Return how fast each target and a steered ownship can come nearer to each other."""
-    closing: FloatArray = (targets_mps + own_mps * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
-    return closing
-
-
-def epochs_of(closing_mps: FloatArray, reach_m: float) -> FloatArray:
-    """Return how long an epoch lasts around each ownship, of closing speeds (ownships, targets)."""
-    fastest = np.maximum(closing_mps.max(axis=1, initial=0.0), 1e-3)
-    return np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
-
-
-def within_of(closing_mps: FloatArray, reach_m: float, epoch_s: Any) -> FloatArray:
-    """Return how near at the start of an epoch counts for who closes in so fast."""
-    return np.asarray(reach_m + closing_mps * epoch_s + _RANGE_MARGIN_M)
 
 
 class SteeredCulling:
-    """The targets near an ownship that is steered, by epochs of time."""
+    """The targets near ownships that are steered, one in each run, by epochs of time.
 
-    def __init__(self, own_speed_mps: float, fleet: Fleet, reach_m: float) -> None:
-        self.reach_m, self._fleet = reach_m, fleet
-        self._speeds_mps, self._own_mps = fleet.max_speeds_mps, own_speed_mps
-        closing = closing_speeds_mps(self._speeds_mps, own_speed_mps)
-        self.epoch_s = float(epochs_of(closing[np.newaxis], reach_m)[0])
-        #: Ranges at the start of an epoch by its number, for one path of the ownship.
-        self._range_m: dict[int, FloatArray] = {}
-        self._own: Any = None
-        #: Where all targets are at the starts of some epochs, from the first of them on.
-        self._placed: tuple[int, Any] | None = None
-        self._most_epochs = max(1, _CELLS_AT_ONCE // max(1, len(fleet)))
-        self._last: tuple[IntArray, Any] = np.arange(len(fleet)), fleet
+    Parameters
+    ----------
+    own_mps : (runs,)
+        Largest speeds of the ownships before they are steered.
+    targets_mps : (runs, targets)
+        Those of the targets of each run.
+    reach_m : float
+    """
 
-    def cut(self, own: Any, time_s: FloatArray) -> tuple[Any, IntArray, Any, BoolArray]:
-        """Return the ownship's states, the targets that may be in reach, their fleet, and when."""
-        if own is not self._own:
-            self._own, self._range_m = own, {}
-        # By a row's own instant the ownship may have been told to fly faster.
-        fastest = np.maximum(own.fastest_by(time_s), self._own_mps)
-        of_rows = np.stack([np.floor(time_s / self.epoch_s), fastest])
-        pairs, of_row = np.unique(of_rows, axis=1, return_inverse=True)
-        of_row = of_row.reshape(-1)
-        numbers = pairs[0].astype(np.int64).tolist()
-        new = sorted({number for number in numbers if number not in self._range_m})
-        # One call for the rows and the epochs: a steered flight has many parts to go through.
-        both = own.at(np.concatenate([time_s, np.array(new) * self.epoch_s]))
-        rows = len(time_s)
-        state = TrajectoryState(*(values[:rows] for values in both.arrays()))
-        here = [both.lat_deg[rows:], both.lon_deg[rows:], both.alt_m[rows:]]
-        self._learn(np.array(new, dtype=np.int64), here)
-        closing = closing_speeds_mps(self._speeds_mps, pairs[1][:, np.newaxis])
-        within_m = within_of(closing, self.reach_m, self.epoch_s)
-        near = np.array([self._range_m[number] for number in numbers]) <= within_m
-        columns = np.flatnonzero(near.any(axis=0))
-        if not np.array_equal(columns, self._last[0]):
-            self._last = columns, self._fleet.subset(columns)
-        return state, columns, self._last[1], near[:, columns][of_row]
+    def __init__(self, own_mps: FloatArray, targets_mps: FloatArray, reach_m: float) -> None:
+        self._own_mps, self._targets_mps, self.reach_m = own_mps, targets_mps, reach_m
+        fastest = self._closing_mps(targets_mps, own_mps).max(axis=1, initial=1e-3)
+        #: How long an epoch lasts around each ownship.
+        self.epoch_s: FloatArray = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
+        # The last epoch that is known of each run, and ranges at its start.
+        self._last: IntArray = np.full(len(own_mps), -1, dtype=np.int64)
+        self._range_m: FloatArray = np.zeros_like(targets_mps)
 
-    def _learn(self, epochs: IntArray, here: list[FloatArray]) -> None:
-        """Find who may come in reach in some epochs, given where the ownship starts each."""
-        while len(epochs):
-            first, others = self._placed or (0, None)
-            if others is None or not first <= epochs[0] < first + self._most_epochs:
-                first = int(epochs[0])
-                others = self._fleet.at((first + np.arange(self._most_epochs)) * self.epoch_s)
-                self._placed = first, others
-            known = int(np.searchsorted(epochs, first + self._most_epochs))
-            row = epochs[:known] - first
-            own_lat, own_lon, own_alt = (values[:known, np.newaxis] for values in here)
-            _, _, range_m = line_of_sight(
-                own_lat, own_lon, own_alt,
-                others.lat_deg[row], others.lon_deg[row], others.alt_m[row],
-                validate=False,
-            )  # fmt: skip
-            self._range_m.update(zip(epochs[:known].tolist(), range_m, strict=True))
-            epochs, here = epochs[known:], [values[known:] for values in here]
+    @staticmethod
+    def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
+        """Return how fast ownships (n,) and targets (n, targets) can come nearer to each other."""
+        return np.asarray(
+            (targets_mps + own_mps[:, np.newaxis] * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
+        )
+
+    def forget(self, run: IntArray) -> None:
+        """Take note that the ownships of some runs fly on otherwise than was known."""
+        self._last[run] = -1
+
+    def near(
+        self,
+        run: IntArray,
+        time_s: FloatArray,
+        told_mps: FloatArray,
+        range_m: Callable[[IntArray, IntArray, FloatArray], FloatArray],
+    ) -> BoolArray:
+        """Return which targets may be in reach at each row, (rows, targets).
+
+        Parameters
+        ----------
+        run, time_s : (rows,)
+            Ascending by run.
+        told_mps : (rows,)
+            Largest speed that the ownship was told to fly by then, or 0.
+        range_m : callable
+            Gives the ranges from ownships to targets of runs, numbered through, at times, all (n,).
+        """
+        width = self._targets_mps.shape[1]
+        epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
+        fastest = np.maximum(told_mps, self._own_mps[run])
+        begins = np.ones(len(run), dtype=bool)
+        begins[1:] = (run[1:] != run[:-1]) | (epoch[1:] != epoch[:-1])
+        begins[1:] |= fastest[1:] != fastest[:-1]
+        first = np.flatnonzero(begins)
+        of, number = run[first], epoch[first]
+        found = self._range_m[of]
+        new = np.flatnonzero(self._last[of] != number)
+        if len(new):
+            target = (of[new][:, np.newaxis] * width + np.arange(width)).reshape(-1)
+            start_s = np.repeat(number[new] * self.epoch_s[of[new]], width)
+            ranges = range_m(np.repeat(of[new], width), target, start_s)
+            found[new] = ranges.reshape(len(new), width)
+        self._last[of], self._range_m[of] = number, found
+        closing = self._closing_mps(self._targets_mps[of], fastest[first])
+        within_m = self.reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
+        return np.asarray((found <= within_m)[np.cumsum(begins) - 1])

@@ -41,17 +41,9 @@ Rates = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class FlownTracks:
-    """Flights of many tracks; arrays (instants, tracks).
+    """Flights of many tracks, (instants, tracks), `step_s` apart from 0 on, from where they begin.
 
-    Parameters
-    ----------
-    step_s : float
-        Between two instants; the first is 0.
-    north_ft, east_ft, up_ft : array
-        From where the track begins; up is the altitude.
-    speed_ft_s, heading_rad, climb_ft_s : array
-        True airspeed, and heading clockwise from north.
-    pitch_rad, bank_rad : array
+    Up is the altitude, speed the true airspeed; headings are clockwise from north.
     """
 
     step_s: float
@@ -160,6 +152,10 @@ def fly_point_mass(
     return FlownTracks(STEP_S, north, east, up, speed, heading, climb, pitch, bank)
 
 
+#: The two ways, by their names in scenes and on the command line.
+DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
+
+
 def eased_turn(
     left_rad: float,
     left_before_rad: float,
@@ -170,28 +166,13 @@ def eased_turn(
 ) -> Rates:
     """Return the rates of a turn to a heading, step by step.
 
-    A step of Euler moves along the heading at its beginning, which is half a step old: so the rates
-    begin half a step later, and path and heading agree to second order.
+    Once a second the pilot commands a rate in proportion to what was left to turn a second ago
+    (`left_before_rad`, positive to the right as `left_rad` is), up to the largest; within
+    `eases_rad` of the heading it falls, at least `LEAST_EASING_S` at the largest rate, or the turn
+    would not settle. The bank follows as that of `fly_point_mass`, in level flight at a ground
+    speed above 0. A step of Euler moves along the heading at its beginning, which is half a step
+    old: so the rates begin half a step later, and path and heading agree to second order.
 
-    Once a second the pilot commands a rate in proportion to what was left to turn a second ago, up
-    to the largest; the bank follows as that of `fly_point_mass`, in level flight.
-
-    Parameters
-    ----------
-    left_rad, left_before_rad : float
-        What is left to turn, positive to the right: now, and a second ago.
-    rate_rad_s : float
-        Rate of the turn that is under way.
-    speed_mps : float
-        Over ground, above 0.
-    most_rad_s : float
-        Largest rate that is commanded.
-    eases_rad : float
-        Within so much of the heading the rate falls in proportion; at least `LEAST_EASING_S` at the
-        largest rate, or the turn would not settle.
-
-    Notes
-    -----
     Bank and roll: em-core of MIT Lincoln Laboratory; the command: as its pilot model (release 6)
     flies, recorded once a second.
     """

@@ -70,26 +70,10 @@ class RadarPlots:
 def read_asterix(path: str | PathLike[str], ownship: str | None = None) -> TrafficFile:
     """Read the aircraft of an ASTERIX file: system tracks (062) and ADS-B reports (021).
 
-    Parameters
-    ----------
-    path : path-like
-        Data blocks, one after the other.
-    ownship : str, optional
-        Identification of the ownship, or ``"SAC/SIC/number"`` of one that has none; left out, the
-        aircraft called ``OWNSHIP``, or else the first one.
-
-    Returns
-    -------
-    TrafficFile
-        Times count from the earliest record; they go on over midnight. Heights are geometric ones
-        where a record has one, else flight levels, both taken as heights above the ellipsoid.
-
-    Raises
-    ------
-    TrafficFileError
-        With all problems of the file, by their records.
-    UsageError
-        The extra ``asterix`` is not installed.
+    The ownship is said by its identification, or as ``"SAC/SIC/number"`` where it has none; left
+    out, it is the aircraft called ``OWNSHIP``, or else the first one. Times count from the earliest
+    record and go on over midnight. Heights are geometric ones where a record has one, else flight
+    levels. All that is wrong is one `TrafficFileError`, by records.
     """
     records, notes = _records(path)
     problems = Problems(str(path), of="record")

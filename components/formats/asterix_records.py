@@ -132,10 +132,7 @@ def callsign(name: str) -> str | None:
 def write_records(records: Sequence[AsterixRecord]) -> bytes:
     """Return records as data blocks, in order of time; those of one instant share blocks.
 
-    Raises
-    ------
-    UsageError
-        A quantity does not fit into its bits, or the extra ``asterix`` is not installed.
+    UsageError says which quantity does not fit into its bits.
     """
     cats = _categories()
     blocks: list[tuple[tuple[int, float], list[Any]]] = []
@@ -266,12 +263,7 @@ def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
 def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
     """Return the records of the categories that we know, in the order of the file, and notes.
 
-    Raises
-    ------
-    TrafficFileError
-        What is no data block or no record, with the byte at which it begins.
-    UsageError
-        The extra ``asterix`` is not installed.
+    TrafficFileError says at which byte what is no data block or no record begins.
     """
     cats = _categories()
     records: list[AsterixRecord] = []

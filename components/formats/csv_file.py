@@ -11,9 +11,13 @@ from pathlib import Path
 
 from components.formats.sample_table import (
     UNITS,
+    VELOCITIES,
+    ColumnSpec,
     SampleColumn,
     SampleTable,
+    complete_velocity,
     enu_velocity,
+    places_of,
     unit_factor,
 )
 from components.formats.text_rows import (
@@ -30,68 +34,38 @@ from components.geometry.angles import FloatArray
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
 
-# Earlier names win where a file has several.
-HEADERS = {
-    "id": (
-        "id",
-        "name",
-        "icao24",
-        "icao",
-        "callsign",
-        "hex",
-        "aircraft",
-        "acid",
-        "flight",
-        "ident",
-    ),
-    "time": ("time", "timestamp", "t", "posixtime", "unixtime", "utc"),
-    "lat": ("lat", "latitude"),
-    "lon": ("lon", "long", "lng", "longitude"),
-    "alt": ("alt", "altitude", "geoaltitude", "altgeom", "height", "baroaltitude", "altbaro"),
-    "yaw": ("heading", "yaw", "trueheading"),
-    "pitch": ("pitch",),
-    "roll": ("roll", "bank"),
-    "trk": ("track", "trk", "truetrack"),
-    "gs": ("gs", "groundspeed", "velocity", "speed"),
-    "vs": ("vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate"),
-    "vx": ("vx",),
-    "vy": ("vy",),
-    "vz": ("vz",),
+_ALTITUDES = ("alt", "altitude", "geoaltitude", "altgeom", "height", "baroaltitude", "altbaro")
+_CLIMBS = ("vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate")
+_IDENTITIES = (
+    "id", "name", "icao24", "icao", "callsign", "hex", "aircraft", "acid", "flight", "ident",
+)  # fmt: skip
+_TIMES = ("time", "timestamp", "t", "posixtime", "unixtime", "utc")
+COLUMNS = {
+    "id": ColumnSpec(_IDENTITIES, required=True),
+    "time": ColumnSpec(_TIMES, "s", required=True),
+    "lat": ColumnSpec(("lat", "latitude"), "deg", required=True),
+    "lon": ColumnSpec(("lon", "long", "lng", "longitude"), "deg", required=True),
+    "alt": ColumnSpec(_ALTITUDES, "m", required=True),
+    "yaw": ColumnSpec(("heading", "yaw", "trueheading"), "deg"),
+    "pitch": ColumnSpec(("pitch",), "deg"),
+    "roll": ColumnSpec(("roll", "bank"), "deg"),
+    "trk": ColumnSpec(("track", "trk", "truetrack"), "deg"),
+    "gs": ColumnSpec(("gs", "groundspeed", "velocity", "speed"), "m/s"),
+    "vs": ColumnSpec(_CLIMBS, "m/s"),
+    **{name: ColumnSpec((name,), "m/s") for name in VELOCITIES[0]},
 }
-REQUIRED = ("time", "id", "lat", "lon", "alt")
-DEFAULT_UNITS = {"time": "s", "alt": "m", "gs": "m/s", "vs": "m/s"} | dict.fromkeys(
-    ("vx", "vy", "vz"), "m/s"
-)
 
 
 def read_csv(path: str | PathLike[str], ownship: str | None = None) -> TrafficFile:
     """Read a CSV file with columns for time, id, latitude, longitude and altitude.
 
-    Parameters
-    ----------
-    path : path-like
-        The file; separated by commas, semicolons, tabs or blanks; cells may be quoted.
-    ownship : str, optional
-        The ownship's id; left out, the first aircraft in the file.
-
-    Returns
-    -------
-    TrafficFile
-        Times count from the earliest sample.
-
-    Raises
-    ------
-    TrafficFileError
-        With all problems of the file (up to 20): line, column, value, what is allowed.
-
-    Notes
-    -----
-    Header names are matched without regard to case, blanks and underscores, and may carry their
-    unit: ``alt_ft``, ``Altitude (ft)``, ``time [ms]``. Without a unit: seconds, degrees, metres,
-    m/s. Time is a number or ISO 8601 (UTC unless it says otherwise). Rows in which latitude,
-    longitude and altitude are all empty (receivers that log velocity messages) are skipped.
-    Heading, pitch and roll are used where given and derived from the path where not; altitude
-    is taken as the height above the ellipsoid.
+    It is separated by commas, semicolons, tabs or blanks; cells may be quoted. Header names are
+    matched without regard to case, blanks and underscores, and may carry their unit: ``alt_ft``,
+    ``Altitude (ft)``, ``time [ms]``; without one they are in seconds, degrees, metres, m/s. Time is
+    a number or ISO 8601 (UTC unless it says otherwise). Rows in which latitude, longitude and
+    altitude are all empty (receivers that log velocity messages) are skipped. Heading, pitch and
+    roll are used where given. The ownship is the first aircraft unless its id is given; all that is
+    wrong is one `TrafficFileError`.
     """
     problems = Problems(str(path))
     lines = read_lines(Path(path), problems)
@@ -139,38 +113,31 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
     parsed = [_name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
     found: dict[str, SampleColumn] = {}
-    ours = {alias for aliases in HEADERS.values() for alias in aliases}
-    shown = shown_columns(headers, not ours.isdisjoint(names))
-    for quantity, aliases in HEADERS.items():
-        index = next((names.index(alias) for alias in aliases if alias in names), None)
-        if index is None:
-            if quantity in REQUIRED:
+    places = places_of(COLUMNS, names)
+    shown = shown_columns(headers, bool(places))
+    for quantity, spec in COLUMNS.items():
+        if quantity not in places:
+            if spec.required:
                 hint = did_you_mean(quantity, names).replace("did you mean", "is it")
                 problems.add(
                     f"there is no column {quantity!r} among {shown}{hint}; accepted names are "
-                    f" {', '.join(aliases)}",
+                    f" {', '.join(spec.names)}",
                     line=line,
                 )
             continue
-        unit = parsed[index][1] or DEFAULT_UNITS.get(quantity, "deg")
+        index = places[quantity]
         factor = 1.0
         if quantity in UNITS:
+            unit = parsed[index][1] or spec.unit
             factor = unit_factor(problems, quantity, unit, line=line, header=headers[index])
         found[quantity] = SampleColumn(index, headers[index], factor)
     problems.raise_if_any()
-    # Velocity counts only when it is complete; half of one is no use.
-    if not all(q in found for q in ("vx", "vy", "vz")):
-        if "trk" not in found and "yaw" in found and "gs" in found and "vs" in found:
-            # Receivers that log velocity call the track "heading".
-            found["trk"] = found["yaw"]
-        if not all(q in found for q in ("trk", "gs", "vs")):
-            for quantity in ("trk", "gs", "vs"):
-                found.pop(quantity, None)
-        for quantity in ("vx", "vy", "vz"):
-            found.pop(quantity, None)
-    else:
-        for quantity in ("trk", "gs", "vs"):
-            found.pop(quantity, None)
+    if "trk" not in found and not complete_velocity(found) and "yaw" in found:
+        # Receivers that log velocity call the track "heading".
+        found["trk"] = found["yaw"]
+    kept = complete_velocity(found)
+    for quantity in {q for parts in VELOCITIES for q in parts} - set(kept):
+        found.pop(quantity, None)
     return found
 
 
@@ -209,11 +176,6 @@ def _time_parser(column: SampleColumn) -> Callable[[str], float]:
 def csv_columns() -> list[tuple[str, ...]]:
     """Return quantity, accepted names, unit by default, and whether it is needed."""
     return [
-        (
-            quantity,
-            ", ".join(names),
-            DEFAULT_UNITS.get(quantity, "" if quantity == "id" else "deg"),
-            "yes" if quantity in REQUIRED else "",
-        )
-        for quantity, names in HEADERS.items()
+        (quantity, ", ".join(spec.names), spec.unit, "yes" if spec.required else "")
+        for quantity, spec in COLUMNS.items()
     ]

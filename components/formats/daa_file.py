@@ -10,9 +10,12 @@ import numpy as np
 
 from components.formats.sample_table import (
     UNITS,
+    ColumnSpec,
     SampleColumn,
     SampleTable,
+    complete_velocity,
     enu_velocity,
+    places_of,
     unit_factor,
 )
 from components.formats.text_rows import (
@@ -33,59 +36,38 @@ from components.geometry.ellipsoid import enu_to_geodetic
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
 
-HEADERS = {
-    "name": ("name", "id", "aircraft", "acid", "callsign", "ident"),
-    "time": ("time", "t", "clock"),
-    "lat": ("lat", "latitude"),
-    "lon": ("lon", "long", "longitude", "lng"),
-    "alt": ("alt", "altitude"),
-    "sx": ("sx", "x"),
-    "sy": ("sy", "y"),
-    "sz": ("sz", "z"),
-    "trk": ("trk", "track"),
-    "gs": ("gs", "groundspeed", "ground_speed"),
-    "vs": ("vs", "verticalspeed", "vertical_speed"),
-    "vx": ("vx",),
-    "vy": ("vy",),
-    "vz": ("vz",),
+# Units are what DAIDALUS itself assumes where a file has no row of units.
+COLUMNS = {
+    "name": ColumnSpec(("name", "id", "aircraft", "acid", "callsign", "ident")),
+    "time": ColumnSpec(("time", "t", "clock"), "s"),
+    "lat": ColumnSpec(("lat", "latitude"), "deg"),
+    "lon": ColumnSpec(("lon", "long", "longitude", "lng"), "deg"),
+    "alt": ColumnSpec(("alt", "altitude"), "ft"),
+    "sx": ColumnSpec(("sx", "x"), "nmi"),
+    "sy": ColumnSpec(("sy", "y"), "nmi"),
+    "sz": ColumnSpec(("sz", "z"), "ft"),
+    "trk": ColumnSpec(("trk", "track"), "deg"),
+    "gs": ColumnSpec(("gs", "groundspeed", "ground_speed"), "knot"),
+    "vs": ColumnSpec(("vs", "verticalspeed", "vertical_speed"), "fpm"),
+    "vx": ColumnSpec(("vx",), "knot"),
+    "vy": ColumnSpec(("vy",), "knot"),
+    "vz": ColumnSpec(("vz",), "fpm"),
 }
 # Where the nose points, which the track does not say in wind; and what alerting reads besides:
 # which alerter an intruder belongs to, and standard deviations; those of "en" are signed square
 # roots of the covariances of east and north.
-EXTRA_HEADERS = {
-    "yaw": ("heading", "hdg", "true_heading", "trueheading", "yaw"),
-    "airspeed": ("airspeed", "air_speed", "tas", "true_airspeed"),
-    "alerter": ("alerter",),
+EXTRA_COLUMNS = {
+    "yaw": ColumnSpec(("heading", "hdg", "true_heading", "trueheading", "yaw"), "deg"),
+    "airspeed": ColumnSpec(("airspeed", "air_speed", "tas", "true_airspeed"), "knot"),
+    "alerter": ColumnSpec(("alerter",)),
     **{
-        name: (name,)
-        for kind in ("s", "v")
+        name: ColumnSpec((name,), unit)
+        for kind, unit in (("s", "m"), ("v", "m/s"))
         for name in (*(f"{kind}_{axes}_std" for axes in ("ew", "ns", "en")), f"{kind}z_std")
     },
 }
-# What DAIDALUS itself assumes where a file has no row of units.
-DEFAULT_UNITS = {
-    "time": "s",
-    "lat": "deg",
-    "lon": "deg",
-    "alt": "ft",
-    "sx": "nmi",
-    "sy": "nmi",
-    "sz": "ft",
-    "trk": "deg",
-    "gs": "knot",
-    "vs": "fpm",
-    "vx": "knot",
-    "vy": "knot",
-    "vz": "fpm",
-    "yaw": "deg",
-    "airspeed": "knot",
-    "alerter": "",
-    **{f"{name}_std": "m" for name in ("s_ew", "s_ns", "s_en", "sz")},
-    **{f"{name}_std": "m/s" for name in ("v_ew", "v_ns", "v_en", "vz")},
-}
 # Extras that are no error where they cannot be read: files in the wild hold gaps there.
 _OPTIONAL = frozenset({"yaw", "airspeed"})
-_VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
 
 
 def read_daa(
@@ -97,34 +79,15 @@ def read_daa(
 ) -> TrafficFile:
     """Read a `.daa` or `.xyz` file: one row of names, one of units, then samples.
 
-    Parameters
-    ----------
-    path : path-like
-        The file. Which of the two kinds it is shows in its columns, not in its name.
-    reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        Where on Earth the origin of an `.xyz` file is put. Its sx and sy are east and north in
-        the tangent plane there, its sz is the altitude above the reference: aircraft at one sz
-        are level with each other, however far apart.
-
-    Returns
-    -------
-    TrafficFile
-        The first aircraft named is the ownship. Times count from the earliest sample.
-
-    Raises
-    ------
-    TrafficFileError
-        With all problems of the file (up to 20): line, column, value, what is allowed.
-
-    Notes
-    -----
-    Columns may come in any order; only name, time and position are required. Velocity is taken
-    from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there. A column `heading`
-    is where the nose points, from true north; an aircraft whose column has gaps, or a column that
-    is in no unit of angle, is read without it. All other columns are ignored. Commas, semicolons,
-    tabs and blanks separate, also mixed. A file without a row of units is read with those of
-    DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the notes. Altitudes are taken as
-    heights above the ellipsoid.
+    Which of the two kinds it is shows in its columns, not in its name. The reference point (deg, m)
+    is where the origin of an `.xyz` file is put: its sx and sy are east and north in the tangent
+    plane there, its sz is the altitude above it, so that aircraft at one sz are level however far
+    apart. Columns may come in any order; only name, time and position are required. Velocity is
+    taken from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there. A column
+    `heading` is where the nose points, from true north; an aircraft whose column has gaps, or a
+    column that is in no unit of angle, is read without it. Without a row of units those of
+    DAIDALUS are taken, which the notes say. The first aircraft named is the ownship; all that is
+    wrong is one `TrafficFileError`.
     """
     table, columns = _table(path, ("yaw",))
     notes = table.notes
@@ -197,12 +160,7 @@ def _find_columns(
 ) -> dict[str, int]:
     """Find which column holds what; a missing required one ends the reading."""
     plain = [header.lower() for header in headers]
-    places: dict[str, int] = {}
-    accepted = {**HEADERS, **{quantity: EXTRA_HEADERS[quantity] for quantity in extra}}
-    for quantity, names in accepted.items():
-        for name in names:
-            if name in plain and quantity not in places:
-                places[quantity] = plain.index(name)
+    places = places_of({**COLUMNS, **{q: EXTRA_COLUMNS[q] for q in extra}}, plain)
     offsets = any(q in places for q in ("sx", "sy", "sz")) and "lat" not in places
     required = ("name", "time", *(("sx", "sy", "sz") if offsets else ("lat", "lon", "alt")))
     unused = [h for i, h in enumerate(plain) if i not in places.values()]
@@ -223,10 +181,7 @@ def _find_columns(
 def _wanted(places: dict[str, int]) -> list[str]:
     """List the quantities to read: time, position and one complete velocity."""
     wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in places]
-    for velocity in _VELOCITIES:
-        if all(q in places for q in velocity):
-            return wanted + list(velocity)
-    return wanted
+    return [*wanted, *complete_velocity(places)]
 
 
 def _find_units(
@@ -237,7 +192,8 @@ def _find_units(
     notes: list[str],
 ) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
     """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
-    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in DEFAULT_UNITS.items()}
+    assumed = {q: spec.unit for q, spec in (COLUMNS | EXTRA_COLUMNS).items() if q != "name"}
+    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in assumed.items()}
     if not lines:
         problems.fail("there are no samples after the row of column names")
     line, text = lines[0]
@@ -245,7 +201,7 @@ def _find_units(
     bracketed = "[" in text
     known = sum(clean_token(token) in ALL_TOKENS for token in row)
     if not bracketed and known < max(2, len(row) // 2):
-        used = [f"{headers[places[q]]} [{u}]" for q, u in DEFAULT_UNITS.items() if q in places]
+        used = [f"{headers[places[q]]} [{u}]" for q, u in assumed.items() if q in places]
         notes.append(f"there is no row of units; assumed {', '.join(used)}")
         return defaults, lines
     if len(row) != len(headers):
@@ -304,6 +260,6 @@ def _geodetic(
 def daa_columns() -> list[tuple[str, ...]]:
     """Return quantity, accepted names, and unit by default."""
     return [
-        (quantity, ", ".join(names), DEFAULT_UNITS.get(quantity, ""))
-        for quantity, names in (*HEADERS.items(), ("yaw", EXTRA_HEADERS["yaw"]))
+        (quantity, ", ".join(spec.names), spec.unit)
+        for quantity, spec in (*COLUMNS.items(), ("yaw", EXTRA_COLUMNS["yaw"]))
     ]

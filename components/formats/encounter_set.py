@@ -5,12 +5,12 @@ an initial state and *events* (climb, turn and acceleration, held from an instan
 *track*. Lists of all rows lie end to end in flat arrays, cut by `starts`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from components.flights.point_mass import fly_euler, fly_point_mass
+from components.flights.point_mass import DYNAMICS
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
@@ -20,7 +20,6 @@ LISTS = {
     EVENTS: ("time_s", "climb_mps", "turn_rad_s", "acceleration_mps2"),
     TRACKS: ("time_s", "north_m", "east_m", "altitude_m"),
 }
-DYNAMICS = ("euler", "point_mass")
 #: Sums of weights, and of their cubes, stay numbers.
 LARGEST_WEIGHT = 1e90
 
@@ -86,6 +85,45 @@ class EncounterSet:
             f"{self.numbers[0]} to {self.numbers[-1]}; the nearest is {close}"
         )
 
+    def take(self, places: IntArray) -> "EncounterSet":
+        """Return the encounters at some places, as often as each stands there."""
+        counts, lengths = np.diff(self.first_rows), np.diff(self.starts)
+        rows = _runs(self.first_rows[places], counts[places])
+        entries = _runs(self.starts[rows], lengths[rows])
+        return replace(
+            self,
+            numbers=self.numbers[places],
+            weights=self.weights[places],
+            first_rows=np.concatenate([[0], np.cumsum(counts[places])]),
+            names=tuple(self.names[row] for row in rows.tolist()),
+            state={name: values[rows] for name, values in self.state.items()},
+            starts=np.concatenate([[0], np.cumsum(lengths[rows])]),
+            lists={name: values[entries] for name, values in self.lists.items()},
+            extra={name: values[places] for name, values in self.extra.items()},
+        )
+
+    def without(self, places: Sequence[int]) -> "EncounterSet":
+        """Return the set without some encounters, which are counted."""
+        kept = self.take(np.delete(np.arange(len(self)), places))
+        return replace(kept, skipped=self.skipped + len(places))
+
+    def together(self, place: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        """Give for each intruder the times (n,) of both paths' samples at which both are there.
+
+        With them go north, east and altitude (3, n) of the ownship and of the intruder.
+        """
+        first, end = (int(self.first_rows[place + k]) for k in (0, 1))
+        own = self.path(first)
+        for row in range(first + 1, end):
+            other = self.path(row)
+            times = np.union1d(own[0], other[0])
+            low, high = max(own[0][0], other[0][0]), min(own[0][-1], other[0][-1])
+            times = times[(times >= low) & (times <= high)]
+            paths = [
+                [np.interp(times, path[0], path[k]) for k in (1, 2, 3)] for path in (own, other)
+            ]
+            yield times, np.array(paths[0]), np.array(paths[1])
+
     def path(
         self, row: int, dynamics: str = "euler"
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -122,8 +160,7 @@ def flown_events(
         for k, name in enumerate(LISTS[EVENTS][1:]):
             commands[k, :, column] = found.lists[name][at]
     climb, turn, acceleration = commands
-    fly = {"euler": fly_euler, "point_mass": fly_point_mass}[dynamics]
-    flown = fly(
+    flown = DYNAMICS[dynamics](
         state["altitude_m"] / FOOT_M,
         state["speed_mps"] / FOOT_M,
         acceleration_ft_s2=acceleration / FOOT_M,
@@ -138,6 +175,14 @@ def flown_events(
         state["east_m"] + flown.east_ft * FOOT_M,
         flown.up_ft * FOOT_M,
     )
+
+
+def _runs(firsts: IntArray, lengths: IntArray) -> IntArray:
+    """Return first, first + 1, ... of every run, one run after the other."""
+    ends = np.cumsum(lengths)
+    total = int(ends[-1]) if len(ends) else 0
+    found: IntArray = np.arange(total) + np.repeat(firsts - (ends - lengths), lengths)
+    return found
 
 
 NAMES = ("ownship", "intruder")

@@ -45,23 +45,11 @@ _FLAGS = {"true": 1.0, "false": 0.0, "1": 1.0, "0": 0.0}
 
 @dataclass(eq=False)
 class Measurements:
-    """Looks in the order of time, and what each detected.
+    """Looks in the order of time, and what each detected: entries of all looks end to end.
 
-    Parameters
-    ----------
-    time_s, arrival_s : (looks,) of float
-        When it was made, and when it came.
-    scan : (looks,) of int
-    offsets : (looks + 1,) of int
-        Entries ``offsets[i]:offsets[i + 1]`` belong to look i.
-    entries : dict of (entries,) of float
-        By column; NaN where a cell is empty. ``declared`` and ``cued`` are 0 or 1.
-    looks : dict of (looks,) of float
-        The ownship's pose and velocity, as far as the file says them.
-    target : tuple of str or None
-        Name of the target of each entry; None where the file says none.
-    where : tuple of str
-        Line or row of each entry, for messages.
+    Entries ``offsets[i]:offsets[i + 1]`` belong to look i, NaN where a cell is empty; ``declared``
+    and ``cued`` are 0 or 1. `looks` holds the ownship's pose and velocity, as far as the file says
+    them, `target` the names of targets, and `where` the line or row of each entry, for messages.
     """
 
     time_s: FloatArray
@@ -98,21 +86,11 @@ class _Table:
 
 
 def read_measurements(path: Path, block: str | None = None) -> Measurements:
-    """Return the looks of a sensor.
+    """Return the looks of a sensor; ValueError says all that is wrong, with its line or row.
 
-    Parameters
-    ----------
-    path : Path
-        A ``.parquet`` or CSV file of detections; the folder of a run: then empty looks and the
-        ownship's pose are those of its ``scans.parquet``; or an ASTERIX file (``.ast``) of plots,
-        whose angles are from north and level.
-    block : str, optional
-        Whose rows are read, where the file has a column ``block`` or more than one radar.
-
-    Raises
-    ------
-    ValueError
-        With the file, and the line or row of everything that is wrong.
+    The file is ``.parquet`` or CSV; the folder of a run, whose ``scans.parquet`` then says empty
+    looks and the ownship's pose; or ASTERIX (``.ast``), whose angles are from north and level.
+    `block` says whose rows are read, where there are several.
     """
     if path.suffix == ".ast":
         return _of_asterix(path, block)

@@ -7,12 +7,13 @@ k times four doubles (time in s, north, east, altitude).
 
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from components.formats.encounter_set import TRACKS, EncounterSet
-from components.formats.set_file import EncounterSetError, read_set, without
+from components.formats.encounter_set import NAMES, TRACKS, EncounterSet
+from components.formats.set_file import EncounterSetError, read_set
 from components.formats.track_files import (
     Track,
     Tracks,
@@ -86,7 +87,7 @@ def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int,
             rows = np.array([(0.0, *start), *np.reshape(values, (-1, 4)).tolist()])
             if updates and rows[1, 0] == 0.0:  # the start is there twice
                 rows = rows[1:]
-            name = "ownship" if n == 0 else "intruder" if n == 1 else f"intruder {n}"
+            name = NAMES[n] if n < 2 else f"intruder {n}"
             if not np.isfinite(rows).all():
                 damaged.setdefault(k, f"{name}: holds something else than numbers")
             elif (rows[:, 0] < 0.0).any():
@@ -146,7 +147,7 @@ def read_encounters(
     kinds = {path.suffix.lower() for path in paths}
     if kinds == {SET} and len(paths) == 1:
         found = read_set(paths[0], skip_damaged)
-        return found if at is None else EncounterSet(**{**vars(found), "reference_deg": at})
+        return found if at is None else replace(found, reference_deg=at)
     if len(paths) == 1 and kinds <= set(WAYPOINTS):
         return _waypoints(paths[0], at or (0.0, 0.0), skip_damaged)
     if not paths or not kinds <= {TEXT, TABLE, MATRIX}:
@@ -210,4 +211,4 @@ def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> Encou
         raise EncounterSetError(f"{path}: holds no encounter")
     every = range(len(encounters))
     found = set_of_tracks(str(path), every, np.ones(len(encounters)).tolist(), encounters, at)
-    return without(found, sorted(damaged)) if damaged else found
+    return found.without(sorted(damaged)) if damaged else found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,6 +68,29 @@ _SHORTEST_STEP_S = 1e-6
 _FASTEST_MPS = 1e6
 
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
+
+
+VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
+
+
+@dataclass(frozen=True)
+class ColumnSpec:
+    """A quantity: the names its column may have, earlier ones first, and its unit by default."""
+
+    names: tuple[str, ...]
+    unit: str = ""
+    required: bool = False
+
+
+def places_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
+    """Return in which column of a file each quantity stands that is there."""
+    found = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
+    return {quantity: names.index(name) for quantity, name in found.items() if name is not None}
+
+
+def complete_velocity(there: Collection[str]) -> tuple[str, ...]:
+    """Return the quantities of the first velocity that is complete: half of one is no use."""
+    return next((parts for parts in VELOCITIES if all(q in there for q in parts)), ())
 
 
 @dataclass(frozen=True)

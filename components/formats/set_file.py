@@ -23,7 +23,7 @@ from components.formats.encounter_set import (
     TRACKS,
     EncounterSet,
 )
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, status_of
 from dsa_des.files.output_file import temporary_beside
@@ -159,7 +159,7 @@ class _SetReader:
             str(self.path), self.kind, rows_of, weights[first], bounds, tuple(map(str, names)),
             flat, starts, lists, reference, extra,
         )  # fmt: skip
-        return without(found, sorted(said)) if said else found
+        return found.without(sorted(said)) if said else found
 
     def column(self, name: str) -> FloatArray:
         column = self.table[name]
@@ -280,26 +280,6 @@ class _SetReader:
             else self.column(name)[first]
             for name in there
         }
-
-
-def without(found: EncounterSet, places: list[int]) -> EncounterSet:
-    """Return a set without some encounters, which are counted."""
-    keep: BoolArray = np.ones(len(found), dtype=np.bool_)
-    keep[places] = False
-    counts = np.diff(found.first_rows)
-    rows = np.repeat(keep, counts)
-    lengths = np.diff(found.starts)
-    entries = np.repeat(rows, lengths)
-    return EncounterSet(
-        found.source, found.kind, found.numbers[keep], found.weights[keep],
-        np.concatenate([[0], np.cumsum(counts[keep])]),
-        tuple(name for name, kept in zip(found.names, rows, strict=True) if kept),
-        {name: values[rows] for name, values in found.state.items()},
-        np.concatenate([[0], np.cumsum(lengths[rows])]),
-        {name: values[entries] for name, values in found.lists.items()},
-        found.reference_deg, {name: values[keep] for name, values in found.extra.items()},
-        found.skipped + len(places),
-    )  # fmt: skip
 
 
 @contextmanager

@@ -103,18 +103,10 @@ class TrafficFileError(ValueError):
 
 @dataclass(frozen=True)
 class TrafficFile:
-    """The aircraft of a traffic file.
+    """The aircraft of a file: the ownship, and all others in the order in which it names them.
 
-    Parameters
-    ----------
-    ownship : SampledTrajectory
-        The first aircraft named in the file, or the one asked for.
-    intruders : list of SampledTrajectory
-        All others, in the order in which the file first names them.
-    start_time_s : float
-        The file's own time of its earliest sample. Times in the trajectories count from there.
-    notes : list of str
-        What was assumed, reordered or ignored.
+    Times count from the file's earliest sample, `start_time_s` of its own; `notes` says what was
+    assumed, reordered or ignored.
     """
 
     ownship: SampledTrajectory

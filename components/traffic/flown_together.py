@@ -15,13 +15,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
-from components.flights.culling import (
-    NearIntervals,
-    closing_speeds_mps,
-    epochs_of,
-    near_intervals,
-    within_of,
-)
+from components.flights.culling import NearIntervals, SteeredCulling, near_intervals
 from components.flights.fleet import Fleet
 from components.flights.many_flights import SteeredFleet, fleet_of
 from components.geometry.ellipsoid import line_of_sight
@@ -159,7 +153,7 @@ class FlownTogether:
         self._says_truth, self._asked_for = face.says_truth, face.flights_asked_for
         self._rates_hz = rates_hz
         self._intervals: NearIntervals | None = None
-        self._epochs: _Epochs | None = None
+        self._epochs: SteeredCulling | None = None
         #: Manoeuvres that have come and are not flown by any row yet, with their runs and ticks.
         self._pending: list[Coming] = []
         look = farthest_look(consumer.request for consumer in face.context.consumers)
@@ -170,7 +164,9 @@ class FlownTogether:
                 end_s = float(face.context.duration_s) + look.lasts_s
                 self._intervals = self._near_intervals(look.range_m, end_s)
             elif not self._asked_for:
-                self._epochs = _Epochs(self, flown, self._width, look.range_m)
+                runs = len(flown.own), self._width
+                speeds_mps = flown.targets.max_speeds_mps.reshape(runs)
+                self._epochs = SteeredCulling(flown.own.max_speeds_mps, speeds_mps, look.range_m)
 
     def _near_intervals(self, reach_m: float, end_s: float) -> NearIntervals:
         flown, width = self._flown, max(1, self._width)
@@ -195,10 +191,6 @@ class FlownTogether:
             validate=False,
         )[2]  # fmt: skip
 
-    def fastest_by(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return the largest speed that ownships (n,) were told to fly by times (n,), or 0."""
-        return self._own.fastest_by(ownship, time_s)
-
     def run(self, wake: Wake) -> TrafficStates:
         """Return the state of all aircraft of each row's replica."""
         replica, time_s = wake.run, wake.time_s
@@ -213,7 +205,8 @@ class FlownTogether:
         if self._intervals is not None:
             near = self._intervals.holds(each, times, times + self._lasts_s).reshape(shape)
         elif self._epochs is not None:
-            near = self._epochs.near(replica, time_s)
+            told_mps = self._own.fastest_by(replica, time_s)
+            near = self._epochs.near(replica, time_s, told_mps, self.range_m)
         culled = None
         if near is not None:
             present &= near
@@ -283,45 +276,6 @@ def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray
     place = np.minimum(np.searchsorted(ownship[order], replica), len(ownship) - 1)
     mine = order[place]
     return ((ownship[mine] == replica) & (ticks >= came[mine])).astype(np.int64)
-
-
-class _Epochs:
-    """Who may come in reach of an ownship that is steered; see `SteeredCulling`."""
-
-    def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
-        self._flights, self._width = flights, width
-        replicas = len(flown.own)
-        self._speeds_mps = flown.targets.max_speeds_mps.reshape(replicas, width)
-        self._own_mps, self._reach_m = flown.own.max_speeds_mps, reach_m
-        closing = closing_speeds_mps(self._speeds_mps, self._own_mps[:, np.newaxis])
-        self._epoch_s = epochs_of(closing, reach_m)
-        self._last: IntArray = np.full(replicas, -1, dtype=np.int64)
-        self._range_m: FloatArray = np.zeros((replicas, width))
-
-    def forget(self, ownship: IntArray) -> None:
-        """Take note that ownships fly on otherwise than was known."""
-        self._last[ownship] = -1
-
-    def near(self, replica: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may be in reach at each row, (rows, width)."""
-        epoch = np.floor(time_s / self._epoch_s[replica]).astype(np.int64)
-        fastest = np.maximum(self._flights.fastest_by(replica, time_s), self._own_mps[replica])
-        begins = np.ones(len(replica), dtype=bool)
-        begins[1:] = (replica[1:] != replica[:-1]) | (epoch[1:] != epoch[:-1])
-        begins[1:] |= fastest[1:] != fastest[:-1]
-        first = np.flatnonzero(begins)
-        of, number = replica[first], epoch[first]
-        found = self._range_m[of]
-        new = np.flatnonzero(self._last[of] != number)
-        if len(new):
-            ownship = np.repeat(of[new], self._width)
-            target = (of[new][:, np.newaxis] * self._width + np.arange(self._width)).reshape(-1)
-            start_s = np.repeat(number[new] * self._epoch_s[of[new]], self._width)
-            found[new] = self._flights.range_m(ownship, target, start_s).reshape(len(new), -1)
-        self._last[of], self._range_m[of] = number, found
-        closing = closing_speeds_mps(self._speeds_mps[of], fastest[first][:, np.newaxis])
-        near = found <= within_of(closing, self._reach_m, self._epoch_s[of][:, np.newaxis])
-        return np.asarray(near[np.cumsum(begins) - 1])
 
 
 def flown_by(face: Any, replicas: ReplicaRuns) -> AllFlown | None:

@@ -27,15 +27,16 @@ from components.flights.closest_approach import (
     closest_approaches,
     present_together_s,
 )
-from components.flights.culling import Culling, SteeredCulling
+from components.flights.culling import Culling, SteeredCulling, range_between
 from components.flights.fleet import Fleet
+from components.flights.steered_flight import SteeredFlight
 from components.geometry.state import TrajectoryState
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_together import FlownTogether, flown_by
 from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
 from components.traffic.wind_effect import ATTITUDE
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import ReplicaRuns, Wake
@@ -109,7 +110,10 @@ class TrafficSource(SteeredOwnship):
         self._check_terrain(self.own.at)
         self._all_columns = np.arange(len(self.roster))
         self._crabbing = self.built(ATTITUDE)
+        #: The targets that were moved last, and their fleet.
+        self._moved: tuple[IntArray, Fleet] = self._all_columns, self.targets
         self._steered_culling: SteeredCulling | None = None
+        self._culled_around: Any = None
         look = farthest_look(c.request for c in self.context.consumers)
         self.flights_asked_for = look.lasts_s > 0.0
         if not self.context.simulate_everything and self.clock_of(self.p) is None:
@@ -133,8 +137,9 @@ class TrafficSource(SteeredOwnship):
             end_s = float(self.context.duration_s)
             self._culling = Culling(self.own, self.targets, look.range_m, end_s, look.lasts_s)
         elif not self.flights_asked_for:
-            speed_mps: float = self.own.max_speed_mps
-            self._steered_culling = SteeredCulling(speed_mps, self.targets, look.range_m)
+            own_mps = np.array([self.own.max_speed_mps])
+            targets_mps = self.targets.max_speeds_mps[np.newaxis]
+            self._steered_culling = SteeredCulling(own_mps, targets_mps, look.range_m)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -178,15 +183,11 @@ class TrafficSource(SteeredOwnship):
         """Return the state of all aircraft that may matter, at every instant."""
         flights, truth = self._steer(wake)
         time_s = wake.time_s
-        columns, fleet, near = self._all_columns, self.targets, None
-        if self._steered_culling is not None:
-            own, columns, fleet, near = self._steered_culling.cut(self.own, time_s)
-        else:
-            own = self.own.at(time_s)
-            if self._culling is not None:
-                columns, fleet, near = self._culling.cut(time_s)
-        states = fleet.at(time_s)
-        own = self._own_in_wind(own, time_s)
+        columns, near = self._near(time_s)
+        if not np.array_equal(columns, self._moved[0]):
+            self._moved = columns, self.targets.subset(columns)
+        states = self._moved[1].at(time_s)
+        own = self.own_at(time_s)
         for crabbing in self._crabbing:
             times = np.broadcast_to(time_s[:, np.newaxis], states.lat_deg.shape)
             states = crabbing.of_targets(columns, states, times)
@@ -207,6 +208,25 @@ class TrafficSource(SteeredOwnship):
             true_flights=truth,
             run_time_s=None if truth is None else time_s,
         )
+
+    def _near(self, time_s: FloatArray) -> tuple[IntArray, BoolArray | None]:
+        """Return which targets may come in reach, and when (rows, targets); None for always."""
+        if self._steered_culling is not None:
+            assert isinstance(self.own, SteeredFlight)
+            if self.own is not self._culled_around:
+                self._culled_around = self.own
+                self._steered_culling.forget(np.zeros(1, dtype=np.int64))
+            run, told_mps = np.zeros(len(time_s), dtype=np.int64), self.own.fastest_by(time_s)
+            near = self._steered_culling.near(run, time_s, told_mps, self._range_m)
+            columns = np.flatnonzero(near.any(axis=0))
+            return columns, near[:, columns]
+        if self._culling is None:
+            return self._all_columns, None
+        columns = self._culling.active(float(time_s.min()), float(time_s.max()))
+        return columns, self._culling.near(columns, time_s)
+
+    def _range_m(self, _: IntArray, target: IntArray, time_s: FloatArray) -> FloatArray:
+        return range_between(self.own.at, self.targets.each, target, time_s)
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: the truth where a scene is small, or asks for it."""

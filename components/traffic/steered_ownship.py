@@ -121,9 +121,7 @@ class SteeredOwnship(Component):
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
-        return self._own_in_wind(self.own.at(time_s), time_s)
-
-    def _own_in_wind(self, own: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
+        own = self.own.at(time_s)
         for crabbing in self._crabbing:
             own = crabbing.of_own(self.own, own, time_s)
         return own

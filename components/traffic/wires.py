@@ -45,14 +45,7 @@ class OverheadWire(Parameters):
     )
 
     def pieces(self) -> Iterator[dict[str, Any]]:
-        """Return the pieces as entries of ``intruders``; cameras see none of them.
-
-        Raises
-        ------
-        ValueError
-            If two posts are in one place, a span sags more than it is long, or there are too many
-            pieces.
-        """
+        """Return the pieces as entries of ``intruders``; cameras see none of them."""
         posts = np.array([[post.east_m, post.north_m, post.up_m] for post in self.posts])
         ends = [catenary(a, b, self.sag_m, self.piece_m) for a, b in pairwise(posts)]
         spans = [(line[:-1], line[1:]) for line in ends]
@@ -85,30 +78,11 @@ class OverheadWire(Parameters):
 
 
 def catenary(first: FloatArray, last: FloatArray, sag_m: float, step_m: float) -> FloatArray:
-    """Return points of a wire that hangs between two posts, first and last among them.
+    """Return points (n, 3) of a wire that hangs between two posts, these too: east, north, up.
 
-    Parameters
-    ----------
-    first, last : (3,), m
-        East, north and up of the posts.
-    sag_m : float
-        Depth below the middle of the line between them, 0 or more.
-    step_m : float
-        Longest level distance from point to point.
-
-    Returns
-    -------
-    (points, 3) array, m
-
-    Raises
-    ------
-    ValueError
-        If the posts stand above each other, or the span sags more than it is long.
-
-    Notes
-    -----
-    a cosh(x / a), a by the sag, hung from the line between the posts: exact for posts of one
-    height, within sag times (rise / length)² for others.
+    `sag_m` is its depth below the middle of the line between them, `step_m` the longest level
+    distance from point to point, all in m. It is a cosh(x / a), a by the sag, hung from the line:
+    exact for posts of one height, within sag times (rise / length)² for others.
     """
     level_m = math.hypot(*(last - first)[:2].tolist())
     if not level_m > 0.0:
