@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_validator
 
-from components.aircraft.equipage import AdsBEquipage, Equipage
+from components.aircraft.equipage import AdsBEquipage, Equipage, IcaoAddress
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import InputFileError, status_of
@@ -175,9 +175,8 @@ class Aircraft(Parameters):
     ads_b: AdsBEquipage | None = Field(
         default=None, description="What it broadcasts; nothing if left out."
     )
-    icao_address: str | None = Field(
+    icao_address: IcaoAddress | None = Field(
         default=None,
-        pattern="^[0-9A-Fa-f]{6}$",
         description="24-bit address of Mode S and ADS-B, six hexadecimal digits; by default one "
         "that follows from its name.",
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -28,6 +29,17 @@ CONTAINMENT_M = np.array(
 )
 #: Standard deviations of each of two axes in the 95 % radius of both, 2.448.
 RADIUS_IN_DEVIATIONS = math.sqrt(-2.0 * math.log(0.05))
+
+
+def _address(given: str) -> str:
+    # All 0 and all 1 are nobody's (ICAO Annex 10 III, 9, appendix).
+    if not re.fullmatch("[0-9A-Fa-f]{6}", given) or int(given, 16) in (0, 0xFFFFFF):
+        raise ValueError("must be six hexadecimal digits, neither all 0 nor all F")
+    return given
+
+
+#: A 24-bit address as text.
+IcaoAddress = Annotated[str, AfterValidator(_address)]
 
 
 class AdsBEquipage(Parameters):

@@ -6,7 +6,7 @@ one track again (`merge`) is the same for all that are Gaussian.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +20,7 @@ from components.estimation.batched import (
     squared_length,
     symmetric,
 )
+from components.estimation.carried_errors import MotionWithErrors, ToldErrors, errors_of
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import (
     Innovation,
@@ -115,8 +116,22 @@ class Estimator(Protocol):
         """Return tracks after times (n,), not negative."""
         ...
 
-    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
-        """Return what every model expects to be measured of predicted tracks."""
+    @property
+    def errors(self) -> int:
+        """How many errors of measurements a track's state carries, behind its velocity."""
+        return 0
+
+    def carrying(self, lasts_s: tuple[float, ...]) -> "Estimator":
+        """Return the filter with errors that last so long as states; itself if it carries none."""
+        return self
+
+    def expect(
+        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+    ) -> list[Moments]:
+        """Return what every model expects to be measured of predicted tracks.
+
+        `told` are the errors of the measurements, of a filter that carries some.
+        """
         ...
 
     def update(
@@ -201,9 +216,21 @@ class ExtendedKalmanFilter(Estimator):
         state, covariance = predict(self.model, tracks.states[0], tracks.covariances[0], dt_s)
         return Estimates([state], [covariance], tracks.weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+    @property
+    def errors(self) -> int:
+        """How many errors its states carry."""
+        return errors_of(self.model)
+
+    def carrying(self, lasts_s: tuple[float, ...]) -> "ExtendedKalmanFilter":
+        """Return the filter with errors as states."""
+        return replace(self, model=MotionWithErrors(self.model, lasts_s))
+
+    def expect(
+        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+    ) -> list[Moments]:
         """Return what is expected to be measured."""
-        seen, jacobian = linearised(kind, tracks.states[0], pose)
+        how = linearised if told is None else told.linearised
+        seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
 
 

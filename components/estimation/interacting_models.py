@@ -12,11 +12,12 @@ that is not true is sure that there is no turn, and would learn of one late.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from components.estimation.batched import symmetric
+from components.estimation.carried_errors import ToldErrors
 from components.estimation.estimator import LEAST, Estimates, Estimator, sum_of
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -47,17 +48,28 @@ class InteractingMultipleModels(Estimator):
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
         """Return tracks after times (n,): the models are mixed, then each goes on."""
         steps = transition_probabilities(self.rates_per_s, dt_s)
-        states, covariances, weights = mixed(*tracks, steps, self.fresh)
+        states, covariances, weights = mixed(*tracks, steps, self.fresh, 6 + self.errors)
         moved = [
             one.predict(Estimates([x], [p], weights), dt_s)
             for one, x, p in zip(self.filters, states, covariances, strict=True)
         ]
         return Estimates([e.states[0] for e in moved], [e.covariances[0] for e in moved], weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+    @property
+    def errors(self) -> int:
+        """How many errors the states of every filter carry."""
+        return self.filters[0].errors
+
+    def carrying(self, lasts_s: tuple[float, ...]) -> "InteractingMultipleModels":
+        """Return the filters with errors as states."""
+        return replace(self, filters=tuple(one.carrying(lasts_s) for one in self.filters))
+
+    def expect(
+        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+    ) -> list[Moments]:
         """Return what every model expects to be measured."""
         return [
-            one.expect(kind, Estimates([x], [p], tracks.weights), pose)[0]
+            one.expect(kind, Estimates([x], [p], tracks.weights), pose, told)[0]
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
         ]
 
@@ -100,8 +112,12 @@ def mixed(
     probabilities: FloatArray,
     transitions: FloatArray,
     fresh: Sequence[float] = (),
+    shared: int = 6,
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    """Return what each model starts from, and the models' probabilities before the look."""
+    """Return what each model starts from, and the models' probabilities before the look.
+
+    `shared` components are in every model's state.
+    """
     many = len(states)
     predicted = np.stack(
         [sum_of([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
@@ -110,7 +126,7 @@ def mixed(
     new_states, new_covariances = [], []
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
-        sizes = [_shared(states[i], states[j]) for i in range(many)]
+        sizes = [_shared(states[i], states[j], shared) for i in range(many)]
         given = [_filled(states[i], states[j], sizes[i], bool(fresh)) for i in range(many)]
         state = sum_of([w * x for w, x in zip(weights, given, strict=True)])
         covariance = np.zeros_like(covariances[j])
@@ -118,7 +134,7 @@ def mixed(
             apart = given[i] - state
             whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
             if fresh and sizes[i] < len(whole):
-                _freshen(whole, fresh[j])
+                _freshen(whole, shared, fresh[j])
             covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
         new_states.append(state)
         new_covariances.append(symmetric(covariance))
@@ -138,28 +154,29 @@ def before(
     return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
 
 
-def _shared(one: FloatArray, other: FloatArray) -> int:
-    return len(one) if len(one) == len(other) else 6
+def _shared(one: FloatArray, other: FloatArray, least: int) -> int:
+    return len(one) if len(one) == len(other) else least
 
 
 def _filled(given: FloatArray, own: FloatArray, shared: int, fresh: bool) -> FloatArray:
     if shared == len(own):
         return given[:shared]
-    return np.concatenate([given[:6], np.zeros_like(own[6:]) if fresh else own[6:]])
+    rest = own[shared:]
+    return np.concatenate([given[:shared], np.zeros_like(rest) if fresh else rest])
 
 
 def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
     if shared == len(own):
         return given[:shared, :shared]
     whole = np.zeros_like(own)
-    whole[:6, :6] = given[:6, :6]
-    whole[6:, 6:] = own[6:, 6:]
+    whole[:shared, :shared] = given[:shared, :shared]
+    whole[shared:, shared:] = own[shared:, shared:]
     return whole
 
 
-def _freshen(covariance: FloatArray, variance: float) -> None:
-    covariance[6:, 6:] = 0.0
-    for i in range(6, len(covariance)):
+def _freshen(covariance: FloatArray, shared: int, variance: float) -> None:
+    covariance[shared:, shared:] = 0.0
+    for i in range(shared, len(covariance)):
         covariance[i, i] = variance
 
 

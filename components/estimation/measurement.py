@@ -23,19 +23,19 @@ _NEAREST_M = 1e-3
 
 @dataclass(frozen=True)
 class Kind:
-    """Which are measured, in this order: azimuth, elevation, range, range rate, sinking.
+    """Which are measured, in this order: azimuth, elevation, range, range rate, velocity.
 
-    How fast the target sinks is along the frame's third axis.
+    The target's velocity is along the frame's axes.
     """
 
     has_range: bool = True
     has_range_rate: bool = False
-    has_sinking: bool = False
+    has_velocity: bool = False
 
     @property
     def size(self) -> int:
         """How many quantities there are."""
-        return 2 + self.has_range + self.has_range_rate + self.has_sinking
+        return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
 
 
 def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
@@ -53,8 +53,8 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
     if kind.has_range_rate:
         closing = _closing(state, pose)
         seen[2 + kind.has_range] = dot(away, closing) / np.maximum(distance, _NEAREST_M)
-    if kind.has_sinking:
-        seen[-1] = state[5]
+    if kind.has_velocity:
+        seen[-3:] = state[3:6]
     return seen
 
 
@@ -70,7 +70,7 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     seen = np.empty((kind.size, state.shape[-1]))
     np.arctan2(y, x, out=seen[0])
     np.arctan2(-z, level, out=seen[1])
-    moving = kind.has_range_rate or kind.has_sinking
+    moving = kind.has_range_rate or kind.has_velocity
     jacobian = np.zeros((kind.size, 6 if moving else 3, state.shape[-1]))
     level_square = safe * safe
     steep = z / (safe * square)
@@ -97,9 +97,10 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
         seen[row] = rate
         jacobian[row, :3] = (closing - rate * unit) / distance
         jacobian[row, 3:6] = unit
-    if kind.has_sinking:
-        seen[-1] = state[5]
-        jacobian[-1, 5] = 1.0
+    if kind.has_velocity:
+        seen[-3:] = state[3:6]
+        for axis in range(3):
+            jacobian[axis - 3, 3 + axis] = 1.0
     return seen, jacobian
 
 

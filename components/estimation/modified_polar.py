@@ -44,6 +44,61 @@ def moved_in_polar(
     return _moved(axes, distance, by_range, to_polar, change, after, covariance, sensor_m)
 
 
+def turned_about_vertical(
+    before: FloatArray,
+    after: FloatArray,
+    covariance: FloatArray,
+    sensor_m: FloatArray,
+    sensor_m_s: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return a correction by a coarse bearing as one of bearing, distance on the ground and height.
+
+    Where range and height are known far better than the bearing, what is known of a target lies on
+    an arc about the vertical through the sensor, and of its motion past the sensor along and across
+    the arc: a bearing turns both, and changes neither distance nor how fast that grows.
+    """
+    away, velocity = before[:3] - sensor_m, before[3:6] - sensor_m_s
+    moved, spread = after.copy(), covariance.copy()
+    ground = np.maximum(np.hypot(away[0], away[1]), _NEAREST_M)
+    cos, sin = away[0] / ground, away[1] / ground
+    change = after[:6] - before[:6]
+
+    def level(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0]
+
+    outward, aside = level(change)
+    angle = aside / ground
+    along, across = level(velocity)
+    gained, beside = level(change[3:])
+    distance = np.maximum(ground + outward, _NEAREST_M)
+    along_then = along + gained + across * angle
+    across_then = across + beside - along * angle
+    cos_then, sin_then = (
+        np.cos(angle) * cos - np.sin(angle) * sin,
+        np.sin(angle) * cos + (np.cos(angle) * sin),
+    )
+    moved[0] = sensor_m[0] + distance * cos_then
+    moved[1] = sensor_m[1] + distance * sin_then
+    moved[3] = sensor_m_s[0] + along_then * cos_then - across_then * sin_then
+    moved[4] = sensor_m_s[1] + along_then * sin_then + across_then * cos_then
+    # The derivative of the state there by the one here: of the level parts, by way of the arc.
+    here = np.zeros((4, 4, len(ground)))  # bearing, distance, motion along and across
+    here[0, 0], here[0, 1] = -sin / ground, cos / ground
+    here[1, 0], here[1, 1] = cos, sin
+    here[2, 0], here[2, 1], here[2, 2], here[2, 3] = *(across * here[0, :2]), cos, sin
+    here[3, 0], here[3, 1], here[3, 2], here[3, 3] = *(-along * here[0, :2]), -sin, cos
+    there = np.zeros_like(here)
+    there[0, 0], there[0, 1] = -distance * sin_then, cos_then
+    there[1, 0], there[1, 1] = distance * cos_then, sin_then
+    there[2, 0] = -along_then * sin_then - across_then * cos_then
+    there[3, 0] = along_then * cos_then - across_then * sin_then
+    there[2, 2], there[2, 3], there[3, 2], there[3, 3] = cos_then, -sin_then, sin_then, cos_then
+    step, rows = product(there, here), [0, 1, 3, 4]
+    spread[rows] = product(step, covariance[rows])
+    spread[:, rows] = product_transposed(spread[:, rows], step)
+    return moved, symmetric(spread)
+
+
 def ranged_in_polar(
     state: FloatArray,
     covariance: FloatArray,

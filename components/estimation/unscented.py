@@ -4,7 +4,7 @@ Source: Julier, Uhlmann, *Unscented filtering and nonlinear estimation*, Proc. I
 weights of Wan, van der Merwe (2000). Means of angles are those of unit vectors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from components.estimation.batched import (
     solve_upper,
     symmetric,
 )
+from components.estimation.carried_errors import MotionWithErrors, ToldErrors, errors_of
 from components.estimation.estimator import Estimates, Estimator
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -74,10 +75,21 @@ class UnscentedKalmanFilter(Estimator):
         state, covariance = predict_unscented(self.model, state, covariance, dt_s, self.sigma)
         return Estimates([state], [covariance], weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+    @property
+    def errors(self) -> int:
+        """How many errors its states carry."""
+        return errors_of(self.model)
+
+    def carrying(self, lasts_s: tuple[float, ...]) -> "UnscentedKalmanFilter":
+        """Return the filter with errors as states."""
+        return replace(self, model=MotionWithErrors(self.model, lasts_s))
+
+    def expect(
+        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+    ) -> list[Moments]:
         """Return what is expected to be measured."""
         (state,), (covariance,), _ = tracks
-        return [unscented_moments(kind, state, covariance, pose, self.sigma)]
+        return [unscented_moments(kind, state, covariance, pose, self.sigma, told)]
 
 
 def predict_unscented(
@@ -100,7 +112,12 @@ def predict_unscented(
 
 
 def unscented_moments(
-    kind: Kind, state: FloatArray, covariance: FloatArray, pose: SensorPose, sigma: SigmaPoints
+    kind: Kind,
+    state: FloatArray,
+    covariance: FloatArray,
+    pose: SensorPose,
+    sigma: SigmaPoints,
+    told: ToldErrors | None = None,
 ) -> Moments:
     """Return the moments of what sigma points would be measured as.
 
@@ -116,7 +133,8 @@ def unscented_moments(
         np.tile(pose.to_body, many),
         None if pose.velocity_m_s is None else np.tile(pose.velocity_m_s, many),
     )
-    seen = expected(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
+    how = expected if told is None else told.repeated(many).expected
+    seen = how(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
     mean = _weighted(seen, of_mean)
     for angle in range(2):
         sin = _weighted(np.sin(seen[angle])[np.newaxis], of_mean)[0]

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import FloatArray, Vector, local_axes, wrap_heading_rad
-from components.geometry.ellipsoid import radii_of_curvature
+from components.geometry import Vector, local_axes, radii_of_curvature, wrap_heading_rad
+from dsa_des.arrays.types import FloatArray
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 """ISO 80000-3 standard acceleration of free fall."""

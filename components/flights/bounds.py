@@ -14,9 +14,13 @@ import numpy as np
 from components.flights.fleet import Fleet
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.geometry.angles import wrap_by_sines
-from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M, line_of_sight
-from components.geometry.state import TrajectoryState
+from components.geometry import (
+    ECCENTRICITY_SQUARED,
+    SEMI_MAJOR_AXIS_M,
+    TrajectoryState,
+    line_of_sight,
+    wrap_by_sines,
+)
 from components.messages.reach import REACH_MARGIN
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray

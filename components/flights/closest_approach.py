@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.flights.fleet import PieceSearch
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry import line_of_sight
 from dsa_des.arrays.types import FloatArray, IntArray
 
 # -- the times at which distances are compared; none are ever laid out in full: a flight of a month

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_state
-from components.geometry.angles import local_axes
-from components.geometry.ellipsoid import enu_to_geodetic, line_of_sight_ned
+from components.geometry import enu_to_geodetic, line_of_sight_ned, local_axes
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: In which sense the aircraft are closest: by the slant range, or by the horizontal distance.

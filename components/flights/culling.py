@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from components.flights.fleet import Fleet
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry import line_of_sight
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5

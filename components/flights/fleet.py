@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState
 from dsa_des.arrays.types import FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192

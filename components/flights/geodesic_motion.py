@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.angles import (
+from components.geometry import (
     DEG_PER_RAD,
-    FloatArray,
+    ECCENTRICITY_SQUARED,
+    FLATTENING,
+    SEMI_MAJOR_AXIS_M,
     direction_angle,
+    radii_of_curvature,
     slope_angle,
     wrap_heading_rad,
     wrap_longitude_deg,
 )
-from components.geometry.ellipsoid import (
-    ECCENTRICITY_SQUARED,
-    FLATTENING,
-    SEMI_MAJOR_AXIS_M,
-    radii_of_curvature,
-)
+from dsa_des.arrays.types import FloatArray
 
 # Rows of the parameter table of one straight leg.
 GEODESIC_ROWS = 20

@@ -10,15 +10,16 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 
 from components.flights.geodesic_motion import geodesic_state
-from components.geometry.angles import (
+from components.geometry import (
+    ECCENTRICITY_SQUARED,
     TWO_PI,
-    FloatArray,
     local_axes,
     normal_to_degrees,
     past,
+    radii_of_curvature,
     wrap_heading_rad,
 )
-from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, radii_of_curvature
+from dsa_des.arrays.types import FloatArray
 
 LARGEST_TURN_RADIUS_M = 200_000.0
 """Up to here a turn keeps its speed to 2e-4; the error grows with the radius, 1e-6 at 1 km."""

@@ -12,8 +12,8 @@ from geographiclib.geodesic import Geodesic
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
 from components.flights.leg_motion import FORMULAS, Kind, Segment, turn_parameters
-from components.geometry.angles import FloatArray, heading_from_deg
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic, heading_from_deg
+from dsa_des.arrays.types import FloatArray
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:

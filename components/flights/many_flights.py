@@ -21,8 +21,7 @@ from components.flights.steered_flight import (
     flown_from,
     times_around_s,
 )
-from components.geometry.angles import heading_from_deg, wrap_longitude_deg
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray, IntArray
 

@@ -19,10 +19,14 @@ from components.flights.fleet import (
     in_blocks,
 )
 from components.flights.sampled_segments import evaluate_segments, fit_segments, locate
-from components.geometry.angles import FloatArray, Vector, wrap_heading_rad, wrap_longitude_deg
-from components.geometry.ellipsoid import line_of_sight
-from components.geometry.state import TrajectoryState
-from dsa_des.arrays.types import IntArray
+from components.geometry import (
+    TrajectoryState,
+    Vector,
+    line_of_sight,
+    wrap_heading_rad,
+    wrap_longitude_deg,
+)
+from dsa_des.arrays.types import FloatArray, IntArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""

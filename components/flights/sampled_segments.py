@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.angles import (
-    FloatArray,
+from components.geometry import (
+    SEMI_MAJOR_AXIS_M,
+    TrajectoryState,
     Vector,
     local_axes,
     normal_to_degrees,
+    radii_of_curvature,
     wrap_difference_rad,
     wrap_heading_rad,
     wrap_longitude_deg,
 )
-from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, radii_of_curvature
-from components.geometry.state import TrajectoryState
+from dsa_des.arrays.types import FloatArray
 
 RAD_PER_DEG = np.pi / 180.0
 

@@ -22,9 +22,12 @@ from components.flights.fleet import (
 )
 from components.flights.leg_motion import FORMULAS, KINDS, Segment
 from components.flights.legs import AnyLeg, LegBuilder, require
-from components.geometry.angles import heading_from_deg, wrap_longitude_deg
-from components.geometry.ellipsoid import enu_to_geodetic
-from components.geometry.state import TrajectoryState
+from components.geometry import (
+    TrajectoryState,
+    enu_to_geodetic,
+    heading_from_deg,
+    wrap_longitude_deg,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12

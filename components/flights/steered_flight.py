@@ -16,8 +16,7 @@ from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.geometry.ellipsoid import line_of_sight_ned
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray
 

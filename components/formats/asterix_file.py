@@ -19,8 +19,7 @@ from components.formats.asterix_records import (
 from components.formats.sample_table import SampleColumn, SampleTable, enu_velocity
 from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
 from components.geometry import radii_of_curvature, wrap_pi
-from components.geometry.angles import FloatArray
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.files.input_files import InputFileError, read_input_bytes
 
 _PLACE = ("lat", "lon", "alt")

@@ -30,7 +30,7 @@ from components.formats.text_rows import (
     read_lines,
     shown_columns,
 )
-from components.geometry.angles import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
 

@@ -31,8 +31,8 @@ from components.formats.text_rows import (
     shown_columns,
     tokens,
 )
-from components.geometry.angles import FloatArray, local_axes
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic, local_axes
+from dsa_des.arrays.types import FloatArray
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
 

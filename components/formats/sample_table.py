@@ -22,7 +22,7 @@ from components.formats.text_rows import (
     TrafficFile,
     clean_token,
 )
-from components.geometry.angles import FloatArray
+from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import shortened
 
 UNITS = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import unit_vectors
-from components.messages.columns import OWN_VELOCITY, POSE, TARGET_VELOCITY
+from components.messages.columns import OWN_VELOCITY, POSE, TOLD
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.false_detections import true_entries
@@ -76,7 +76,7 @@ class Fusion(Component):
             for name in reversed(best_angles)
             if offers[name].measures_range_rate
         ]
-        self._told_velocity = any(offer.measures_velocity for offer in offers.values())
+        self._told = any(offer.tells for offer in offers.values())
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
         #: How long before a detection another one may have come to be put together with it.
         self.keep_ticks = self.gate_ticks
@@ -152,7 +152,7 @@ class Fusion(Component):
         measured_tick = np.zeros(count, dtype=np.int64)
         pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
         moves = np.full((3, count), np.nan) if self._with_pose and self.by_range_rate else None
-        told = np.full((len(TARGET_VELOCITY), count), np.nan) if self._told_velocity else None
+        told = np.full((len(TOLD), count), np.nan) if self._told else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self.by_angles:
             name = self.sensors[index]
@@ -171,7 +171,7 @@ class Fusion(Component):
                 _copy(values, _RANGES, found[name], arrivals[name], entries[name])
                 if told is not None:
                     chosen = entries[name][found[name]]
-                    told[:, found[name]] = told_velocities(arrivals[name].message)[:, chosen]
+                    told[:, found[name]] = told_columns(arrivals[name].message)[:, chosen]
         for index in self.by_range_rate:
             name = self.sensors[index]
             if name in found and len(found[name]):
@@ -194,7 +194,7 @@ class Fusion(Component):
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
-            target_velocity=None if told is None else dict(zip(TARGET_VELOCITY, told, strict=True)),
+            told_by_target=None if told is None else dict(zip(TOLD, told, strict=True)),
             **values,
         )
 
@@ -221,11 +221,11 @@ def velocities(message: Detections) -> FloatArray:
     return np.stack(list(velocity.values()))
 
 
-def told_velocities(message: Detections) -> FloatArray:
-    """Return what each entry is told of its target's velocity, (6, entries); NaN for nothing."""
-    if message.target_velocity is None:
-        return np.full((len(TARGET_VELOCITY), len(message.target)), np.nan)
-    return np.stack([message.target_velocity[name] for name in TARGET_VELOCITY])
+def told_columns(message: Detections) -> FloatArray:
+    """Return what each entry is told, (`TOLD`, entries); NaN for nothing."""
+    if message.told_by_target is None:
+        return np.full((len(TOLD), len(message.target)), np.nan)
+    return np.stack([message.told_by_target[name] for name in TOLD])
 
 
 def _copy(

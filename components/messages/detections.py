@@ -110,6 +110,28 @@ class LastingError:
 
 
 @dataclass(frozen=True)
+class ToldError:
+    """An error with a deviation that detections tell, Gauss-Markov with a time constant.
+
+    Parameters
+    ----------
+    way : int
+        Which way it goes (`components.estimation.carried_errors`).
+    deviation : str
+        Which of `TOLD` is its deviation.
+    lasts_s : float
+        Infinite for what stays the same, 0 for what is new at every instant.
+    of_aircraft : bool
+        Whether it is the aircraft's own, the same for all that hear it.
+    """
+
+    way: int
+    deviation: str
+    lasts_s: float
+    of_aircraft: bool = True
+
+
+@dataclass(frozen=True)
 class SensorOffer:
     """What a sensor says of its detections to the blocks that receive them.
 
@@ -130,7 +152,7 @@ class SensorOffer:
         Where it looks, in the ownship's body axes; None where it does not say.
     lasting : mapping of LastingError, or None
         What of its errors lasts from look to look, by quantity (``azimuth``, ``elevation``,
-        ``range``, ``range_rate``, ``velocity``, ``climb``), those without are new at every look;
+        ``range``, ``range_rate``), those without are new at every look;
         None where it does not say.
     clock : callable or None
         Returns when it looks. Asked only where it matters, and no part of the word that replicas
@@ -143,8 +165,11 @@ class SensorOffer:
     unstated_across_m2 : float
         Variance of the ownship's own place across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
-    measures_velocity : bool
-        Whether its detections may have a `target_velocity`.
+    tells : bool
+        Whether its detections may have something that is `told_by_target`.
+    told_errors : tuple of ToldError
+        Errors whose deviations differ from detection to detection, as `told_by_target` has them.
+        What carries them needs no `lasting` of the same.
     """
 
     measures_range: bool
@@ -162,7 +187,8 @@ class SensorOffer:
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
     unstated_across_m2: float = 0.0
-    measures_velocity: bool = False
+    tells: bool = False
+    told_errors: tuple[ToldError, ...] = ()
 
 
 def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
@@ -223,9 +249,9 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
-    target_velocity : dict of (entries,), or None
-        The target's own velocity over ground, where a sensor is told it (`TARGET_VELOCITY`), along
-        the axes of the horizon where the ownship believes to be; NaN where it is not told.
+    told_by_target : dict of (entries,), or None
+        What aircraft tell (`TOLD`): velocity over ground, along the axes of the horizon where the
+        ownship believes to be, and how much errs of it and of the place; NaN where nothing is told.
     looks : dict of (rows, targets), or None
         Every look at every target (`components.messages.looks`), where they are recorded.
     roster : Roster
@@ -266,7 +292,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     )
     own_velocity_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
-    target_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
+    told_by_target: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
     def tables(self) -> dict[str, Columns]:

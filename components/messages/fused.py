@@ -44,8 +44,8 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     own_velocity : dict of (entries,), or None
         How the ownship moved (`OWN_VELOCITY`) when the range rate was measured; NaN where none
         was, None from a fusion of sensors that measure none.
-    target_velocity : dict of (entries,), or None
-        As `Detections` has it, of the sensor that the range is of; NaN where it is told none.
+    told_by_target : dict of (entries,), or None
+        As `Detections` has it, of the sensor that the range is of; NaN where it is told nothing.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
@@ -78,7 +78,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     ticks_per_s: int = static(default=10**9, kw_only=True)
     own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     own_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
-    target_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
+    told_by_target: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: Looks | None = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

@@ -39,6 +39,8 @@ class Pinhole:
     columns, rows : int
     azimuth_rad : float
         Of the optical axis in the sensor's axes.
+    axis_column : float or None
+        Column of the optical axis; the middle of the frame if None.
     """
 
     width_rad: float
@@ -46,6 +48,7 @@ class Pinhole:
     columns: int
     rows: int
     azimuth_rad: float = 0.0
+    axis_column: float | None = None
 
     def __post_init__(self) -> None:
         low, high = self.elevation_rad
@@ -56,6 +59,29 @@ class Pinhole:
                 f"most {math.degrees(WIDEST_RAD):g} deg across, within 85 deg up and down; use "
                 "several cameras, each with a mounting"
             )
+
+    @classmethod
+    def calibrated(
+        cls,
+        focal_px: tuple[float, float],
+        principal_px: tuple[float, float],
+        columns: int,
+        rows: int,
+    ) -> Pinhole:
+        """Return the picture of a camera by its intrinsics, columns before rows.
+
+        The optical axis is the first of the sensor's axes; the principal point may lie anywhere.
+        """
+        (across, upward), (column, row) = focal_px, principal_px
+        if not (across > 0.0 and upward > 0.0):
+            raise ValueError(f"focal_px is {across:g} and {upward:g}: both must be above 0")
+        edges = math.atan((row - rows) / upward), math.atan(row / upward)
+        return cls(2.0 * math.atan(0.5 * columns / across), edges, columns, rows, 0.0, column)
+
+    @property
+    def middle_column(self) -> float:
+        """Column of the optical axis."""
+        return 0.5 * self.columns if self.axis_column is None else self.axis_column
 
     @property
     def focal(self) -> tuple[float, float]:
@@ -72,14 +98,14 @@ class Pinhole:
             across = np.where(ahead > 1e-9, np.tan(turned), np.nan)
             upward = np.where(ahead > 1e-9, np.tan(elevation_rad) / ahead, np.nan)
         focal_x, focal_y = self.focal
-        return 0.5 * self.columns + focal_x * across, (
+        return self.middle_column + focal_x * across, (
             focal_y * (math.tan(self.elevation_rad[1]) - upward)
         )
 
     def direction(self, column: ArrayLike, row: ArrayLike) -> tuple[Any, Any]:
         """Return azimuth and elevation in the sensor's axes of what is seen at a place."""
         focal_x, focal_y = self.focal
-        across = (np.asarray(column) - 0.5 * self.columns) / focal_x
+        across = (np.asarray(column) - self.middle_column) / focal_x
         upward = math.tan(self.elevation_rad[1]) - np.asarray(row) / focal_y
         return self.azimuth_rad + np.arctan(across), np.arctan2(upward, np.hypot(1.0, across))
 

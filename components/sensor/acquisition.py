@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry.ellipsoid import north_east_up
+from components.geometry import north_east_up
 from components.sensor.look import Cells
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from components.estimation.carried_errors import BEARING, RANGE
 from components.geometry import wrap_pi_unchecked
-from components.messages.detections import LastingError, LastingPart, SensorOffer
+from components.messages.columns import TOLD
+from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
 from components.messages.reach import Reach
 from components.navigation.errors import navigation_noise
 from components.sensor.ladder_values import over_cells
@@ -18,7 +21,11 @@ from components.sensor.parameters import rising_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
 from components.surveillance.broadcast import Altimeters, Who
-from components.surveillance.cooperative import CooperativeParameters, CooperativeSensor
+from components.surveillance.cooperative import (
+    CooperativeParameters,
+    CooperativeSensor,
+    velocity_of,
+)
 from components.surveillance.interrogation import (
     CUT,
     IN_1_S,
@@ -36,6 +43,7 @@ from components.surveillance.interrogation import (
     sine_of_elevation,
 )
 from components.surveillance.reports import unreported
+from components.surveillance.stated_errors import ALTIMETER, ROUNDING
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -48,6 +56,17 @@ from dsa_des.time.gauss_markov import GaussMarkov
 CLIMB_OVER_S = 5.0
 _FARTHEST_M = max(MODE_S_REACH_M, *MODE_C_REACH_M)
 _LEAST_M2 = 1e-4
+#: So much of all else is taken to be new in every answer.
+_WHITE_M2 = 0.25
+
+
+_TOLD_ERRORS = (
+    ALTIMETER,
+    ROUNDING,
+    ToldError(BEARING, "bearing_deviation", 0.0, of_aircraft=False),
+    ToldError(RANGE, "delay_deviation", math.inf),
+    ToldError(RANGE, "range_deviation", RANGE_CORRELATION_S, of_aircraft=False),
+)
 
 
 class ActiveParameters(CooperativeParameters):
@@ -186,6 +205,7 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
+            tells=self._errs, told_errors=_TOLD_ERRORS if self._errs else (),
         )  # fmt: skip
 
     def answer_probability(self, cells: Cells) -> FloatArray:
@@ -294,7 +314,7 @@ class Active(CooperativeSensor):
         azimuth_rad: FloatArray,
         elevation_rad: FloatArray,
         range_m: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Any]]:
         """Return measured lines of sight in body axes, and their variances."""
         own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
         distance = self.measured_range_m(cells, found)
@@ -312,12 +332,41 @@ class Active(CooperativeSensor):
         variances = variances_in_body(
             own, ned, self._variances(cells, found, ned, altitude, deviation)
         )
-        beside = {
+        beside: dict[str, Any] = {
             "azimuth_variance_rad2": variances[0],
             "elevation_variance_rad2": variances[1],
             "range_variance_m2": variances[2],
         }
+        if self._errs:
+            beside["told_by_target"] = self._told(cells, found, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
+
+    def _told(
+        self, cells: Cells, found: AnyArray, altitude_m: FloatArray, deviation: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Return the deviations of all errors, as `TOLD`."""
+        nothing = np.zeros(len(found))
+        mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
+        feet = altitude_m / FOOT_M
+        position_m, attitude_rad = navigation_noise(self.context)
+        now = np.zeros(len(found))
+        own = velocity_of(cells, found, now, cells.seen_at(found, now), "own")
+        return dict.fromkeys(TOLD, np.full(len(found), np.nan)) | {
+            "own_north": own[0], "own_east": own[1], "own_down": own[2],
+            "place_deviation": nothing,
+            "height_deviation": np.sqrt(altimetry_variance_ft2(feet)) * FOOT_M,
+            "rounding_deviation": self._step_ft(mode_s) * FOOT_M / math.sqrt(12.0),
+            "speed_deviation": nothing,
+            "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
+            "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),
+            "range_deviation": nothing + RANGE_ERROR_M,
+            "age_s": nothing,
+            "velocity_age_s": nothing,
+            "white_variance": nothing + _WHITE_M2 + max(position_m) ** 2,
+        }  # fmt: skip
+
+    def _step_ft(self, mode_s: BoolArray) -> FloatArray:
+        return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
 
     def _variances(
         self,
@@ -332,11 +381,10 @@ class Active(CooperativeSensor):
             least = np.full(len(found), _LEAST_M2)
             return least, least, least
         mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
-        step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
         # The altitude is that of no pose; bearing and range are counted from the ownship's own.
         position_m, attitude_rad = navigation_noise(self.context)
         place_m2 = max(position_m[:2]) ** 2
         across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
         along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
-        high = (altimetry_variance_ft2(altitude_m / FOOT_M) + step**2 / 12.0) * FOOT_M**2
-        return np.maximum(across, _LEAST_M2), along, high
+        feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + self._step_ft(mode_s) ** 2 / 12.0
+        return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2

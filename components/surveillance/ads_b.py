@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.geometry import line_of_sight_ned
-from components.messages.columns import OWN_VELOCITY, TARGET_VELOCITY
+from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
 from components.sensor.ladder_values import over_cells
@@ -33,7 +33,7 @@ from components.surveillance.cooperative import (
 from components.surveillance.reception import LAWS
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
-from components.surveillance.stated_errors import StatedByAircraft, lasting_errors
+from components.surveillance.stated_errors import StatedByAircraft, lasting_errors, told_errors
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -179,11 +179,12 @@ class AdsB(CooperativeSensor):
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
+        errs = self.p.position_errors != "none" or self.p.compact
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
-            measures_velocity=True,
+            tells=True, told_errors=told_errors(self.p.position_errors) if errs else (),
         )  # fmt: skip
 
     @property
@@ -369,8 +370,8 @@ class AdsB(CooperativeSensor):
             "range_variance_m2": variances[2],
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
-            "target_velocity": stated.velocity(
-                moving, cells.state_ns[found] / NANOSECONDS - said["velocity_s"]
+            "told_by_target": stated.told(
+                moving, cells.state_ns[found] / NANOSECONDS - said["velocity_s"], age_s
             ),
         }
         return azimuth, elevation, distance, beside
@@ -386,8 +387,6 @@ class AdsB(CooperativeSensor):
             row, velocity = self._rows
             some = np.flatnonzero(np.isfinite(velocity[0]))
             moves[:, row[some]] = velocity[:, some]
-        told = report.target_velocity
-        if told is None:
-            told = {name: np.zeros(0) for name in TARGET_VELOCITY}
         own = dict(zip(OWN_VELOCITY, moves, strict=True))
-        return replace(report, own_velocity=own, target_velocity=told)
+        told = report.told_by_target or {name: np.zeros(0) for name in TOLD}
+        return replace(report, own_velocity=own, told_by_target=told)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.aircraft.equipage import Equipage
-from components.messages.columns import TARGET_VELOCITY
-from components.messages.detections import LastingError, LastingPart
+from components.estimation.carried_errors import EAST, HEIGHT, NORTH, SPEED_EAST, SPEED_NORTH
+from components.messages.columns import TOLD
+from components.messages.detections import LastingError, LastingPart, ToldError
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.broadcast import CLIMB_SCALE_M_S, CORRELATION_TIME_S
 from components.surveillance.extended_squitter import FOOT_PER_MINUTE_M_S, KNOT_M_S
@@ -31,12 +32,26 @@ def lasting_errors(position_errors: str) -> dict[str, LastingError]:
         return {}
     lasts_s = {"elevation": math.inf}  # an aircraft keeps its altimeter
     if position_errors == "gauss_markov":
-        for name in ("azimuth", "range", "range_rate", "velocity"):
+        for name in ("azimuth", "range", "range_rate"):
             lasts_s[name] = CORRELATION_TIME_S
     return {
         name: LastingError(parts=(LastingPart(lasts_s=time_s, share=1.0),))
         for name, time_s in lasts_s.items()
     }
+
+
+#: The altimeter of an aircraft, which speaks through its broadcasts and its replies.
+ALTIMETER = ToldError(HEIGHT, "height_deviation", math.inf)
+#: What is new in each height: its rounding, of one that climbs, and how far it was carried on.
+ROUNDING = ToldError(HEIGHT, "rounding_deviation", 0.0, of_aircraft=False)
+
+
+def told_errors(position_errors: str) -> tuple[ToldError, ...]:
+    """Return the errors that broadcasts tell of; what is rounded stays in its step as long."""
+    lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
+    ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
+    found = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
+    return (*found, ALTIMETER, ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -81,10 +96,32 @@ class StatedByAircraft:
         level = place + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * age_s**2
         return level, level, high
 
-    def velocity(self, north_east_down_m_s: FloatArray, age_s: FloatArray) -> dict[str, FloatArray]:
-        """Return velocities of some age as `TARGET_VELOCITY`."""
-        turned = (_MANOEUVRE_M_S2 * age_s) ** 2
-        climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else _LEAST_M2
+    def told(
+        self, north_east_down_m_s: FloatArray, velocity_age_s: FloatArray, age_s: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Return velocities of some age, and what errs of them and of places, as `TOLD`."""
+        turned = (_MANOEUVRE_M_S2 * velocity_age_s) ** 2 + _LEAST_M2
+        climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
-        spread = [self.speed_m2_s2 + turned, self.speed_m2_s2 + turned, climb + turned]
-        return dict(zip(TARGET_VELOCITY, [*north_east_down_m_s, *spread], strict=True))
+        found = dict.fromkeys(TOLD, np.full(len(age_s), np.nan))
+        found |= dict(
+            zip(TOLD, [*north_east_down_m_s, turned, turned, climb + turned], strict=False)
+        )
+        if not (self.errs or self.rounds):
+            return found
+        nothing, known = np.zeros(len(age_s)), ~np.isnan(north_east_down_m_s[0])
+        place = self.equipage.position_deviation_m[self.craft] if self.errs else nothing
+        rounding_m2 = (25.0 * FOOT_M) ** 2 / 12.0 if self.rounds else 0.0
+        _, _, high = self.place_m2(nothing)
+        # Without a velocity an aircraft may have gone anywhere at the speed of one.
+        carried_m = np.where(known, 0.5 * _MANOEUVRE_M_S2 * age_s, _UNKNOWN_M_S) * age_s
+        white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
+        return found | {
+            "place_deviation": place,
+            "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
+            "rounding_deviation": np.sqrt(rounding_m2 + np.where(known, climb * age_s**2, 0.0)),
+            "speed_deviation": np.sqrt(self.speed_m2_s2), "bearing_deviation": nothing,
+            "delay_deviation": nothing, "range_deviation": nothing,
+            "age_s": np.where(known, age_s, 0.0),
+            "velocity_age_s": np.where(known, velocity_age_s, 0.0), "white_variance": white,
+        }  # fmt: skip

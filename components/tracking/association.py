@@ -17,7 +17,11 @@ from components.association.jpda import marginals
 from components.estimation.batched import is_everything, log_determinant, selected
 from components.estimation.estimator import Estimates, innovation_squared
 from components.estimation.frame import SensorPose
-from components.estimation.modified_polar import moved_in_polar, ranged_in_polar
+from components.estimation.modified_polar import (
+    moved_in_polar,
+    ranged_in_polar,
+    turned_about_vertical,
+)
 from components.tracking.gating import GatedPairs, log_density, log_gain
 from components.tracking.rules import TrackerRules
 from components.tracking.track_store import TrackStore, estimate_columns
@@ -88,8 +92,8 @@ class Candidates:
     def price(self) -> FloatArray:
         """Of each pair, what it costs its track to go without: the widest gate that it has."""
         sizes = np.concatenate([np.full(len(one.track), one.kind.size) for one in self.kinds])
-        limits = np.zeros(5)
-        for many in range(2, 5):
+        limits = np.zeros(8)
+        for many in range(2, 8):
             limits[many] = gate_threshold(self.rules.p.gate_probability, many)
         price = np.full(int(self.track.max()) + 1, -np.inf)
         np.maximum.at(price, self.track, limits[sizes] + self.volume)
@@ -244,9 +248,12 @@ def correct_angle_only(
 ) -> None:
     """Bring corrections of angle-only tracks into modified polar coordinates, in place.
 
-    `estimates` are those of the tracks `track` of the predicted `part` after the pairs `pair`.
+    Those by coarse bearings are brought onto arcs. `estimates` are those of the tracks
+    `track` of the predicted `part` after the pairs `pair`.
     """
     angle_only = (~part.ranged[track]).nonzero()[0]
+    if one.own_m_s is not None:
+        turn_coarse(part, track, one.own_m_s[:, pair], pose, estimates)
     if one.kind.has_range or len(angle_only) == 0:
         return
     which = track[angle_only]
@@ -261,6 +268,22 @@ def correct_angle_only(
             range_m, variance_m2 = (values[pair[angle_only]] for values in one.ranges)
             moved = ranged_in_polar(*moved, range_m, variance_m2, sensor_m)
         state[:, angle_only], covariance[:, :, angle_only] = moved
+
+
+def turn_coarse(
+    part: TrackStore, track: IntArray, own_m_s: FloatArray, pose: SensorPose, estimates: Estimates
+) -> None:
+    """Bring corrections by coarse bearings onto arcs, in place; NaN where a bearing is not."""
+    coarse = np.flatnonzero(~np.isnan(own_m_s[0]))
+    if not len(coarse):
+        return
+    which = track[coarse]
+    after = zip(estimates.states, estimates.covariances, strict=True)
+    for before, (state, covariance) in zip(part.states(), after, strict=True):
+        state[:, coarse], covariance[:, :, coarse] = turned_about_vertical(
+            selected(before, which), selected(state, coarse), selected(covariance, coarse),
+            selected(pose.position_m, which), own_m_s[:, coarse],
+        )  # fmt: skip
 
 
 def joined(parts: Sequence[Any]) -> Any:

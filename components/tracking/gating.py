@@ -14,7 +14,8 @@ from components.estimation.measurement import Kind, expected
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import LookBatch, Scans, kind_of
+from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
+from components.tracking.told_errors import by_angles, levelled
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -36,6 +37,8 @@ class GatedPairs:
     measured: PairMeasurement
     #: What else was measured, of tracks without a range: ranges and their variances.
     ranges: tuple[FloatArray, FloatArray] | None = None
+    #: (3, pairs) or None: The ownship's velocity, of bearings coarse beside their ranges; else NaN.
+    own_m_s: FloatArray | None = None
 
     @property
     def measures_range(self) -> bool:
@@ -74,17 +77,30 @@ def gated_pairs(
             if len(track) == 0:
                 continue
             cells = batch.detection[entry]
-            variance = spread(track, cells, rows)
-            pairs = pair_measurement(
-                moments,
-                track,
-                _picked(scans.measured, rows, cells),
-                variance,
-                common_errors(
-                    rules, part, track, scans, rows, cells, moments[0].expected, variance
-                ),
-                part.weights,
-            )
+            measured = _picked(scans.measured, rows, cells)
+            own_m_s = None
+            if rules.carried is not None and code & TELLS and ranged is not False:
+                own_m_s = rules.carried.own_m_s(scans, cells)
+                told = rules.carried.told(scans, cells)
+                white = rules.carried.white(
+                    scans, cells, rows, rules.estimator.models, selected(part.weights, track)
+                )
+                measured[:2], place = levelled(measured[:2], pose.take(track))
+                pairs = pair_measurement(
+                    rules.estimator.expect(kind, part.take(track).estimates(), place, told),
+                    np.arange(len(track)), measured,
+                    by_angles(white, measured),
+                    None, part.weights,
+                )  # fmt: skip
+            else:
+                variance = spread(track, cells, rows)
+                pairs = pair_measurement(
+                    moments, track, measured, variance,
+                    common_errors(
+                        rules, part, track, scans, rows, cells, moments[0].expected, variance
+                    ),
+                    part.weights,
+                )  # fmt: skip
             gated = pairs.distance <= gate_threshold(rules.p.gate_probability, kind.size)
             held[entry[gated]] = True
             if not gated.all():
@@ -98,6 +114,7 @@ def gated_pairs(
                 GatedPairs(
                     kind, track[inside], entry[inside], pairs.take(inside),
                     ranges if ranged is False else None,
+                    None if own_m_s is None else own_m_s[:, inside],
                 )
             )  # fmt: skip
     return kinds, direction, held
@@ -254,7 +271,7 @@ def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> Floa
     mine = sensors[one.detection]
     lowest = mine & -mine
     sensor = np.frexp(lowest.astype(float))[1] - 1
-    code = one.kind.has_range + 2 * one.kind.has_range_rate + 4 * one.kind.has_sinking
+    code = one.kind.has_range + 2 * one.kind.has_range_rate + 4 * one.kind.has_velocity
     return np.asarray(rules.log_density[code].take(sensor))
 
 

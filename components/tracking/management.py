@@ -12,7 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, selected, squared_length
+from components.estimation.batched import (
+    product,
+    product_transposed,
+    selected,
+    squared_length,
+    symmetric,
+)
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, updated
@@ -20,7 +26,7 @@ from components.estimation.measurement import Kind, expected, linearised, positi
 from components.messages.reach import EVALUATE
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
-from components.tracking.scans import LookBatch, Scans, kind_of
+from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import NEVER, TrackStore, estimate_columns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -117,11 +123,13 @@ def initiated(
     if rules.p.start_climb_m_s is not None:
         spread[5, 5] = rules.p.start_climb_m_s**2
     states, covariances = [], []
+    begin = _start_by_told(rules, scans, pose, codes, detection, position, spread)
+    known = 6 + rules.estimator.errors
     for size in sizes:
         state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
-        state[:3], covariance[:6, :6] = position, spread
-        for i in range(6, size):
-            covariance[i, i] = rules.start_deviation(size) ** 2
+        state[:known], covariance[:known, :known] = begin
+        for i in range(known, size):
+            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
         _update_by_rates(scans, pose, codes, detection, state, covariance)
         states.append(state)
         covariances.append(covariance)
@@ -276,11 +284,7 @@ def _update_by_rates(
     state: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Update new tracks by their measured range rates, in pose, and by velocities."""
-    told = np.flatnonzero(codes & 4)
-    for axis in (3, 4, 5) if len(told) else ():
-        state[axis, told] = scans.measured[axis + 1, detection[told]]
-        covariance[axis, axis, told] = scans.variance[axis + 1, detection[told]]
+    """Update new tracks by their measured range rates, in pose."""
     which = np.flatnonzero(codes & 2)
     if len(which) == 0:
         return
@@ -292,6 +296,48 @@ def _update_by_rates(
     state[:, which], covariance[:, :, which] = updated(
         selected(state, which), selected(covariance, which), found, rate - known[2:]
     )
+
+
+def _start_by_told(
+    rules: TrackerRules,
+    scans: Scans,
+    pose: SensorPose,
+    codes: IntArray,
+    detection: IntArray,
+    position: FloatArray,
+    spread: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return new tracks with the velocities that are told, and with the errors that they carry.
+
+    `spread` (6, 6, n) is that of position and velocity where nothing is told. What is told is off
+    by its errors, so that the target lies that far on the other side.
+    """
+    errors, count = rules.estimator.errors, len(detection)
+    state, covariance = np.zeros((6 + errors, count)), np.zeros((6 + errors, 6 + errors, count))
+    state[:3], covariance[:6, :6] = position, spread
+    moving = np.flatnonzero(codes & 4)
+    for axis in (3, 4, 5) if len(moving) else ():
+        state[axis, moving] = scans.measured[axis + 1, detection[moving]]
+        covariance[axis, axis, moving] = scans.variance[axis + 1, detection[moving]]
+    for i in range(6, 6 + errors):
+        covariance[i, i] = 1.0
+    telling = np.flatnonzero(codes & TELLS)
+    if rules.carried is None or not len(telling):
+        return state, covariance
+    cells = detection[telling]
+    effects = rules.carried.told(scans, cells).effects(position[:, telling], pose.take(telling))
+    effects[3:] *= (codes[telling] & 4) > 0
+    models = rules.estimator.models
+    even = np.full((len(models), len(cells)), 1.0 / len(models))
+    white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6], models, even)
+    own = covariance[:6, :6, telling]
+    for i in (3, 4, 5):
+        own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
+    own[:3, :3] = _diagonal(white[:3])
+    covariance[:6, :6, telling] = symmetric(own + product_transposed(effects, effects))
+    covariance[:6, 6:, telling] = -effects
+    covariance[6:, :6, telling] = -effects.swapaxes(0, 1)
+    return state, covariance
 
 
 def _diagonal(variance: FloatArray) -> FloatArray:

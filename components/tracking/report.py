@@ -53,8 +53,9 @@ def state_tracks(
     wake: Wake,
     sensors: tuple[str, ...],
     passive_range_share: float | None = None,
+    errors: int = 0,
 ) -> StateTracks:
-    """Return the message of what is reported."""
+    """Return the message of what is reported, of states that carry so many errors."""
     ticks = wake.ticks[rows]
     if not reported:
         empty = StateTracks.initial({}).of_runs(wake.run[rows])
@@ -105,7 +106,7 @@ def state_tracks(
         origin_lon_deg=origin[1],
         origin_alt_m=origin[2],
         covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
-        extras={} if models == 1 else store.extras(models, known),
+        extras={} if models == 1 else store.extras(models, known, errors),
         sensors=sensors,
         nis=np.where(freedom > 0, store.plain("nis"), np.nan),
         nis_freedom=freedom,
@@ -148,16 +149,16 @@ class _Columns:
         return state, {place: covariance[place] for place in COVARIANCE}
 
     def extras(
-        self, models: int, known: Callable[[FloatArray], FloatArray]
+        self, models: int, known: Callable[[FloatArray], FloatArray], errors: int
     ) -> dict[str, FloatArray]:
-        """Return what models have besides position and velocity."""
+        """Return what models have besides position, velocity and errors."""
         found = {}
         for m in range(models):
-            size = len(self._parts[0][f"state{m}"])
+            size = len(self._parts[0][f"state{m}"]) - errors
             found[_PROBABILITIES[size]] = self.element("weights", m)
             if size == 7:
-                found["turn_rate_rad_s"] = known(self.element(f"state{m}", 6))
+                found["turn_rate_rad_s"] = known(self.element(f"state{m}", 6 + errors))
             elif size == 9:
                 for i, name in enumerate(_ACCELERATIONS):
-                    found[name] = known(self.element(f"state{m}", 6 + i))
+                    found[name] = known(self.element(f"state{m}", 6 + errors + i))
         return found

@@ -17,20 +17,21 @@ from pydantic import Field, model_validator
 from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
+from components.tracking.told_errors import CarriedErrors
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 
-_QUANTITIES = ("azimuth", "elevation", "range", "range_rate", "velocity", "climb")
+_QUANTITIES = ("azimuth", "elevation", "range", "range_rate", "velocity")
 # Which of these each row of `Scans.measured` is.
-_OF_ROW = np.array([0, 1, 2, 3, 4, 4, 5])
+_OF_ROW = np.array([0, 1, 2, 3, 4, 4, 4])
 
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
     """What of each sensor's errors lasts."""
 
-    step: FloatArray  # (6 quantities, sensors), of the grid; 0 for none
-    # (parts, 6 quantities, sensors), as in `LastingPart`; 0 where there is none
+    step: FloatArray  # (5 quantities, sensors), of the grid; 0 for none
+    # (parts, 5 quantities, sensors), as in `LastingPart`; 0 where there is none
     variance: FloatArray
     lasts_s: FloatArray
     across_m2: FloatArray
@@ -235,6 +236,7 @@ class TrackerRules:
     rates_of: int  # mask of the sensors whose range rates are used
     lasting: LastingErrors | None  # what of the sensors' errors is not new at every look
     unstated_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
+    carried: CarriedErrors | None  # what of it the filter carries as states
 
     @classmethod
     def of(
@@ -259,6 +261,7 @@ class TrackerRules:
             p, estimator, ticks_per_s, fields, log_densities(fields, p.false_alarms_per_scan),
             (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
             LastingErrors.of(offers, sensors), np.array(unstated) if any(unstated) else None,
+            CarriedErrors.of(offers, sensors) if estimator.errors else None,
         )  # fmt: skip
 
     @property
@@ -309,6 +312,6 @@ def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArr
         for code in range(8):
             volume = width * height * (far if code & 1 else 1.0)
             volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
-            volume *= _WHOLE_RATE_M_S if code & 4 else 1.0
+            volume *= _WHOLE_RATE_M_S**3 if code & 4 else 1.0
             density[code, i] = math.log(per_scan / volume)
     return density

@@ -9,7 +9,7 @@ import numpy as np
 from components.estimation.batched import selected
 from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
-from components.messages.columns import POSE, TARGET_VELOCITY
+from components.messages.columns import POSE, TOLD
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -20,6 +20,9 @@ _VARIANCES = (
     "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
     "range_rate_variance_m2_s2",
 )  # fmt: skip
+
+#: In the kind of a detection: whether it tells of errors that the filter carries.
+TELLS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,27 +47,33 @@ class Scans:
     variance: FloatArray  # (7, detections), the same
     contributors: IntArray
     source: IntArray  # (7, detections), index of the sensor that gave each quantity; -1 for none
+    told: FloatArray | None  # (`TOLD`, detections), what is told of each; None where nothing is
 
     def __len__(self) -> int:
         return len(self.row)
 
-    def kinds(self, rates_of: int) -> IntArray:
-        """Return the kind of each detection: 1 with a range, 2 more with a range rate, 4 sinking.
+    def kinds(self, rates_of: int, carries: bool) -> IntArray:
+        """Return the kind of each detection.
 
-        Of a velocity that is told, and errs in the same way for minutes, a track takes over all
-        when it is born, and then only how fast the target sinks: what lasts of a velocity's error
-        adds up in the position, which a filter that takes it for new does not know.
+        It is 1 with a range, 2 more with a range rate, 4 with a velocity, and `TELLS` with errors
+        that the filter carries. One that carries none does without a velocity whose errors last:
+        they add up in the position, and it would not know.
         """
         code = (~np.isnan(self.measured[2])).astype(np.int64)
         if rates_of and not np.isnan(self.velocity).all():
             moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
             used = moves & (self.variance[3] > 0.0) & ~np.isnan(self.measured[3])
             code += 2 * (used & (self.contributors & ~rates_of == 0))
-        told = ~np.isnan(self.measured[4:]).any(axis=0)
-        if rates_of and told.any():
-            told &= (self.variance[4:] > 0.0).all(axis=0) & (code & 1 > 0)
-            code = np.where(told, 5, code)
-        return code
+        if self.told is None:
+            return code
+        errs = ~np.isnan(self.told[-1])
+        moves = ~np.isnan(self.measured[4:]).any(axis=0) & (code & 1 > 0)
+        moves &= (self.variance[4:] > 0.0).all(axis=0) & (
+            rates_of >> np.maximum(self.source[2], 0) & 1 > 0
+        )
+        tells = errs & (self.source[0] == self.source[2]) & carries
+        code = np.where(errs | moves, code & 1, code)
+        return code + 4 * (moves & (tells | ~errs)) + TELLS * tells
 
     def in_frame(self, origin_deg_m: FloatArray) -> Self:
         """Return the looks with targets' velocities along the axes of frames with some origins."""
@@ -87,6 +96,7 @@ class Scans:
             selected(self.pose, looks), selected(self.velocity, looks), offsets,
             selected(self.measured, which), selected(self.variance, which),
             self.contributors[which], self.source.take(which, axis=-1),
+            None if self.told is None else selected(self.told, which),
         )  # fmt: skip
 
     @classmethod
@@ -98,7 +108,11 @@ class Scans:
         names = ("row", "run", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
                  "variance", "contributors", "source")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
-        return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
+        told = [part.told for part in parts if part.told is not None]
+        return cls(
+            offsets=np.concatenate(([0], np.cumsum(counts))),
+            told=np.concatenate(told, axis=-1) if told else None, **columns,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +157,7 @@ def kind_of(code: int) -> tuple[Kind, list[int]]:
     """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
     kind = Kind(bool(code & 1), bool(code & 2), bool(code & 4))
     rows = [*([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
-    return kind, [0, 1, *rows, *([6] if kind.has_sinking else [])]
+    return kind, [0, 1, *rows, *([4, 5, 6] if kind.has_velocity else [])]
 
 
 def scans_of(fused: FusedDetections) -> Scans:
@@ -192,11 +206,11 @@ def scans_of(fused: FusedDetections) -> Scans:
     np.bitwise_or.at(union, number, sensors[order])
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
-    told = np.full((len(TARGET_VELOCITY), len(mask)), np.nan)
-    if fused.target_velocity is not None:
-        told = np.stack([fused.target_velocity[name] for name in TARGET_VELOCITY])
+    told = np.full((len(TOLD), len(mask)), np.nan)
+    if fused.told_by_target is not None:
+        told = np.stack([fused.told_by_target[name] for name in TOLD])
     measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *told[:3]])
-    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *told[3:]])
+    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *told[3:6]])
     seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
@@ -210,6 +224,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
         measured=selected(measured, entries),
         variance=selected(variance, entries),
+        told=None if fused.told_by_target is None else selected(told, entries),
         contributors=mask[entries],
         source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )

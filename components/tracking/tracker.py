@@ -35,6 +35,7 @@ from components.tracking.report import Reported, state_tracks
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
+from components.tracking.told_errors import told_errors
 from components.tracking.track_store import TrackStore, records_of
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -102,6 +103,8 @@ class Tracker(Component):
         self.rules: TrackerRules | None = None
         self._association = self.association()
         self._estimator = self.estimator()
+        if errors := told_errors(offers):
+            self._estimator = self._estimator.carrying(tuple(one.lasts_s for one, _ in errors))
         self._sensors: tuple[str, ...] = ()
         self._store = self._no_tracks(0)
         self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
@@ -196,7 +199,7 @@ class Tracker(Component):
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(records.origin, of)
         poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
-        codes = scans.kinds(self.rules.rates_of)
+        codes = scans.kinds(self.rules.rates_of, self.rules.carried is not None)
         turned = scans.in_frame(origin)
         reported: list[Reported] = []
         for works in turns(plan.of):
@@ -242,7 +245,8 @@ class Tracker(Component):
             return None
         rows = np.unique(plan.row)
         share = self.p.passive_range_share
-        return state_tracks(reported, poses, origin, rows, wake, self._sensors, share)
+        errors = self._estimator.errors
+        return state_tracks(reported, poses, origin, rows, wake, self._sensors, share, errors)
 
     def _remember(
         self,

@@ -18,7 +18,7 @@ from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.text_rows import TrafficFile
-from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry import line_of_sight_ned
 from components.traffic.source import SourceParameters, TrafficSource, roster_of
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray

@@ -18,8 +18,7 @@ from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights.culling import NearIntervals, SteeredCulling, near_intervals
 from components.flights.fleet import Fleet
 from components.flights.many_flights import SteeredFleet, fleet_of
-from components.geometry.ellipsoid import line_of_sight
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState, line_of_sight
 from components.messages.known_flights import flat
 from components.messages.reach import farthest_look
 from components.messages.targets import TrafficStates

@@ -15,7 +15,7 @@ from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles

@@ -14,7 +14,7 @@ from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.geometry.ellipsoid import enu_to_geodetic
+from components.geometry import enu_to_geodetic
 from components.traffic.flown_together import AllFlown
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles

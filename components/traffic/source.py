@@ -30,7 +30,7 @@ from components.flights.closest_approach import (
 from components.flights.culling import Culling, SteeredCulling, range_between
 from components.flights.fleet import Fleet
 from components.flights.steered_flight import SteeredFlight
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_together import FlownTogether, flown_by

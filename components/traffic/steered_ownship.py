@@ -10,7 +10,7 @@ import numpy as np
 from components.flights.culling import Culling
 from components.flights.fleet import Fleet
 from components.flights.steered_flight import SteeredFlight, Trajectory
-from components.geometry.state import TrajectoryState
+from components.geometry import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.steering import Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -11,9 +11,8 @@ from components.flights.attitude import Wind, attitude_in_wind, scene_wind
 from components.flights.fleet import Fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.flights.steered_flight import SteeredFlight
-from components.geometry.angles import FloatArray
-from components.geometry.state import TrajectoryState
-from dsa_des.arrays.types import IntArray
+from components.geometry import TrajectoryState
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
 

@@ -183,10 +183,10 @@ class Component:
     #: its effects, must then hold all of that state; arrays, lists, dicts and sets among them may
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
-    #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or remembers each replica (`Wake.replica`) apart from the others:
-    #: the next wake comes back to each but those before its `Wake.first_run`. A class says so of
-    #: its own code only: a subclass that does not say it again gets an instance for each replica.
+    #: Whether one instance may serve many runs in lock step: its `run` treats every row by itself,
+    #: draws by `Stream.of_runs`, and remembers each run (`Wake.run`) apart from the others: the
+    #: next wake comes back to each but those before its `Wake.first_run`. A class says so of its
+    #: own code only: a subclass that does not say it again gets an instance for each run.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.

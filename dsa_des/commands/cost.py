@@ -61,7 +61,7 @@ def cost_of_accuracy(
     costs: list[RungCost] = []
     chain: list[dict[str, Any]] = []
     with target.writing() as folder:
-        progress = Progress(silent=as_json)
+        progress = CostProgress(silent=as_json)
         for number, (name, ladder) in enumerate(climbs, 1):
             progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
             try:
@@ -95,7 +95,7 @@ def cost_of_accuracy(
         say(f"{target.path}: {', '.join(names)}")
 
 
-class Progress:
+class CostProgress:
     """Says what is measured: every step on a terminal, elsewhere one every ten seconds."""
 
     def __init__(self, silent: bool) -> None:

@@ -30,8 +30,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire as WireOfScene
-from dsa_des.time.clock import MAX_TICK, parse_rational
-from dsa_des.time.scan_cursor import ScanCursor
+from dsa_des.time.clock import MAX_TICK, ScanCursor, parse_rational
 
 EMBED = "dsa_des.embed"
 

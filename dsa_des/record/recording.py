@@ -20,7 +20,7 @@ from dsa_des.block.recorded_columns import (
 )
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
-from dsa_des.time.run_ends import RunEnds
+from dsa_des.time.runs import RunEnds
 
 # Declared names that an error lists.
 _MOST_NAMES = 30

@@ -26,8 +26,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime, RunEnds
 
 __all__ = ["NotInLockStep", "Replicas", "lock_step"]
 
@@ -105,7 +104,9 @@ class Replicas(Timeline):
         self.ends = RunEnds(self.time)
         self._faces = components
         for name, component in components.items():
-            if not self._shared(name, component):
+            if self._shared(name, component):
+                self.streams.share(name)
+            else:
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
                 make = self._maker(name, component)
@@ -116,7 +117,8 @@ class Replicas(Timeline):
 
     def _shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
-        if not component.serves_replicas():
+        # What was drawn when it was set up would be the first one's in all of them.
+        if not component.serves_replicas() or self.streams.drew_for_all(name):
             return False
         differing = self._differing(name)
         if isinstance(component.p, ClockedParameters):

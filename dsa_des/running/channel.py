@@ -19,8 +19,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.running.effects import WireFaults
 from dsa_des.time.clock import MAX_TICK
-from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime, RunEnds
 
 #: Rows and when they arrive.
 Rows = tuple[RunTicks, Message]

@@ -13,7 +13,7 @@ from dsa_des.running.node import Node
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime
 
 #: From which block to which.
 Edge = tuple[str, str]

@@ -32,7 +32,7 @@ from dsa_des.running.processors import Processor
 from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime
 
 
 @dataclass

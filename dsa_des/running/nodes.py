@@ -19,7 +19,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.randomness import Streams
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime
 
 
 def build_nodes(

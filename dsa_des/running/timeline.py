@@ -19,8 +19,7 @@ from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime, RunEnds
 
 
 class Timeline:

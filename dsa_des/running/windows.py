@@ -24,8 +24,7 @@ from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
-from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime, RunEnds
 
 
 class Window(NamedTuple):

@@ -93,12 +93,20 @@ class Stream:
     Parameters
     ----------
     seed : int or sequence of int
-        That of the run, or of each of several runs (`of_runs`); without a word of runs, draws are
-        those of the first.
+        That of the run, or of each of several runs, which `of_runs` tells apart.
     block, purpose : str
+
+    Attributes
+    ----------
+    drew_for_all : bool
+        Whether something was drawn for all of several runs, with the seed of the first.
+    shared : bool
+        Whether that is refused: who serves all runs draws for each.
     """
 
     def __init__(self, seed: int | Sequence[int], block: str, purpose: str) -> None:
+        self._block, self._purpose = block, purpose
+        self.drew_for_all = self.shared = False
         seeds = [seed] if isinstance(seed, int) else seed
         keys = [key_of(one, block, purpose) for one in seeds]
         self._keys = np.array(keys, dtype=np.uint64)
@@ -117,6 +125,8 @@ class Stream:
     ) -> tuple[UInt64Array, UInt64Array, UInt64Array, UInt64Array]:
         if not 0 <= draw < 2**16:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
+        if len(self._keys) > 1:
+            self._draw_for_all()
         target = np.asarray(targets, dtype=np.uint64)
         key, numbers = self._key, np.asarray(scans, dtype=np.int64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
@@ -142,6 +152,14 @@ class Stream:
             target >> _U32,
         )
         return philox4x32(counter, key)
+
+    def _draw_for_all(self) -> None:
+        self.drew_for_all = True
+        if self.shared:
+            raise ValueError(
+                f"draws {self._purpose!r} of block {self._block!r} are of several runs: say of "
+                "which each is (`stream.of_runs(wake.run)`)"
+            )
 
     def uniform(self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0) -> FloatArray:
         """Return uniform draws in [0, 1) with 53 bits, keyed by target, scan and draw number.
@@ -181,10 +199,15 @@ class Stream:
         return radius * np.cos(angle), radius * np.sin(angle), third
 
 
+#: Of which runs draws are is known: there is no choice among keys.
+_KNOWN: UInt64Array = np.empty(0, dtype=np.uint64)
+
+
 class _RunStream(Stream):
     """The draws of rows whose keys are known; their shape is that of targets or scans."""
 
     def __init__(self, keys: UInt64Array) -> None:
+        self._keys = _KNOWN
         self._key = (keys & _U_LOW, keys >> _U32)
 
 
@@ -207,12 +230,24 @@ class Streams:
         self.seed = seed if isinstance(seed, int) else seed[0]
         self._seeds = (seed,) if isinstance(seed, int) else tuple(seed)
         self._made: dict[tuple[str, str], Stream] = {}
+        self._shared: set[str] = set()
 
     def stream(self, block: str, purpose: str) -> Stream:
         """Return the stream of a block's purpose."""
         if (block, purpose) not in self._made:
             self._made[block, purpose] = Stream(self._seeds, block, purpose)
+            self._made[block, purpose].shared = block in self._shared
         return self._made[block, purpose]
+
+    def drew_for_all(self, block: str) -> bool:
+        """Whether a block drew with the seed of the first of several runs."""
+        return any(one.drew_for_all for (of, _), one in self._made.items() if of == block)
+
+    def share(self, block: str) -> None:
+        """Refuse from now on what a block draws without a word of runs."""
+        self._shared.add(block)
+        for (of, _), stream in self._made.items():
+            stream.shared = stream.shared or of == block
 
     def scan_normals(self, block: str, purpose: str) -> Callable[[IntArray], FloatArray]:
         """Return a function from scan numbers to standard normal draws (for clock jitter)."""

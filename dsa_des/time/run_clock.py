@@ -7,7 +7,7 @@ import numpy as np
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
 from dsa_des.time.clock import ClockSpec, ScanClock
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime
 
 #: Scan numbers, and when these scans are.
 Scans = tuple[IntArray, RunTicks]

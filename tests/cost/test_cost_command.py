@@ -47,14 +47,14 @@ def rows(tmp_path_factory):
 def test_who_waits_is_told_what_is_measured(monkeypatch, capsys):
     now_s = iter([0.0, 1.0, 11.0, 12.0, 22.0])
     monkeypatch.setattr(cost.time, "monotonic", lambda: next(now_s))
-    progress = cost.Progress(silent=False)
+    progress = cost.CostProgress(silent=False)
     for step in ("a", "b", "c", "d"):
         progress.say(step)  # standard error is no terminal: a line every ten seconds
     assert capsys.readouterr() == ("", "b\nd\n")
     monkeypatch.setattr(cost.time, "monotonic", lambda: 0.0)
     monkeypatch.setattr(cost.sys.stderr, "isatty", lambda: True, raising=False)
-    cost.Progress(silent=True).say("nothing")
-    cost.Progress(silent=False).say("at once")
+    cost.CostProgress(silent=True).say("nothing")
+    cost.CostProgress(silent=False).say("at once")
     assert capsys.readouterr() == ("", "at once\n")
 
 

@@ -120,7 +120,7 @@ def passes(pairs: Pairs, radius_ft: float, half_height_ft: float) -> np.ndarray:
 
 
 def test_the_gas_models_closed_form_over_the_radius(tmp_path: Path) -> None:
-    pairs = sampler(tmp_path, GAS, **FREE).pairs(range(6000))
+    pairs = sampler(tmp_path, GAS, **FREE).pairs(range(3000))
     # Mean relative speeds, by plain Monte Carlo of velocities.
     random = np.random.default_rng(2)
     count = 400_000

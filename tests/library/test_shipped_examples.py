@@ -1,19 +1,33 @@
-"""Shipped scenes and studies: found by name, and all of them can be read."""
+"""Shipped scenes, studies and cases: found by name, all can be read, and none has notes."""
 
 import pytest
 
 import dsa_des
+from dsa_des.running.reports import notes_of_scene
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.examples import examples, find_example
+from dsa_des.scene.scene import load_scene
 from dsa_des.studies.study_file import read_study
 
 
 def test_each_is_found_by_its_name_and_scenes_are_whole():
     kinds = {example.kind for example in examples()}
-    assert kinds == {"scene", "study"}
+    assert kinds == {"scene", "study", "case"}
     for example in examples():
         assert find_example(example.name, example.kind) == example.path
         if example.kind == "scene":
             assert dsa_des.load_scene(example.name).title == example.title
+
+
+def test_shipped_scenes_are_quiet():
+    """They are right, or say that they mean it: no run of one begins with notes."""
+    notes = {
+        example.name: notes_of_scene(Simulation(load_scene(example.path)))
+        for example in examples()
+        if example.kind == "scene"
+    }
+    assert len(notes) > 40
+    assert {name: said for name, said in notes.items() if said} == {}
 
 
 def test_a_shipped_study_can_be_read():

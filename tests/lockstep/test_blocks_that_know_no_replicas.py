@@ -170,3 +170,40 @@ def test_a_subclass_says_for_itself_that_it_serves_all_replicas():
         assert base.lockstep
         assert not type("Silent", (base,), {}).lockstep
         assert type("Outspoken", (base,), {"lockstep": True}).lockstep
+
+
+class DrawsOnce(TrackerStub):
+    """Says that it serves all, and draws how many of its tracks it forgets when it is set up."""
+
+    lockstep = True
+
+    def setup(self):
+        super().setup()
+        self.each = 2 + int(5.0 * self.stream("how many").uniform(np.uint64(0), np.int64(0)))
+
+    def run(self, wake):
+        tracks = super().run(wake)
+        kept = [] if tracks is None else np.flatnonzero(tracks.tick // 10**9 % self.each)
+        return tracks.take(kept) if len(kept) else None
+
+
+class DrawsForAll(TrackerStub):
+    """Says that it serves all, and forgets by draws that say nothing of runs."""
+
+    lockstep = True
+
+    def run(self, wake):
+        self.stream("forgets").uniform(np.uint64(0), wake.scans)
+        return super().run(wake)
+
+
+def test_who_draws_when_set_up_draws_in_each_replica(lock, tmp_path):
+    simulation = lock.same_as_alone(with_tracker(tmp_path, DrawsOnce))
+    assert list(simulation.timeline.split) == ["tracker"]
+
+
+def test_who_does_not_say_of_which_run_it_draws_is_told(tmp_path):
+    scenes = with_tracker(tmp_path, DrawsForAll)
+    Simulation(scenes[0]).run()
+    with pytest.raises(BlockFailure, match=r"tracker.*'forgets'.*several runs.*of_runs"):
+        lock_step(scenes).run()

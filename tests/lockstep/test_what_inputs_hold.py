@@ -7,8 +7,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
 from dsa_des.running.windows import Windows
-from dsa_des.time.run_ends import RunEnds
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime, RunEnds
 
 RUN_TICKS = 60
 

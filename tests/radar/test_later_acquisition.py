@@ -1,6 +1,7 @@
 """A radar acquires slow targets, and those off the nose, later than it keeps them."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import wired
 from covering import covers
 
 import dsa_des
+from components.sensor.acquisition import Acquired, AcquisitionRange
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
@@ -133,3 +135,39 @@ def test_what_cannot_be(ranges, said):
         table["blocks"]["radar"]["acquisition"] = ranges
         dsa_des.load_scene(table)
     assert said in str(caught.value)
+
+
+def test_who_is_missed_or_goes_too_far_is_acquired_anew():
+    """Two targets of two runs by hand, in one call and in two that are cut anywhere."""
+    scan = np.array([0, 1, 2, 3, 4, 5, 6, 8, 9, 10])
+    range_km = np.array([6.0, 4.0, 6.0, 11.0, 6.0, 4.0, 9.0, 6.0, 4.9, 9.9])
+    seen = [0, 1, 1, 0, 0, 1, 1, 0, 1, 1]
+    other = np.array([9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 4.0, 9.0, 9.0, 4.0])
+    of_other = [0, 0, 0, 0, 0, 0, 1, 0, 0, 1]  # scan 7 is missing: anew in scan 10
+
+    def factors(where, first, last):
+        part = slice(first, last)
+        count = len(scan[part])
+        cells = SimpleNamespace(
+            run=np.repeat([0, 2], count), target=np.ones(2 * count, dtype=int),
+            scan=np.tile(scan[part], 2), roster=SimpleNamespace(names=("a", "b")),
+            body_azimuth_rad=np.zeros(2 * count),
+            range_m=1000.0 * np.concatenate([range_km[part], other[part]]),
+        )  # fmt: skip
+        return where(Sized(cells)).reshape(2, -1)
+
+    ranges = (AcquisitionRange(range_km=10.0, share=(0.5,)),)
+    for cut in range(1, len(scan)):
+        where = Acquired(ranges)
+        found = np.concatenate([factors(where, 0, cut), factors(where, cut, None)], axis=1)
+        assert found.tolist() == [seen, of_other], cut
+
+
+class Sized:
+    """Cells with nothing but columns."""
+
+    def __init__(self, columns):
+        self.__dict__.update(vars(columns))
+
+    def __len__(self):
+        return len(self.scan)

@@ -15,8 +15,8 @@ from dice import Dice
 from random_scene import legal_case
 
 LIMIT_S = 60.0
-FEW = range(9_000_000, 9_000_009)
-MORE = range(9_100_020, 9_100_025)
+FEW = range(9_000_000, 9_000_006)
+MORE = range(9_100_020, 9_100_023)
 
 
 @pytest.mark.parametrize("seed", FEW)
@@ -74,9 +74,6 @@ def test_what_differs_is_seen(tmp_path):
 
 def test_the_generator_leaves_nothing_out(tmp_path):
     """Over some hundred scenes every type of block, loop, beam and fault on the way occurs."""
-    features: set[str] = set()
-    for seed in range(9_200_000, 9_200_120):
-        features |= legal_case(seed, tmp_path).features
     wanted = {
         "closed loop", "sweeping beam in a loop", "update_rate_hz", "shared processors",
         "initial message", "clock jitter", "clock rate error", "clock offset", "weather",
@@ -91,4 +88,8 @@ def test_the_generator_leaves_nothing_out(tmp_path):
         "drop_probability sensor -> fusion", "cue loop", "fusion.covariance_intersection",
         "tracker that estimates", "late looks that count", "fusion.pass_through",
     }  # fmt: skip
-    assert wanted - features == set()
+    for seed in range(9_200_000, 9_200_120):
+        wanted -= legal_case(seed, tmp_path).features
+        if not wanted:
+            break
+    assert wanted == set()

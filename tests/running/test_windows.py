@@ -14,7 +14,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Window, Windows
 from dsa_des.scene.scene import load_scene
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.time.runs import ReplicaTime
 
 LOOP = "configs/benchmark/manoeuvres.toml"
 FEEDBACK = '{ from = "end", to = "cue.cue", delay = "1 scan", holds = "nothing" }'

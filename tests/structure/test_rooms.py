@@ -143,6 +143,18 @@ def test_nothing_imports_what_makes_the_pages(room):
     assert [edge for edge in imports().edges if edge[1] in inside and edge[0] not in may] == []
 
 
+def test_geometry_is_imported_by_its_face():
+    """One name for each function, whatever file it is in; the proofs of error bounds apart."""
+    room = f"{BLOCKS}.geometry"
+    files = {module for module in modules() if module.startswith(f"{room}.")}
+    assert len(files) > 5
+    assert [
+        (source, target)
+        for source, target in imports().edges
+        if target in files - {f"{room}.error_bounds"} and not source.startswith(room)
+    ] == []
+
+
 def folders_of_code() -> list[Path]:
     """All folders, at any depth, that hold Python files of the product, its tests or its pages."""
     tops = (ENGINE, BLOCKS, "tests", "docs")

@@ -106,7 +106,7 @@ def test_runs_that_kill_their_worker_are_recorded_as_failed(small: Path) -> None
         .replace("[1, 5]", "[5]")
         .replace("seed = 3", "seed = 1")
     )
-    extra = '"blocks.ir.flaw" = { choice = ["die", "none"] }\n"blocks.traffic'
+    extra = '"blocks.ir.flaw" = { choice = ["die", "none", "none", "none"] }\n"blocks.traffic'
     Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
     study = read_study("study.toml")
     dying = {k for k in range(6) if study.replica(k).changes["blocks.ir.flaw"] == "die"}

@@ -116,6 +116,43 @@ def test_glances_scale_the_search_and_spells_are_all_or_nothing_of_a_run():
     assert abs(seen / runs - expected) < 2.6 * math.sqrt(expected * (1 - expected) / runs)
 
 
+def test_who_sits_left_and_who_sits_right_attend_each_for_themselves():
+    # One of two who look out through half of all runs sees the aircraft in three of four.
+    pilot = {"beta_per_sr_s": 1e9, "left_looking": 0.5, "right_looking": 0.5, "looking": "spells"}
+    spells = dsa_des.load_scene(scene(pilot, duration_s=3))
+    runs = 240
+    together = tables_of([scene_of(spells, Replica(k, {})) for k in range(runs)], lock_step)
+    seen = len(set(together["detections"]["replica"].to_pylist()))
+    assert abs(seen / runs - 0.75) < 2.6 * math.sqrt(0.75 * 0.25 / runs)
+
+
+def test_a_search_in_glances_comes_round_so_much_later():
+    pilot = {"search": "round", "round_s": 30.0, "smallest_arcmin": 4.0, "left_looking": 0.5}
+    found, deviation = share_seen(pilot, before_s=8.0, targets=600)
+    shows_m = math.sqrt(AREA_M2 * 4.0 / math.pi) / math.radians(4.0 / 60.0)
+    expected = round_share(CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=60.0)
+    assert 0.15 < expected < 0.3
+    assert abs(found - expected) < 2.6 * deviation
+
+
+def test_nobody_is_sought_before_he_appears():
+    late = met("late", start_time_s=4.5)
+    looks = rows(run(scene({"smallest_arcmin": 0.0}, [late], duration_s=7)), "looks")
+    first, second = [row["detection_probability"] for row in looks if row["time_s"] in (5.0, 6.0)]
+    # Half a second before the scan at 5 s, then a whole one; nearer by little.
+    assert math.log1p(-first) / math.log1p(-second) == pytest.approx(0.5, abs=0.03)
+
+
+def test_who_flies_away_is_seen_until_he_is_too_small():
+    # 12 m² are under 4' from 3359 m on, (3359 - 2000) / 150 = 9.06 s after the start.
+    # Edge-on its wings show nothing; but how far is looked goes by the largest side.
+    body = {"front_m2": AREA_M2, "side_m2": 0.0, "horizontal_m2": 90.0}
+    away = met("away", range_m=2000.0, heading_deg=217.0, speed_mps=210.0, eo=body)
+    pilot = {"beta_per_sr_s": 1e9, "smallest_arcmin": 4.0}
+    scans = {row["scan"] for row in rows(run(scene(pilot, [away], duration_s=20)))}
+    assert scans == set(range(min(scans), 10)) and min(scans) <= 1
+
+
 @covers("right_looking", "azimuth_deg", "elevation_deg", of=("visual.acquisition",))
 def test_each_seat_has_its_side_in_axes_that_bank_with_the_aircraft():
     own = {"roll_deg": 20.0, "speed_mps": 0.0}

@@ -23,7 +23,11 @@ _TARGETS = ((-540, -480, 40, 130, 70), (-1300, -950, -70, 40, 50), (-780, -360, 
 _RATE_HZ = 25
 
 
-def _recorded(seed: int, noise: float, texture: float, *, pictures: bool) -> list[dict[str, Any]]:
+def recorded(
+    seed: int, noise: float, texture: float, camera: str = "optical.eo"
+) -> list[dict[str, Any]]:
+    """Return every look of the signature at the targets, or what a camera that renders detects."""
+    pictures = camera != "optical.eo"
     turn = np.random.default_rng(seed).uniform(-25.0, 25.0, len(_TARGETS))
     targets = ", ".join(
         f'{{ name = "t{i}", north_m = {n}, east_m = {e}, up_m = {u}, speed_mps = {v}, '
@@ -39,9 +43,8 @@ def _recorded(seed: int, noise: float, texture: float, *, pictures: bool) -> lis
     ]  # fmt: skip
     path = find_example("optical/pictures")
     assert path is not None
-    swaps = [] if pictures else ["eo=optical.eo"]
     sink = MemorySink()
-    scene = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s="4")
+    scene = load_scene(path, sets=sets, swaps=[f"eo={camera}"], seed=seed, duration_s="4")
     Simulation(scene, recorder=Recorder([sink])).run()
     rows = sink.tables()["detections" if pictures else "looks"].to_pylist()
     return [row for row in rows if row["block"] == "eo"]
@@ -56,12 +59,11 @@ def flow_errors(seeds: Iterable[int], noise: float, texture: float) -> np.ndarra
     found = []
     for seed in seeds:
         covered = {
-            (row["target"], row["scan"]): row["pixels"]
-            for row in _recorded(seed, noise, texture, pictures=False)
+            (row["target"], row["scan"]): row["pixels"] for row in recorded(seed, noise, texture)
         }
         looks = {
             (row["target"], row["scan"]): row
-            for row in _recorded(seed, noise, texture, pictures=True)
+            for row in recorded(seed, noise, texture, "optical.image")
         }
         for (name, scan), row in looks.items():
             before = looks.get((name, scan - 1))

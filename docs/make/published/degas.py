@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 
 import dsa_des
 from components.geometry import line_of_sight
-from docs.make.published import degas_sensors
+from docs.make.published import degas_bands, degas_sensors
 from docs.make.published.rows import PublishedRow, table
 
 TITLE = "DEGAS, from encounter to metric"
@@ -47,15 +47,6 @@ what was recorded, and each of these is a key of its own: `alerting.m_of_n`, and
 the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing that the
 rows need. Other encounters of the same source fly through the same scene by `traffic.daa_file`
 and `traffic.csv` in the place of its traffic.
-"""
-
-_BANDS = """
-**Its bands, cell by cell.** It asks DAIDALUS 2.0.1, and recorded 271 directions and 6 altitudes at
-each of 181 seconds. With `daidalus_version = 2.0.1` all 49,051 and all 1,086 are equal (a value on
-an edge has the region of either side), given the velocity of the step of 0.1 s before, which is
-what its logic sees; with that of the instant itself 8 cells at edges of a turning ownship's bands
-differ.
-The tests compare them (`tests/guidance/test_bands_against_reference.py`).
 """
 
 _TRACKED = """
@@ -131,7 +122,7 @@ def section(images: Path, runs: Any = None) -> str:
             _HEAD,
             table([*unmitigated(), *mitigated()]),
             _CHOSEN,
-            _BANDS,
+            degas_bands.text(),
             degas_sensors.text(images, runs),
             _TRACKED.format(across_ft=across_ft),
         ]

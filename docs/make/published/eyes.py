@@ -289,7 +289,7 @@ shows and t before the collision: P = (R/V - t)/T. The table fixes R/T and t/T a
 are 9': 36 looks of a second, as over 180° by 20° in steps of 10°. T and R are read off this
 table, then, not known beforehand; 12 numbers follow from two. `visual.acquisition` with `search =
 "round"`, `looking = "spells"`; the number is the closed form, in brackets 95 % of {runs:,}
-flights each.
+flights each (of twelve such intervals one may well miss its closed form).
 
 {morris}
 
@@ -297,13 +297,15 @@ Published numbers are of two places, cut off ("less than"). Andrews's rate (β =
 steradian and second, haze of 2.996 over the visual range) does not give this table with any area
 and visual range: the nearest, 420 ft² and 6.2 nmi, has {rates} at 200, 300, 400 and 500 kt.
 
-**What eyes leave of the risk.** Published by N. Underhill, E. Maki, B. Gill and A. Weinert
-(*Estimating See and Be Seen Performance with an Airborne Visual Acquisition Model*,
-arXiv:2307.05502, 2023; the abstract was at hand, not the text), with an updated model of Andrews:
-0.625 of NMAC and 0.746 of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do.
-Its block is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a pilot on
-the left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual range of
-20 nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 142 abeam, 430 from above).
+**What eyes leave of the risk.** Published with an updated model of Andrews: 0.625 of NMAC and 0.746
+of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do. We take them to be of
+N. Underhill, E. Maki, B. Gill and A. Weinert (*Estimating See and Be Seen Performance with an
+Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023), of which the abstract was at hand; it
+has no numbers.
+The model's block is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a
+pilot on the left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual
+range of 20 nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 142 abeam, 430 from
+above).
 Ours: encounters of two aircraft of MIT Lincoln Laboratory's uncorrelated model
 (`uncor_1200code_v1`, BSD-2, not part of the project), turns by DAIDALUS 5 s after an alert of whom
 the pilot has seen for 5 s (`configs/published/see_and_avoid.toml`;

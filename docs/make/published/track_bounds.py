@@ -169,7 +169,8 @@ def section(images: Path) -> str:
 
 _HEAD = """Appendix Q of RTCA DO-365 says how sensors err, its Table 2-20 within what 95 % of the errors of a
 track must lie. `dsa-des study do365_tracks` flies encounters of a model (here {runs}), and takes, in each, one sample at every nautical mile, from 30 s after the start on; an
-entry is the 95 % quantile over encounters, with its 95 % interval by order statistics, of the bound.
+entry is the 95 % quantile over encounters, with its 95 % interval by order statistics, of the bound (`inf`: of
+too few tracks there is no upper end).
 
 ![Quantiles of the radar's tracks over range, beside the bounds](images/{figure})"""
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from components.estimation.motion import CoordinatedTurn, Motion
+from components.estimation.motion import ConstantVelocity, CoordinatedTurn, Motion
 from components.optical.sensors import OpticalRangeBoundary as CameraBoundary
 from components.radar.radar import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
@@ -94,6 +94,8 @@ class Case:
     #: The model that flights are drawn from, ten in a scene.
     drawn: Motion | None = None
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
+    #: What the drawn ones are, in turn.
+    aircraft: list[dict[str, Any]] = field(default_factory=list)
     #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
     #: How near a track must be to be a target's: coarse bearings err by more than that of others.
@@ -150,15 +152,26 @@ def _closing() -> list[dict[str, Any]]:
 
 
 ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "range_km": 40.0}
-ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0]}
-#: Far enough apart for bearings of 9 degrees.
+ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0],
+          "far_every": 1}  # fmt: skip
+#: Of the navigation of aircraft: categories of position and velocity, in turn.
 _EQUIPPED = [
+    {"mode_s": True, "ads_b": {"nacp": nacp, "nacv": nacv}}
+    for nacp, nacv in ((8, 1), (9, 2), (10, 3), (7, 2), (11, 4), (9, 1))
+]
+_THREE = [
     {**STRAIGHT, "name": f"equipped{i}", "east_m": east, "north_m": north, "heading_deg": heading,
-     "mode_s": True, "ads_b": {"nacp": 8 + i, "nacv": 1 + i}}
-    for i, (east, north, heading) in enumerate(
-        ((-4000.0, -3000.0, 100.0), (3000.0, -9000.0, 330.0), (-8000.0, 2500.0, 200.0))
+     "climb_mps": climb, **_EQUIPPED[i]}
+    for i, (east, north, heading, climb) in enumerate(
+        (
+            (-4000.0, -3000.0, 100.0, 4.0),
+            (3000.0, -9000.0, 330.0, -3.0),
+            (-8000.0, 2500.0, 200.0, 6.0),
+        )
     )
 ]  # fmt: skip
+#: Of drawn flights: 60 m/s in any direction, and level at first.
+_AS_DRAWN = {"start_speed_m_s": 42.4, "start_climb_m_s": 3.0}
 
 _BIASES = {"azimuth_bias_deg": 1.0, "elevation_bias_deg": 1.0, "range_bias_m": 40.0,
            "scan_rate_hz": 5}  # fmt: skip
@@ -199,9 +212,20 @@ CASES = {
     "lasting": Case("a radar with errors that last 5 s, ekf", _EKF,
                     sensors={"radar": {**RADAR, **_LASTING}}),
     "near": Case("passes at 240 m, ekf", _EKF, [NEAR]),
-    "ads_b": Case("ADS-B of NACp 8, 9 and 10 at 1 Hz, ekf", {"type": "tracking.ekf"},
-                  _EQUIPPED, sensors={"ads_b": ADS_B}),
-    "active": Case("active surveillance of Mode S at 1 Hz, ukf", {"type": "tracking.ukf"},
-                   _EQUIPPED[:1], sensors={"active": ACTIVE}, within_m=3000.0),
+    "ads_b": Case("ADS-B of NACp 8, 9 and 10 at 1 Hz, nothing rounded, ekf", _EKF, _THREE,
+                  sensors={"ads_b": {**ADS_B, "compact": False}}),
+    "ads_b_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, _THREE,
+                      sensors={"ads_b": {**ADS_B, "compact": False}}),
+    "ads_b_compact": Case("the same as messages round it, ekf", _EKF, _THREE,
+                          sensors={"ads_b": ADS_B}),
+    "active": Case("active surveillance of Mode S at 1 Hz, drawn flights, ukf",
+                   {"type": "tracking.ukf", **_AS_DRAWN}, [], ConstantVelocity(4.0),
+                   sensors={"active": ACTIVE}, within_m=3000.0, aircraft=_EQUIPPED),
+    "active_ekf": Case("the same, ekf", {"type": "tracking.ekf", **_AS_DRAWN}, [],
+                       ConstantVelocity(4.0), sensors={"active": ACTIVE}, within_m=3000.0,
+                       aircraft=_EQUIPPED),
+    "both": Case("ADS-B of NACp 8 and active surveillance, ukf",
+                 {"type": "tracking.ukf", **STILL, "alpha": 0.3}, _THREE[:1],
+                 sensors={"active": ACTIVE, "ads_b": ADS_B}, within_m=3000.0),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,9 @@ def scenes_of(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
     for number in range(-(-replicas // _FLIGHTS)):
         path = folder / f"flights{number}.csv"
         drawn_flights(path, case.drawn, number)
-        traffic = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
-        scene = dsa_des.load_scene(scene_of_case(case, traffic))
+        read: dict[str, Any] = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
+        if case.aircraft:
+            crafts = zip(range(1, 1 + _FLIGHTS), cycle(case.aircraft), strict=False)
+            read["aircraft"] = {f"t{i}": craft for i, craft in crafts}
+        scene = dsa_des.load_scene(scene_of_case(case, read))
         yield [scene_of(scene, Replica(1 + number, {}))]

@@ -6,7 +6,7 @@ from reference_data import reference_text
 
 import dsa_des
 from docs.make.published import __main__ as maker
-from docs.make.published import degas, degas_sensors
+from docs.make.published import degas, degas_bands, degas_sensors
 from docs.make.published.degas_sensors import quantiles
 
 PAGE = maker.PAGE.read_text(encoding="utf-8").splitlines()
@@ -70,6 +70,10 @@ def test_its_flights_from_a_file_give_the_same(tmp_path):
     )
     for row in degas.mitigated(scene):
         assert row.verdict == "equal", row.line()
+
+
+def test_bands_are_not_spoken_of_without_their_record(tmp_path):
+    assert "equal" not in degas_bands.text(tmp_path / "degas")
 
 
 def test_the_middle_99_percent_are_of_the_runs_that_have_a_value():

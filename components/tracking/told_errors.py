@@ -1,0 +1,118 @@
+"""Which errors of what aircraft tell a tracker carries in its states, and how large they are.
+
+An error that an aircraft has, whoever hears it, is one state for all sensors: its altimeter speaks
+through its broadcasts and through its replies.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.estimation.batched import times
+from components.estimation.carried_errors import BEARING, RANGE, ToldErrors
+from components.estimation.frame import SensorPose
+from components.estimation.motion import Motion
+from components.messages.columns import TOLD
+from components.messages.detections import SensorOffer, ToldError
+from components.tracking.scans import Scans
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+# Nearer to the vertical azimuths say nothing.
+_LEAST_COS = 1e-3
+
+
+def told_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
+    """Return the errors that sensors tell of, and whose they are: once for those of an aircraft."""
+    found: dict[tuple[ToldError, str], list[str]] = {}
+    for name, offer in sorted(offers.items()):
+        for one in offer.told_errors if isinstance(offer, SensorOffer) else ():
+            found.setdefault((one, "" if one.of_aircraft else name), []).append(name)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedErrors:
+    """The errors that tracks carry."""
+
+    ways: tuple[int, ...]
+    column: IntArray  # (errors,), of each error's deviation in `Scans.told`
+    mine: BoolArray  # (errors, sensors), which sensors have which
+    at_range: BoolArray  # (sensors,), whether a height leaves the range as it is
+
+    @classmethod
+    def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
+        """Return those that some sensors tell of."""
+        errors = told_errors(offers)
+        mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
+        ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
+        return cls(
+            tuple(one.way for one, _ in errors),
+            np.array([TOLD.index(one.deviation) for one, _ in errors]),
+            mine, (mine & ranging[:, np.newaxis]).any(axis=0),
+        )  # fmt: skip
+
+    def told(self, scans: Scans, cells: IntArray) -> ToldErrors:
+        """Return what some detections are told of their errors."""
+        assert scans.told is not None
+        source, told = scans.source[0][cells], scans.told[:, cells]
+        deviation = np.where(self.mine[:, source], told[self.column], 0.0)
+        return ToldErrors(self.ways, deviation, told[TOLD.index("age_s")], self.at_range[source])
+
+    def own_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
+        """Return the ownship's velocity (north, east, down) where a bearing is coarse, else NaN."""
+        assert scans.told is not None
+        return scans.told[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
+
+    def white(
+        self,
+        scans: Scans,
+        cells: IntArray,
+        rows: list[int],
+        models: Sequence[Motion],
+        weights: FloatArray,
+    ) -> FloatArray:
+        """Return variances of what is new in some detections, of a place along all axes alike.
+
+        What is told is of some time ago: targets have changed since as `models` have it, with
+        `weights` (models, n).
+        """
+        assert scans.told is not None
+        variance = scans.variance[rows][:, cells]
+        variance[:3] = scans.told[TOLD.index("white_variance"), cells]
+        carried_s, age_s = (
+            scans.told[TOLD.index(name), cells] for name in ("age_s", "velocity_age_s")
+        )
+        for model, weight in zip(models, weights, strict=True):
+            moved, turned = model.noise(carried_s), model.noise(age_s)
+            for i in range(3):
+                variance[i] += weight * moved[i, i]
+            for i in range(3, len(rows)):
+                variance[i] += weight * turned[i, i]
+        return np.asarray(variance)
+
+
+def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
+    """Return variances along three axes, m², as those of azimuth, elevation and range."""
+    found, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
+    level = np.maximum(np.cos(measured[1]), _LEAST_COS)
+    found[0] /= (distance * level) ** 2
+    found[1] /= distance**2
+    return found
+
+
+def levelled(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
+    """Return azimuths and elevations (2, n) in body axes as ones in the frame's, and that pose.
+
+    What is told of bearings and heights is told in level axes: there it is linear.
+    """
+    azimuth, elevation = angles_rad
+    level = np.cos(elevation)
+    body = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)])
+    x, y, z = times(pose.to_body.swapaxes(0, 1), body)
+    upright = np.zeros_like(pose.to_body)
+    for i in range(3):
+        upright[i, i] = 1.0
+    turned = np.stack([np.arctan2(y, x), np.arctan2(-z, np.hypot(x, y))])
+    return turned, SensorPose(pose.position_m, upright, pose.velocity_m_s)
