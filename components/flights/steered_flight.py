@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -15,7 +15,7 @@ from components.flights.fleet import in_rows
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
-from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray
@@ -72,6 +72,11 @@ class SteeredFlight:
     ) -> None:
         self.name, self.flight, self.parts = flight.name, flight, parts
 
+    @cached_property
+    def _fleet(self) -> ScriptedFleet:
+        """All parts, which are asked together."""
+        return ScriptedFleet([part for _, part in self.parts])
+
     @property
     def max_speed_mps(self) -> float:
         """Largest speed along the path as it is now."""
@@ -83,7 +88,7 @@ class SteeredFlight:
 
     def fastest_by(self, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre that has begun by each of some times, or 0."""
-        speeds = [0.0, *(flight.max_speed_mps for _, flight in self.parts)]
+        speeds = [0.0, *self._fleet.max_speeds_mps.tolist()]
         part = np.searchsorted([start for start, _ in self.parts], time_s, side="right")
         return np.asarray(np.maximum.accumulate(speeds)[part])
 
@@ -96,7 +101,9 @@ class SteeredFlight:
         around = self.at(times_around_s(np.array([time_s])))
         before = self.parts[-1][1] if self.parts else None
         (part,) = flown_from(self.name, around, np.array([time_s]), [manoeuvre], [before])
-        return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
+        found = SteeredFlight(self.flight, (*self.parts, (time_s, part)))
+        found.__dict__["_fleet"] = ScriptedFleet.joined(self._fleet, part.as_fleet)
+        return found
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return the state at some times, of any shape."""
@@ -105,14 +112,13 @@ class SteeredFlight:
             return self.flight.at(times)
         flat = times.reshape(-1)
         part = np.searchsorted([start for start, _ in self.parts], flat, side="right")
-        flights: list[Any] = [self.flight, *(flight for _, flight in self.parts)]
-        flown = np.flatnonzero(np.bincount(part, minlength=1)).tolist()
-        if len(flown) == 1:
-            state: TrajectoryState = flights[flown[0]].at(times)
-            return state
-        chosen = [np.flatnonzero(part == number) for number in flown]
-        states = [flights[k].at(flat[rows]) for k, rows in zip(flown, chosen, strict=True)]
-        return in_rows(chosen, states).reshaped(times.shape)
+        own, after = np.flatnonzero(part == 0), np.flatnonzero(part)
+        if not len(after):
+            return self.flight.at(times)
+        steered = self._fleet.each(part[after] - 1, flat[after])
+        if len(own):
+            steered = in_rows([own, after], [self.flight.at(flat[own]), steered])
+        return steered.reshaped(times.shape)
 
 
 class Turning(NamedTuple):
