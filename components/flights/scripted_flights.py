@@ -109,14 +109,11 @@ class ScriptedTrajectory:
         if not -180.0 <= lon_deg < 180.0:
             lon_deg = float(wrap_longitude_deg(np.array([lon_deg]))[0])
         start = (float(lat_deg), float(lon_deg), float(alt_m))
-        segments = LegBuilder(
-            name=name,
-            start=start,
-            heading_rad=heading_from_deg(heading_deg),
-            speed_mps=float(speed_mps),
-            climb_mps=float(climb_mps),
-            reference=start if reference is None else reference,
-        ).build(legs)
+        builder = LegBuilder(
+            name, start, heading_from_deg(heading_deg), float(speed_mps), float(climb_mps),
+            start if reference is None else reference,
+        )  # fmt: skip
+        segments = builder.build(legs)
         angles = (None if yaw_deg is None else yaw_deg % 360.0, pitch_deg, roll_deg)
         fixed = tuple(None if angle is None else radians(angle) for angle in angles)
         self._set(name, segments, fixed, float(start_time_s), end)
@@ -146,17 +143,10 @@ class ScriptedTrajectory:
         return cls(name, **place, reference=reference, **others)
 
     @classmethod
-    def of_segments(
-        cls,
-        name: str,
-        segments: list[Segment],
-        fixed_attitude_rad: tuple[float | None, ...],
-        start_time_s: float,
-        end_time_s: float,
-    ) -> ScriptedTrajectory:
-        """Return a flight whose segments are known already."""
+    def of_segments(cls, *known: Any) -> ScriptedTrajectory:
+        """Return a flight whose segments are known already; see `_set`."""
         flight = cls.__new__(cls)
-        flight._set(name, segments, fixed_attitude_rad, start_time_s, end_time_s)
+        flight._set(*known)
         return flight
 
     def _set(
