@@ -35,7 +35,7 @@ ENDS_S = {
     "avoidance/crossing_seen_late.toml": 110,
     "avoidance/crossing_tracked.toml": 55,
     "avoidance/crossing_tracked_late.toml": 105,
-    "avoidance/looking_out.toml": 60,
+    "avoidance/looking_out.toml": 135,
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
     "tracking/do365_sensors.toml": 80,

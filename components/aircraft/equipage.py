@@ -104,8 +104,20 @@ class AdsBEquipage(Parameters):
 class EquipageShares(Parameters):
     """Shares of a fleet that carry what its aircraft's table says; each by itself, by its name."""
 
-    mode_s: float = Field(default=1.0, ge=0, le=1, description="Share that keeps mode_s.")
-    mode_c: float = Field(default=1.0, ge=0, le=1, description="Share that keeps mode_c.")
+    mode_s: float = Field(
+        default=1.0,
+        ge=0,
+        le=1,
+        description="Share that keeps mode_s.",
+        json_schema_extra={"unit": ""},
+    )
+    mode_c: float = Field(
+        default=1.0,
+        ge=0,
+        le=1,
+        description="Share that keeps mode_c.",
+        json_schema_extra={"unit": ""},
+    )
     ads_b: float = Field(default=1.0, ge=0, le=1, description="Share that keeps ads_b.")
 
 

@@ -81,10 +81,18 @@ class ActiveParameters(CooperativeParameters):
         "of 0.1 s.",
     )
     mode_s_in_1_s: float = Field(
-        default=IN_1_S[0], gt=0, lt=1, description="Probability of a Mode S answer within 1 s."
+        default=IN_1_S[0],
+        gt=0,
+        lt=1,
+        description="Probability of a Mode S answer within 1 s.",
+        json_schema_extra={"unit": ""},
     )
     mode_c_in_1_s: float = Field(
-        default=IN_1_S[1], gt=0, lt=1, description="Probability of a Mode C answer within 1 s."
+        default=IN_1_S[1],
+        gt=0,
+        lt=1,
+        description="Probability of a Mode C answer within 1 s.",
+        json_schema_extra={"unit": ""},
     )
     measurement: Literal["exact", "do_365"] = Field(
         default="do_365",

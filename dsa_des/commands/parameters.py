@@ -36,8 +36,11 @@ def parameter_rows(
         if nested and default not in ("required", "-", "[]", "{}"):
             default = "see below"
         bounds = _bounds(info)
+        # A field whose name ends like a unit says that it has none.
+        said = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
+        unit = str(said.get("unit", _unit(name, kind)))
         rows.append(
-            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name, kind),
+            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), unit,
              default, info.description or "")
         )  # fmt: skip
         for inner in nested:
@@ -99,6 +102,8 @@ def _default(info: FieldInfo) -> str:
 def _unit(name: str, kind: str) -> str:
     if kind == "whole number" and name.endswith("_m"):
         return ""  # a count: the m of m out of n
+    if kind == "true or false":
+        return ""
     parts = name.split("_")
     for length in (2, 1):
         suffix = "_".join(parts[-length:])

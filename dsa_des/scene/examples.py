@@ -37,7 +37,8 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     found = find_example(path.as_posix(), kind)
     if found is not None:
         return found
-    if len(path.parts) == 1 and not _has_neighbour(path):
+    # What no file system takes as a name is said by who opens it.
+    if len(path.parts) == 1 and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
         close = nearest(path.name.removesuffix(".toml"), names)
         if close or not path.suffix:

@@ -31,10 +31,7 @@ _TEXT = """
 `do365_active`, `do365_ads_b` and `do365_eo_ir` in the place of perfect surveillance, a Kalman
 filter behind each, and all else as above; {seeds} seeds each{of_all}:
 
-<!-- not run: 4,000 runs, some 15 minutes on a core -->
-```
-dsa-des study degas_sensors
-```
+(`dsa-des study degas_sensors`, 4,000 runs, some 15 minutes on a core.)
 
 ![Distributions of first alert, manoeuvre and least separation](images/{figure})
 
