@@ -208,8 +208,7 @@ def draw_polar(
     place = axes.index(axis)
     with drawing(6.2, 6.0, target) as figure:
         polar = figure.add_subplot(projection="polar")
-        polar.set_theta_zero_location("N")
-        polar.set_theta_direction(-1)
+        polar.set(theta_zero_location="N", theta_direction=-1)
         series = list(_series_along(axes, lines, axis, None).items())
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
@@ -360,8 +359,7 @@ def draw_series(
             known = list(limits) if len(limits) == len(x) else [limits[0]] * len(x)
             axes.plot(x, known, color="#000000", ls="--", lw=1.2, label="limit", zorder=1)
         axes.set_ylim(bottom=0.0)
-        axes.set_xlabel(axis_label(along) if along else "")
-        axes.set_ylabel(readable(name))
+        axes.set(xlabel=axis_label(along) if along else "", ylabel=readable(name))
         axes.set_title(figure_text(title, _TITLE), loc="left")
         _beside(axes)
         tight(figure)
@@ -370,11 +368,10 @@ def draw_series(
 def _bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
-    counts = [line.estimate.count for line in lines]
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
     found = [
         np.array(chi_square_bounds(freedom * n, confidence)) / n if n else (math.nan, math.nan)
-        for n in counts
+        for n in (line.estimate.count for line in lines)
     ]
     low, high = np.array(found).T
     axes.fill_between(
@@ -392,14 +389,12 @@ def draw_scatter(
     with drawing(5.4, 5.2, path) as figure:
         axes = figure.add_subplot()
         if both.any():
-            ends = [
-                min(first[both].min(), second[both].min()),
-                max(first[both].max(), second[both].max()),
-            ]
+            held = np.concatenate([first[both], second[both]])
+            ends = [held.min(), held.max()]
             axes.plot(ends, ends, color="#888888", lw=0.8)
         axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color="#0072B2",
                   alpha=0.6, markeredgewidth=0)  # fmt: skip
-        axes.set_xlabel(f"{readable(metric)}: {figure_text(names[0])}")
-        axes.set_ylabel(f"{readable(metric)}: {figure_text(names[1])}")
+        across, up = (f"{readable(metric)}: {figure_text(name)}" for name in names)
+        axes.set(xlabel=across, ylabel=up)
         axes.set_title(figure_text(title, _TITLE), loc="left")
         tight(figure)

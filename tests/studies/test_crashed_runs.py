@@ -11,8 +11,9 @@ from dsa_des.cli import main
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
+from dsa_des.studies.attempts import TRIES, Attempts, halves
 from dsa_des.studies.chunk import Done
-from dsa_des.studies.executors import TRIES, Attempts, Local, halves
+from dsa_des.studies.executors import Local
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
 from dsa_des.studies.study import Chunk
@@ -128,7 +129,7 @@ class _Process:
     """Runs pieces on paper: a piece with a guilty run is lost."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        module = "dsa_des.studies.executors"
+        module = "dsa_des.studies.attempts"
         monkeypatch.setattr(f"{module}.joined", lambda name, parts: self.sum(name, parts))
         monkeypatch.setattr(
             f"{module}.crashed_run", lambda study, chunk, tries: Done(chunk.name, b"", 1, 1, 1)
