@@ -124,7 +124,7 @@ class RiskRatios(Mitigated):
                 Result(_TOLD, EVENT, "the ownship is told to manoeuvre"),
                 Result(_NEEDLESS, EVENT, "it is told to, and well clear is kept without"),
                 Result("needless_manoeuvre_share", RATIO, said,
-                       ratio=RatioOf(_KEPT, _NEEDLESS, weight, cluster)),
+                       ratio=RatioOf(_KEPT, _NEEDLESS, weight, cluster, share=True)),
             ]  # fmt: skip
         return found
 

@@ -66,6 +66,8 @@ class RatioOf:
         A number that runs share which hang together; they count as one unit.
     only : (column, class), optional
         Of which runs: those of this class.
+    share : bool
+        Whether events over the line are always also under it: an interval ends at 1.
     """
 
     below: str
@@ -73,6 +75,7 @@ class RatioOf:
     weight: str | None = None
     cluster: str | None = None
     only: tuple[str, str] | None = None
+    share: bool = False
 
     def reads(self) -> tuple[str, ...]:
         """Return the names of all columns it reads."""

@@ -6,6 +6,7 @@ and a place of the summary joins all of them; otherwise the replicas are.
 
 from collections import Counter, OrderedDict
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -226,6 +227,9 @@ class Rows:
             below, above, weight, cluster=together, confidence=confidence, method=method,
             resamples=_RESAMPLES,
         )  # fmt: skip
+        if result.ratio is not None and result.ratio.share:
+            low, high = ratio.interval
+            ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing
 
     def _paired(

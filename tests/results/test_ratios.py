@@ -51,6 +51,16 @@ def test_a_ratio_by_hand_with_both_intervals() -> None:
     assert drawn.other is not None and drawn.other.interval == line.ratio.interval
 
 
+def test_a_share_ends_at_one_and_a_ratio_does_not() -> None:
+    """Where what is over the line is always under it, no more than all can be left."""
+    rows = rows_of([1, 1, 0], [0, 1, 0])
+    plain, share = summarise(rows, [ratio("a"), ratio("b", share=True)], 0.95, "t", {})
+    assert plain.estimate.high > 1.0 == share.estimate.high
+    assert plain.other is not None and share.other is not None
+    assert plain.other.interval[1] >= share.other.interval[1] and share.other.interval[1] <= 1.0
+    assert plain.estimate.low == share.estimate.low
+
+
 def test_a_class_counts_its_own_and_none_stands_in_no_class() -> None:
     rows = rows_of([1, 1, 1, 1], [1, 0, 0, 1], kind=["a", "a", "b", None])
     found = summarise(
