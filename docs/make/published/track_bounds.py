@@ -189,5 +189,5 @@ since trackers are given other things too. It matters at 6 nmi, where a track is
 of 1 degree is 190 m. The shipped case of evidence does not set it: its requirements are of tracks at 3 nmi.
 
 **What would mend more.** Filters of one model take manoeuvres for noise at all times, and rates pay for it
-near by; interacting models do so in turns only. Of active surveillance the bearing errs by 9 degrees: no
-filter makes better positions far off of so few looks."""
+near by; interacting models do so in turns only. Of active surveillance the bearing errs by 9 degrees:
+far off, positions are made better by many looks only, and by knowing how long an error lasts."""
