@@ -298,7 +298,7 @@ def _told(values: np.ndarray) -> str:
 
 
 def _page(folder: Path) -> str:
-    text = _HEAD.format(seen=SEEN, noise=NOISE)
+    text = _HEAD.format(seen=SEEN, noise=NOISE, flown=_FLOWN)
     rows: list[Any]
     rows, pairs, cost_s, looked = (
         [],
@@ -329,7 +329,6 @@ def _page(folder: Path) -> str:
         figure=FIGURE,
         image_us=1e6 * cost_s["image"] / looked["image"],
         factor=_factor(bins),
-        flown=_FLOWN,
         signature_us=1e6 * cost_s["signature"] / looked["signature"],
     )
     for stated, share, error, count in bins:
