@@ -188,10 +188,10 @@ detections have `column_px`, `row_px`, and the flow of the target between the fr
 
 **Pixels of a flown run.** The picture is a pinhole's, so `true_column_px` and `true_row_px` say
 where a target is in a frame of any field of view, size and mounting. A file of flights in place of
-the traffic gives its path in pixels:
+the traffic, a shipped one or yours, gives its path in pixels:
 
 ```
-dsa-des run optical/pictures --swap traffic=traffic.daa_file --set blocks.traffic.file=ENCOUNTER.daa
+dsa-des run optical/pictures --swap traffic=traffic.daa_file --set blocks.traffic.file=encounters/crossing.daa
 ```
 
 A camera that was calibrated, frames with time stamps of their own, and targets that were not
