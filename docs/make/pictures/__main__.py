@@ -191,7 +191,8 @@ where a target is in a frame of any field of view, size and mounting. A file of 
 the traffic, a shipped one or yours, gives its path in pixels:
 
 ```
-dsa-des run optical/pictures --swap traffic=traffic.daa_file --set blocks.traffic.file=encounters/crossing.daa
+dsa-des run optical/pictures --swap traffic=traffic.daa_file --set \
+blocks.traffic.file=encounters/crossing.daa
 ```
 
 A camera that was calibrated, frames with time stamps of their own, and targets that were not
