@@ -1,4 +1,4 @@
-"""Errors of measured values over thirty thousand looks of every sensor, in every mode."""
+"""Errors of measured values over a hundred thousand looks of every sensor, in every mode."""
 
 import math
 from itertools import combinations
@@ -43,7 +43,7 @@ def kind(request):
 @pytest.fixture(scope="module")
 def detections(kind):
     found = looks.by_block(run(looks.scene(kind))["detections"])
-    assert all(len(columns["scan"]) == 30_000 for columns in found.values())
+    assert all(len(columns["scan"]) == 100_000 for columns in found.values())
     return found
 
 

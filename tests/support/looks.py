@@ -1,4 +1,4 @@
-"""Thirty thousand looks of every sensor, in one run, and bounds of 99 % for what they give."""
+"""A hundred thousand looks of every sensor, in one run, and bounds of 99 % for what they give."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -11,7 +11,7 @@ from covering import CAMERAS, LINK_BUDGETS, RADARS, RANGING
 
 Columns = dict[str, Any]
 
-TARGETS, SCANS, RATE_HZ = 20, 1500, 250
+TARGETS, SCANS, RATE_HZ = 20, 5000, 250
 ANGLES = ("azimuth", "elevation")
 #: Of each quantity: its column, the truth's, and that of its variance.
 COLUMNS = {

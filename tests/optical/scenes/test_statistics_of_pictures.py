@@ -124,7 +124,7 @@ def test_texture_has_the_stated_deviation_and_grain():
     )
 
 
-@pytest.mark.parametrize(("size", "spread", "n"), [(12, 1.01, 20_000), (16, 1.4, 8_000)])
+@pytest.mark.parametrize(("size", "spread", "n"), [(12, 1.01, 100_000), (16, 1.4, 20_000)])
 def test_a_filter_makes_standard_normal_values_of_noise(size, spread, n):
     """Where there is one filter and one place to look at: what is stated of each of them."""
     rng = np.random.default_rng(size)
