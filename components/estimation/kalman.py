@@ -38,13 +38,22 @@ class Innovation:
     # (m, n) or (m, m, n): Variances of the measurement's own errors; for an unscented filter
     # with what the regression leaves over, which makes it a matrix
     spread: FloatArray
+    # (m, k, n) or None: Of those errors, the covariance with the state's first k; `cross` has it
+    shared: FloatArray | None = None
 
     def take(self, which: IntArray | slice) -> "Innovation":
         """Return those of some tracks."""
         parts = (self.expected, self.root, self.cross, self.jacobian, self.spread)
+        shared = self.shared
         if isinstance(which, slice):
-            return Innovation(*(values[..., which] for values in parts))
-        return Innovation(*(selected(values, which) for values in parts))
+            return Innovation(
+                *(values[..., which] for values in parts),
+                None if shared is None else shared[..., which],
+            )
+        return Innovation(
+            *(selected(values, which) for values in parts),
+            None if shared is None else selected(shared, which),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +66,18 @@ class Moments:
     jacobian: FloatArray  # As in `Innovation`
     # (m, m, n) or None: What the slope leaves of `total`; None where it is exact
     left_over: FloatArray | None = None
+    # (m, k, n) or None: As in `Innovation`; then `left_over` has H times it as well, transposed
+    shared: FloatArray | None = None
 
     def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
         """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
-        spread = self.left_over
+        spread, shared = self.left_over, self.shared
         if which is not None and not is_everything(which, expected.shape[1]):
             expected, total = selected(expected, which), selected(total, which)
             cross, jacobian = selected(cross, which), selected(jacobian, which)
             spread = None if spread is None else selected(spread, which)
+            shared = None if shared is None else selected(shared, which)
         else:
             total = total.copy()
             spread = None if spread is None else spread.copy()
@@ -74,8 +86,9 @@ class Moments:
             if spread is not None:
                 spread[i, i] += variance[i]
         return Innovation(
-            expected, cholesky(total), cross, jacobian, variance if spread is None else spread
-        )
+            expected, cholesky(total), cross, jacobian, variance if spread is None else spread,
+            shared,
+        )  # fmt: skip
 
 
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
@@ -140,6 +153,10 @@ def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> F
     else:
         own = product(found.spread, gain)
     error = product(found.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
+    if found.shared is not None:
+        # With errors that the state shares, S = H P Hᵀ + R + H M + (H M)ᵀ and K S = P Hᵀ + M:
+        # D Hᵀ = K (R + H M) - M, and `spread` is R + (H M)ᵀ.
+        error[:, : found.shared.shape[1]] += found.shared
     term = np.empty_like(block)
     for k in range(len(gain)):
         np.multiply(error[k, :, np.newaxis], gain[k, np.newaxis], out=term)
