@@ -188,11 +188,11 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
     p = block.p
     azimuth_rad, elevation_rad, range_m = cell_size(p)
-    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), CELL_SIZES, strict=True):
-        if width == 0:
-            raise ValueError(
-                f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"
-            )
+    if p.sizeless_steps:
+        raise ValueError(
+            f"{p.sizeless_steps[0]} is 0: false alarms are counted by resolution cells, it must "
+            "be above 0"
+        )
     if p.range_km is None:
         raise ValueError(
             "range_km is not given: false alarms are counted by resolution cells up to it"
