@@ -37,7 +37,11 @@ Associated = tuple[TrackStore, BoolArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Predicted tracks, and all pairs of one and a detection in its gate, whatever their kind."""
+    """Predicted tracks, and all pairs of one and a detection in its gate, whatever their kind.
+
+    `track`, `detection` and `distance` are (pairs,) over all kinds; `kinds` has them by kind, with
+    what each measures.
+    """
 
     rules: TrackerRules
     tracks: TrackStore
