@@ -307,8 +307,8 @@ class Processor:
         of = np.array(blocks, dtype=object)
         for block in sorted(set(of.tolist())):
             mine = [column[of == block] for column in columns]
-            named = {"processor": self.name, "ticks_per_s": self._ticks_per_s}
-            self._record(block, Processing(*mine, **named))
+            rows = Processing(*mine, processor=self.name, ticks_per_s=self._ticks_per_s)
+            self._record(block, rows)
 
     # -- in a window ---------------------------------------------------------------------------
 
