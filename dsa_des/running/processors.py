@@ -306,8 +306,11 @@ class Processor:
     def _record_all(self, blocks: Iterable[str], *columns: IntArray) -> None:
         of = np.array(blocks, dtype=object)
         for block in sorted(set(of.tolist())):
-            mine = [column[of == block] for column in columns]
-            rows = Processing(*mine, processor=self.name, ticks_per_s=self._ticks_per_s)
+            tick, entered, started, behind, outcome = (c[of == block] for c in columns)
+            rows = Processing(
+                tick, entered, started, behind, outcome,
+                processor=self.name, ticks_per_s=self._ticks_per_s,
+            )  # fmt: skip
             self._record(block, rows)
 
     # -- in a window ---------------------------------------------------------------------------
