@@ -17,7 +17,6 @@ from components.estimation.batched import (
     selected,
     solve_lower,
     solve_upper,
-    squared_length,
     symmetric,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -182,11 +181,6 @@ def variance_of_what_is_new(
     left = np.maximum(spread - shared, 1e-6 * spread)
     new = spread * (spread * variance - shared * shared) / (left * left)
     return np.where(common > 0.0, np.clip(new, variance, _MOST * variance), variance)
-
-
-def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:
-    """Return the squared Mahalanobis distance of residuals (m, n), shape (n,)."""
-    return squared_length(solve_lower(found.root, residual))
 
 
 def log_likelihood(found: Innovation, distance: FloatArray) -> FloatArray:

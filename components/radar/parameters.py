@@ -331,11 +331,6 @@ class LinkBudgetParameters(
         return replace(budget, bandwidth_hz=bandwidth_hz)
 
 
-def budget_report(name: str, budget: LinkBudget) -> dict[str, Any]:
-    """Return the section of the run's summary that records the bandwidth in use."""
-    return {"link_budgets": {name: {"bandwidth_hz": float(budget.bandwidth_hz)}}}
-
-
 def moved_threshold(p: LinkBudgetParameters) -> list[str]:
     """Say what Pd a calibration's range has where the threshold is not the one it was for."""
     known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability

@@ -110,6 +110,23 @@ class ErrorParameters(ClockedParameters):
         return StatedError(*values)
 
 
+class RangeErrorParameters(ErrorParameters):
+    """Grid and errors of a measured range."""
+
+    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
+
+    range_resolution_m: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
+    )
+    range_error_m: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range, m."
+    )
+    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
+    )
+
+
 class GlintParameters(ErrorParameters):
     """How far the centre of a target that is seen wanders over it, beside errors by signal."""
 

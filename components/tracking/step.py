@@ -13,7 +13,7 @@ from components.estimation.out_of_sequence import (
     retrodiction_by_motion,
 )
 from components.messages.state_tracks import DELETED
-from components.tracking.association import Association
+from components.tracking.association import Association, Candidates
 from components.tracking.gating import gated_pairs
 from components.tracking.management import expected_looks, initiated, managed, position_variance
 from components.tracking.rules import TrackerRules
@@ -78,7 +78,8 @@ def associated(
     pose = batch.pose(of)
     kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
     looked = expected_looks(rules, part, of, batch, pose, direction)
-    changed, hit, gain = association.update(rules, part, kinds, batch.contributors, pose)
+    pairs = Candidates(rules, part, kinds, batch.contributors, pose)
+    changed, hit, gain = association.update(pairs)
     return managed(rules, part, changed, pose, looked, hit, gain), held
 
 
