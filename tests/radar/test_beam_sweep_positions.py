@@ -62,8 +62,8 @@ def body_azimuths(simulation: Simulation, target: int, times: np.ndarray) -> tup
     """Azimuth and range by the exact flights, at any times."""
     traffic = simulation.components["traffic"]
     transform = simulation.components["transform"]
-    states = traffic.flights(traffic.own, np.array([target]), times[:, np.newaxis])
-    seen = transform._revisited(*states)
+    flights = (traffic.own, traffic.targets[target])
+    seen = transform._revisited(*(flight.at(times[:, np.newaxis]) for flight in flights))
     return seen["body_azimuth_rad"][:, 0], seen["range_m"][:, 0]
 
 
