@@ -42,17 +42,14 @@ class Innovation:
 
     def take(self, which: IntArray | slice) -> "Innovation":
         """Return those of some tracks."""
-        parts = (self.expected, self.root, self.cross, self.jacobian, self.spread)
-        shared = self.shared
-        if isinstance(which, slice):
-            return Innovation(
-                *(values[..., which] for values in parts),
-                None if shared is None else shared[..., which],
-            )
+
+        def one(values: FloatArray) -> FloatArray:
+            return values[..., which] if isinstance(which, slice) else selected(values, which)
+
         return Innovation(
-            *(selected(values, which) for values in parts),
-            None if shared is None else selected(shared, which),
-        )
+            one(self.expected), one(self.root), one(self.cross), one(self.jacobian),
+            one(self.spread), None if self.shared is None else one(self.shared),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,9 @@ class StatedByAircraft:
         # Whose errors are told is filtered by one who knows how targets move on the way.
         turned = nothing if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
         found = dict.fromkeys(TOLD, np.full(len(age_s), np.nan))
-        found |= dict(zip(TOLD, [*north_east_down_m_s, *[turned + _LEAST_M2] * 3], strict=False))
+        # Whole knots last while a flight is steady and are new while it is not: counted as both.
+        new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)
+        found |= dict(zip(TOLD, [*north_east_down_m_s, new, new, turned + _LEAST_M2], strict=False))
         if not tells:
             return found
         known = ~np.isnan(north_east_down_m_s[0])
