@@ -27,7 +27,7 @@ _TOGETHER = 2048
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """What a filter expects of a measurement, and how its covariance relates to it."""
+    """The predicted measurement, the covariance of the residual, and how states relate to it."""
 
     expected: FloatArray  # (m, n)
     root: FloatArray  # (m, m, n), lower triangular root of the covariance of the residual
@@ -48,7 +48,7 @@ class Innovation:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What a filter expects of any measurement of its tracks, before that one's own errors."""
+    """Moments of the predicted measurement, before the measurement's own errors."""
 
     expected: FloatArray  # (m, n)
     total: FloatArray  # (m, m, n), covariance of what is expected

@@ -1,4 +1,4 @@
-"""False alarms: what noise alone, and clutter over a threshold set for noise, add to a report."""
+"""False alarms of noise alone, and of clutter over a threshold that is set for noise."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -32,7 +32,7 @@ _OF_CUED = 2**40
 
 @dataclass(frozen=True, eq=False)
 class Alarms:
-    """What crossed a threshold without a target, in ascending order of the reports' rows.
+    """Threshold crossings without a target, in ascending order of the reports' rows.
 
     `key` is that of its draws, `where` its place by quantity in the sensor's axes, `snr` how strong
     it came out (linear, above 0) and `rate` a uniform number that says its range rate.

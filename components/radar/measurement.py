@@ -1,4 +1,4 @@
-"""What a radar measures of a detection: strength, and the errors that follow from it."""
+"""Measured strength of a radar's detections, and the errors of measurement that follow from it."""
 
 import math
 from collections.abc import Mapping
@@ -209,7 +209,7 @@ FAINTEST = 1e-6
 
 
 class MeasuredStrength(Effect[Strengthening]):
-    """What a radar knows of a target's echo is what it knows of noise: how strong it came out.
+    """A target's echo is known as noise is: by how strong it came out.
 
     SNR and confidence of a detection are those of the output that crossed the threshold, by the
     target's own fluctuation and the noise of that look; errors by signal follow from that output

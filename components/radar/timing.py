@@ -101,7 +101,7 @@ _ROUNDED_DB = 0.05
 
 @dataclass(frozen=True)
 class LookEnergy:
-    """What one look at a target consists of: its beams, its time and its pulses.
+    """The beams, time and pulses of one look at a target.
 
     `pulses` is None without a PRF. `gain` is that of the energy added up coherently over that of
     the look which the link budget is for, 1 where pulses are summed non-coherently, `summed` of

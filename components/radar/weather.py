@@ -1,4 +1,4 @@
-"""What the way takes from a radar's echo: gas, rain and fog, and the blind range."""
+"""Attenuation of a radar's echo by gas, rain and fog, and the blind range."""
 
 import math
 from typing import Any, ClassVar

@@ -18,7 +18,7 @@ from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What a sensor's physics says of each cell.
+    """The outcome of a look: detection and confidence of each cell.
 
     Parameters
     ----------

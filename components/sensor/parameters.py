@@ -19,7 +19,7 @@ CorrelationTime = Annotated[float, Field(gt=0, le=LONGEST_S)]
 
 @dataclass(frozen=True)
 class StatedError:
-    """What a scene states of the error of one measured quantity; in the scene's unit.
+    """Stated error of one measured quantity, in the scene's unit.
 
     The deviation is of what changes from look to look, for a correlation time (None where it is new
     at every look); the bias stays throughout a run, or is the largest that may.

@@ -66,7 +66,7 @@ class Candidates:
 
     @cached_property
     def volume(self) -> FloatArray:
-        """What makes distances of several kinds comparable: false alarms in the volume of |S|."""
+        """Logarithm of false alarms in the volume of |S|, by which kinds are comparable."""
         return np.concatenate(
             [
                 _log_volume(one)

@@ -99,9 +99,9 @@ def late_step(
     as in `before`, are taken back to it by what they were then, those that are newer by what they
     are now; others are carried on to it as ever.
 
-    With `unless_updated` tracks stay as they are that something later has updated (a later look in
-    vain does not count: it told nothing of where they are), and looks are left out that have a
-    detection that such a track would have had.
+    With `unless_updated` tracks stay as they are that something later has updated (a later
+    misdetection does not count: it said nothing of where they are), and looks are left out that
+    have a detection that such a track would have had.
     """
     replica, tick = batch.replica, batch.tick
     of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
