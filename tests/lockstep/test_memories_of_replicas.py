@@ -59,9 +59,7 @@ def seen_at(run, scan, number):
 
 def test_places_are_remembered_run_by_run():
     """A place seen twice in five scans is declared; scans of runs have numbers far apart."""
-    rule = SimpleNamespace(
-        declare_m=2, declare_n=5, declare_speed_m_s=50.0, declare_rate_deg_s=5.0
-    )
+    rule = SimpleNamespace(declare_m=2, declare_n=5, declare_speed_m_s=50.0, declare_rate_deg_s=5.0)
     judge = DeclaredPlaces(SimpleNamespace(p=rule, context=SimpleNamespace(ticks_per_s=1)))
     draws, seen, declared = np.random.default_rng(4), {}, []
     for window in range(40):
