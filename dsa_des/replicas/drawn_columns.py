@@ -142,8 +142,6 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
         return None
     try:
         columns = {key: _column(scene, key, [r.changes[key] for r in replicas]) for key in keys}
-        if len({(column.block, column.path) for column in columns.values()}) < len(columns):
-            return None
         seeds = [replica.seed for replica in replicas]
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
         made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]

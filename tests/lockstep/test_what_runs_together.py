@@ -75,12 +75,18 @@ def test_flights_over_terrain(lock):
     assert isinstance(other, Failed) and "must be below the ownship" in other.error
 
 
-def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path, closed):
+    """In a loop all runs go side by side; without one they come one after the other."""
     path = tmp_path / "distributed.toml"
     cueing = Path("configs/tracking/cueing.toml").resolve()
-    path.write_text(DISTRIBUTED.format(cueing=cueing), encoding="utf-8")
+    text = DISTRIBUTED.format(cueing=cueing)
+    if not closed:
+        text = "\n".join(line for line in text.splitlines() if "holds" not in line)
+    path.write_text(text, encoding="utf-8")
     rates = ["blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1"]
-    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON[1:], *rates])
+    dwell = [] if closed else ["blocks.radar.cued_dwell_factor=1"]
+    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON[1:], *rates, *dwell])
     late = [
         replace(wire, jitter_s=Fraction(2, 5)) if wire.source == "second" else wire
         for wire in scene.wires
@@ -91,7 +97,9 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
         for tenths in (1, 6, 2)
     ]
     scenes = lock.replicas_of(replace(scene, wires=late), *phases)
-    assert not lock.same_as_alone(scenes, window=11).timeline.split
+    simulation = lock.same_as_alone(scenes, window=11)
+    assert not simulation.timeline.split
+    assert (simulation.time.runs == range(3)) == closed
     _, tables = lock.tables_of(lock_step, scenes)
     fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
     assert len({*fused["replica"].to_pylist()}) == 3
