@@ -83,7 +83,7 @@ def stepped_least_range_m(
     """Return the same range of turns that go by steps, as NRC's do.
 
     The bank of a step is that of its end. A turn ends before the step that would go beyond it; from
-    there both fly straight, the ownship exactly along what it has turned to, and the intruder a step
+    there both fly straight, the ownship exactly along what it turned to, and the intruder a step
     ahead. Of the turn the ends of steps have to be clear of the disc, of the straight part the
     closest approach, if it is still to come. Numbers are complex: north, and east times i.
     """
