@@ -80,19 +80,20 @@ def grid_courses(found: list[LeastRange], intruder_kt: float) -> GridCourses:
     of which none was flown are not led out of.
     """
     rows = []
-    for azimuth in np.arange(GRID_DEG, 180.0, GRID_DEG):
-        for course, closing in enumerate(closing_speeds(azimuth, intruder_kt * KT_MPS)):
-            more = [
-                (one.azimuth_deg, one.range_m - one.geometry_m)
-                for one in found
-                if one.course == course
-            ]
-            if not more:
-                rows.append((azimuth, math.inf, math.inf, STEP_S * closing))
+    for course in (0, 1):
+        mine = [one for one in found if one.course == course]
+        at_deg = np.array([one.azimuth_deg for one in mine])
+        off_m = np.array([one.range_m - one.geometry_m for one in mine])
+        for azimuth in np.arange(GRID_DEG, 180.0, GRID_DEG).tolist():
+            closing = closing_speeds(azimuth, intruder_kt * KT_MPS)
+            if len(closing) <= course:
                 continue
-            more_m = float(np.interp(azimuth, *zip(*more, strict=True)))
-            flown_m = least_range_m(azimuth, closing, turns_deg(azimuth)) + more_m
-            rows.append((azimuth, flown_m, counted_m(azimuth, closing, more_m), STEP_S * closing))
+            speed, flown_m, needed_m = closing[course], math.inf, math.inf
+            if mine:
+                more_m = float(np.interp(azimuth, at_deg, off_m))
+                flown_m = least_range_m(azimuth, speed, turns_deg(azimuth)) + more_m
+                needed_m = counted_m(azimuth, speed, more_m)
+            rows.append((azimuth, flown_m, needed_m, STEP_S * speed))
     return GridCourses(*np.array(rows).T)
 
 
