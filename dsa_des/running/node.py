@@ -29,7 +29,6 @@ from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
-from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
 from dsa_des.time.run_clock import RunClock
 from dsa_des.time.runs import ReplicaTime
@@ -84,7 +83,7 @@ class Node:
     clock: RunClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
-    processor: Processor | WindowedQueue | None = None
+    processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0

@@ -13,7 +13,6 @@ from dsa_des.running.grain import Edge, Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.scene.graph import depths, queue_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
@@ -27,7 +26,7 @@ def build_nodes(
     timeline: Timeline,
     components: Mapping[str, Component],
     grain: Grain,
-    processors: Mapping[str, Processor | WindowedQueue],
+    processors: Mapping[str, Processor],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
     """Return the running blocks, which no wire connects yet.
@@ -64,14 +63,10 @@ def build_nodes(
     return nodes
 
 
-def start_processors(
-    scene: Scene,
-    grain: Grain,
-    end_tick: int,
-    env: simpy.Environment,
-    record: Callable[[str, Message], None],
-) -> dict[str, Processor | WindowedQueue]:
-    """Start the shared processors of a scene: message by message, or a window at once.
+def build_processors(
+    scene: Scene, grain: Grain, env: simpy.Environment, record: Callable[[str, Message], None]
+) -> dict[str, Processor]:
+    """Return the shared processors of a scene.
 
     Raises
     ------
@@ -81,26 +76,14 @@ def start_processors(
     streams = Streams(scene.seed)
     order = grain.order(scene)
     ticks_per_s = scene.ticks_per_s
-    processors: dict[str, Processor | WindowedQueue] = {}
+    processors: dict[str, Processor] = {}
     for name, p in scene.processors.items():
         try:
             service = Service(name, p, ticks_per_s, streams.stream(name, "service time"))
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
-        if name in grain.queues:
-            processors[name] = WindowedQueue(
-                name,
-                service,
-                p.when_busy == "drop_oldest",
-                env,
-                ticks_per_s,
-                end_tick,
-                record,
-                WINDOW_PRIORITY + order[queue_key(name)],
-            )
-        else:
-            processors[name] = Processor(name, p, service, env, ticks_per_s, record)
-        processors[name].start()
+        at_once = WINDOW_PRIORITY + order[queue_key(name)] if name in grain.queues else None
+        processors[name] = Processor(name, p, service, env, ticks_per_s, record, at_once)
     return processors
 
 

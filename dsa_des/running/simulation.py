@@ -27,10 +27,10 @@ from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.node import Abort
 from dsa_des.running.nodes import (
     build_nodes,
+    build_processors,
     check_reach,
     connect,
     horizon_ticks,
-    start_processors,
 )
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.processors import Processing
@@ -146,7 +146,7 @@ class Simulation:
         #: When runs end, as far as that is known.
         self.ends = self.timeline.ends
         self._check_ends()
-        processors = start_processors(scene, grain, self.end_tick, self.env, self._record)
+        processors = build_processors(scene, grain, self.env, self._record)
         self.nodes = build_nodes(
             self, self.timeline, self.components, grain, processors, shuffle_ties
         )
