@@ -227,7 +227,7 @@ class Node:
         ends = self.simulation.ends
         if ends.early:
             kept = ends.before(instants)
-            instants, scans, end = instants.take(kept), scans[kept], ends.cut(end)
+            instants, scans = instants.take(kept), scans[kept]
         if len(instants):
             self._run(instants, scans, end)
 

@@ -86,8 +86,3 @@ class RunEnds:
         """Return whether all runs whose time it is are over before a tick of theirs."""
         runs = self._time.runs
         return self.early and bool((self.ticks[runs.start : runs.stop] <= tick).all())
-
-    def cut(self, end: int) -> int:
-        """Return the end of a window, or that of the run that goes alone if it comes first."""
-        runs = self._time.runs
-        return min(end, int(self.ticks[runs.start])) if self.early and len(runs) == 1 else end

@@ -88,7 +88,7 @@ def test_what_has_ended_runs_no_more(tmp_path):
     scene = loaded(tmp_path, CROSSING)
     scenes = [scene_of(scene, Replica(k, {SPEED: v})) for k, v in enumerate((40.0, 90.0))]
     simulation = lock_step(scenes)
-    seen = []
+    seen, came = [], []
     node = simulation.nodes["tracker"]
     runner = node.runner
 
@@ -96,6 +96,7 @@ def test_what_has_ended_runs_no_more(tmp_path):
         @staticmethod
         def run(wake):
             seen.extend(zip(wake.run.tolist(), wake.time_s.tolist(), strict=True))
+            came.extend(part.instants for part in wake.arrived("fused"))
             return runner.run(wake)
 
     node.runner = Watching
@@ -105,6 +106,7 @@ def test_what_has_ended_runs_no_more(tmp_path):
     for number in (0, 1):
         # What is behind the end in the window in which it came is not run either.
         assert max(t for r, t in seen if r == number) < ends_s[number]
+    assert all(simulation.ends.before(instants).all() for instants in came)
     assert windows[-1] - 0.5 <= max(ends_s) <= windows[-1] < 45
 
 

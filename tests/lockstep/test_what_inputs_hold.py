@@ -15,7 +15,7 @@ RUN_TICKS = 60
 def as_held(time, ends, sent, asked, longest, together=None):
     """Whether every replica holds at each tick that it asks about what came there last."""
     channel = Channel("source", 0, None, time, ends)
-    windows = Windows(time, longest, together)
+    windows = Windows(time, longest, together=together)
     told = 0
 
     def inside(ticks, start, end):
