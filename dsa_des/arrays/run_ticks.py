@@ -99,14 +99,14 @@ class RunTicks:
 
     @property
     def last_of_each(self) -> IntArray:
-        """The place of the last instant of each run."""
+        """The position of the last instant of each run."""
         if len(self) == 0 or self.one_run:
             return np.arange(len(self))[-1:]
         return np.flatnonzero(np.append(self.run[1:] != self.run[:-1], True))
 
     @property
     def first_of_each(self) -> IntArray:
-        """The place of the first instant of each run."""
+        """The position of the first instant of each run."""
         if len(self) == 0 or self.one_run:
             return np.arange(len(self))[:1]
         return np.flatnonzero(np.append(True, self.run[1:] != self.run[:-1]))
@@ -198,7 +198,7 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the place of the last instant at or before each that is asked for, of its run.
+    """Return the position of the last instant at or before each that is asked for, of its run.
 
     Parameters
     ----------
@@ -223,27 +223,27 @@ def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
         return np.arange(len(asked)), True
     if _one_run((instants, asked)):
         return last_at_or_before(instants.tick, asked.tick)
-    places, met = last_at_or_before(*_keys(instants, asked)[0])
+    positions, met = last_at_or_before(*_keys(instants, asked)[0])
     if not met:
-        other = instants.run[places] != asked.run
+        other = instants.run[positions] != asked.run
         if other.any():
-            places[other] = -1
-    return places, met
+            positions[other] = -1
+    return positions, met
 
 
-def place_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
-    """Return the place of each instant that is asked for, and whether it is there; None for all.
+def positions_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
+    """Return the position of each instant that is asked for, and whether it is there; None for all.
 
     Parameters
     ----------
     instants, asked : RunTicks
         As for `last_of_run`.
     """
-    places, met = _last_of_run(instants, asked)
+    positions, met = _last_of_run(instants, asked)
     if met or len(instants) == 0:
-        return places, None if met else np.zeros(len(asked), dtype=bool)
-    there: BoolArray = (places >= 0) & (instants.tick[places] == asked.tick)
-    return places, None if there.all() else there
+        return positions, None if met else np.zeros(len(asked), dtype=bool)
+    there: BoolArray = (positions >= 0) & (instants.tick[positions] == asked.tick)
+    return positions, None if there.all() else there
 
 
 def ranks(*parts: RunTicks) -> tuple[list[IntArray], int]:
@@ -255,9 +255,9 @@ def ranks(*parts: RunTicks) -> tuple[list[IntArray], int]:
 
 
 def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the place of the first instant at or after each that is asked for, of its run.
+    """Return the position of the first instant at or after each that is asked for, of its run.
 
-    Where its run has none so late it is the place behind the run's last one.
+    Where its run has none so late it is the position behind the run's last one.
     """
     if _one_run((instants, asked)):
         return np.searchsorted(instants.tick, asked.tick)
@@ -266,5 +266,5 @@ def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
 
 
 def first_of_run(instants: RunTicks, run: IntArray) -> IntArray:
-    """Return the place of the first instant of some runs."""
+    """Return the position of the first instant of some runs."""
     return np.searchsorted(instants.run, run)

@@ -124,7 +124,7 @@ def test_each_of_split_blocks_reports_of_its_own_length(tmp_path):
     )
     simulation.run()
     assert "tracker" in simulation.timeline.split
-    ends_s = (simulation.ends.ticks / simulation.ticks_per_s).tolist()
+    ends_s = (simulation.runs.ends / simulation.ticks_per_s).tolist()
     assert len({*ends_s}) == 3
     lasted = {key[0]: said["lasted_s"]["here"] for key, said in told.items() if "lasted_s" in said}
     assert lasted == dict(enumerate(ends_s))

@@ -131,7 +131,7 @@ def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
     phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
     scenes = lock.replicas_of(scene, *phases)
     simulation = lock.same_as_alone(scenes, window=None if closed else 2)
-    assert (simulation.time.runs == range(3)) == closed
+    assert (simulation.runs.going == range(3)) == closed
     assert not simulation.timeline.split
 
 
@@ -139,7 +139,7 @@ def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next(loc
     """Each run goes through several windows, and they run one after the other."""
     scene = load_scene("configs/systems/tecvol_tracked.toml", duration_s="6")
     simulation = lock.same_as_alone(lock.replicas_of(scene, {}, {}, {}), window=9)
-    assert simulation.time.runs == range(2, 3)
+    assert simulation.runs.going == range(2, 3)
 
 
 @pytest.mark.parametrize("late", ["rerun", "one_step"])
@@ -154,5 +154,5 @@ def test_looks_that_come_late_in_a_loop_are_remembered_by_run(lock, late):
     ]
     simulation = lock.same_as_alone(lock.replicas_of(replace(scene, wires=wires), {}, {}, {}))
     assert not simulation.timeline.split
-    assert len(simulation.time.runs) == 3
+    assert len(simulation.runs.going) == 3
     assert simulation.components["tracker"]._past

@@ -90,8 +90,7 @@ JITTERED = SCENE.replace("delay_s = 0.7", "delay_s = 0.2, jitter_s = 2").replace
 def test_any_window_gives_the_same_rows(tmp_path: Path, scene: str) -> None:
     _, whole = simulate(tmp_path, scene)
     assert whole["manoeuvres"].num_rows >= 3
-    windows = [{"window": 1}, {"window": 2}, {"window": 7}]
-    for options in (*windows, {"window": 31}, {"shuffle_ties": 2}):
+    for options in ({"window": 1}, {"window": 7}, {"window": 31, "shuffle_ties": 2}):
         _, other = simulate(tmp_path, scene, **options)
         for name, table in whole.items():
             assert table.equals(other[name]), (name, options)
