@@ -139,7 +139,9 @@ def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
     class Watching:
         @staticmethod
         def run(wake):
-            came.extend(together.runs.before_ends(new.instants) for new in wake.arrivals("detections"))
+            came.extend(
+                together.runs.before_ends(new.instants) for new in wake.arrivals("detections")
+            )
             return runner.run(wake)
 
     fusion.runner = Watching
