@@ -229,7 +229,7 @@ class Node:
         runs = self.simulation.runs
         if runs.early:
             kept = runs.before_ends(instants)
-            instants, scans, end = instants.take(kept), scans[kept], runs.cut(end)
+            instants, scans = instants.take(kept), scans[kept]
         if len(instants):
             self._run(instants, scans, end)
 
