@@ -34,8 +34,25 @@ def load() -> None:
             if not any(part in found.name for part in _NOT_LOADED):
                 with contextlib.suppress(ImportError):  # an extra that is not installed here
                     importlib.import_module(found.name)
+    build_models()
     gc.collect()
     gc.freeze()
+
+
+def build_models() -> None:
+    """Do what each process would otherwise do by itself: parameters' schemas, and pandas for Arrow.
+
+    Pydantic builds a schema when it is first needed; Arrow looks for pandas with its first array.
+    """
+    import pyarrow
+    from pydantic import BaseModel
+
+    pyarrow.array([0])
+    models = BaseModel.__subclasses__()
+    for model in models:
+        models.extend(model.__subclasses__())
+        if not model.__pydantic_complete__:
+            model.model_rebuild(raise_errors=False)
 
 
 def next_job(source: socket.socket) -> dict:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
+from components.display.outcomes import NEAR_M
 from dsa_des.text.safe_text import printable, shortened
 
 MOST_TARGETS = 10
@@ -160,21 +161,23 @@ def _tracks_text(entry: dict[str, Any]) -> str:
     if not count:
         return "no confirmed track"
     text = f"{count:,} confirmed track{'s' if count > 1 else ''}"
-    if entry.get("false") is not None:
-        text += f", {format(entry['false'], ',') if entry['false'] else 'none'} of them false"
+    false = entry.get("false")
+    if false is not None:
+        text += f", {false:,} of them false" if false else ", none false"
+    elif "false" in entry:
+        text += " without a range" if count == 1 else ", all without a range"
     if entry.get("position_error_m") is not None:
         text += f"; position error {distance_text(entry['position_error_m'])} rms"
-    firsts = entry.get("targets") or {"": entry["first_confirmed"]}
-    text += (
-        "; first confirmed"
-        + (": " if "" not in firsts else " ")
-        + ", ".join(
-            f"{name} at {first['time_s']:.1f} s".lstrip()
-            + ("" if first["range_m"] is None else f" ({distance_text(first['range_m'])} away)")
-            for name, first in _few(firsts)
-        )
-    )
-    return text + _more_text(firsts)
+    if not entry.get("targets"):
+        return f"{text}; first confirmed {_first_text(entry['first_confirmed'])}"
+    firsts = [f"{name} {_first_text(first)}" for name, first in _few(entry["targets"])]
+    text += f"; first within {NEAR_M:g} m of {', '.join(firsts)}"
+    return text + _more_text(entry["targets"])
+
+
+def _first_text(first: dict[str, Any]) -> str:
+    away = "" if first["range_m"] is None else f" ({distance_text(first['range_m'])} away)"
+    return f"at {first['time_s']:.1f} s{away}"
 
 
 def _span_text(entry: dict[str, Any]) -> str:
@@ -197,7 +200,7 @@ def _few(targets: dict[str, Any]) -> list[tuple[str, Any]]:
 
 def _more_text(targets: dict[str, Any]) -> str:
     more = len(targets) - MOST_IN_A_LINE
-    return f" and {more:,} more" if more > 0 else ""
+    return f" and {more:,} more target{'s' if more > 1 else ''}" if more > 0 else ""
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:

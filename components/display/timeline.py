@@ -62,7 +62,7 @@ def draw_timeline(
     """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
-    title = figure_text(simulation.scene.title, 28)  # the legend is beside it
+    title = figure_text(simulation.scene.title, 80)
     with drawing(*_SIZE_IN, path) as figure:
         if not scans:  # a scene without sensors has ranges only
             whole = figure.add_axes((_LEFT, 0.1, _BELOW, 0.8))
@@ -74,7 +74,8 @@ def draw_timeline(
         share = min(0.42, 0.14 + 0.07 * max(1, len(detected.sensors)))
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
         _draw_scans(above, scans, shown, detected.styles, close_up)
-        above.set_title(f"{title}: {close_up.what}", loc="left")
+        # The legend stands beside the lower line.
+        above.set_title(f"{title}\n{close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
@@ -93,15 +94,15 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     length_s = duration_s
     if periods:
         length_s = min(4.2 * max(periods), MOST_SCANS_SHOWN * min(periods), duration_s)
-    anchor_s, what = 0.0, "at the start of the run"
+    anchor_s, what = 0.0, "At the start of the run"
     first = [one.first_hit_s for one in scans.values() if one.first_hit_s is not None]
     if first:
-        anchor_s, what = min(first), "around the first detection"
+        anchor_s, what = min(first), "Around the first detection"
     together = _first_joined(folder, len(scans))
     if together is not None:
         anchor_s, number = together
         word = {2: "two", 3: "three", 4: "four"}.get(number, str(number))
-        what = f"around the first fusion of {word} sensors"
+        what = f"Around the first fusion of {word} sensors"
     start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
     end_s = start_s + length_s
     return CloseUp(start_s, end_s, what, _joined(folder, start_s, end_s))

@@ -1,7 +1,7 @@
 """Tables with one row per encounter, and ``dsa-des encounters risk``: the risk ratio of one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -265,27 +265,37 @@ def _edges(text: str) -> FloatArray:
 
 
 def _lines(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
-    low, high = found.interval
     alone = found.clusters == found.encounters
     clusters = "" if alone else f" in {found.clusters} clusters"
+    shown = _digits(found)
+    low, high = map(shown, found.interval)
     lines = [
         f"{found.encounters} encounters{clusters}, {found.nominal_events} with the event "
         f"nominally, {found.mitigated_events} mitigated ({found.induced_events} of them induced)",
-        f"probability nominal     {found.nominal_probability:.15g}",
-        f"probability mitigated   {found.mitigated_probability:.15g}",
-        f"risk ratio              {found.ratio:.15g}",
-        f"  unresolved            {found.unresolved:.15g}",
-        f"  induced               {found.induced:.15g}",
-        f"standard error          {found.standard_error:.8g} ({found.method}, paired)",
-        f"  nominal taken as known  {found.unpaired_error:.8g}",
-        f"{100 * confidence:g} % interval           {low:.6g} to {high:.6g}",
-        f"effective sample size   {found.effective_sample_size:.2f}",
+        f"probability nominal       {shown(found.nominal_probability)}",
+        f"probability mitigated     {shown(found.mitigated_probability)}",
+        f"risk ratio                {shown(found.ratio)}",
+        f"  unresolved              {shown(found.unresolved)}",
+        f"  induced                 {shown(found.induced)}",
+        f"{f'{100 * confidence:g} % interval':<26}{low} to {high} ({found.method})",
+        f"standard error            {found.standard_error:.3g} (paired)",
+        f"  nominal taken as known  {found.unpaired_error:.3g}",
+        f"effective sample size     {found.effective_sample_size:.2f}",
     ]
     if found.few:
         lines.append("few: fewer than 20 mitigated events, in effect, carry the interval")
     if skipped:
         lines.append(f"{skipped} damaged encounters were skipped")
     return lines
+
+
+def _digits(found: RiskRatio) -> Callable[[float], str]:
+    """Return what writes numbers with three digits, or down to the second of half the interval."""
+    half = (found.interval[1] - found.interval[0]) / 2
+    digits = 3
+    if found.ratio > 0 and half > 0:
+        digits = max(digits, 2 + math.floor(math.log10(found.ratio)) - math.floor(math.log10(half)))
+    return lambda value: f"{value:.{digits}g}"
 
 
 def _show_classes(by: str, classes: dict[str, RiskRatio], confidence: float) -> None:
@@ -297,9 +307,10 @@ def _show_classes(by: str, classes: dict[str, RiskRatio], confidence: float) -> 
             rows.append([*counts, "-", "-", "-", "-", one.reason])
             continue
         low, high = one.interval
+        shown = _digits(one)
         values = (one.ratio, one.unresolved, one.induced)
-        interval = f"{low:.4g} to {high:.4g}"
-        rows.append([*counts, *(f"{v:.4g}" for v in values), interval, "few" if one.few else ""])
+        interval = f"{shown(low)} to {shown(high)}"
+        rows.append([*counts, *map(shown, values), interval, "few" if one.few else ""])
     headings = [by, "encounters", "nominal", "mitigated", "ratio", "unresolved", "induced",
                 f"{100 * confidence:g} % interval", "note"]  # fmt: skip
     print_table(console(), "", headings, rows, right=range(1, 7), below=8)

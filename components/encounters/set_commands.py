@@ -159,7 +159,7 @@ def _rows(c: Closest) -> list[list[str]]:
     rows = []
     for name, values in (
         ("horizontal, m", c.horizontal_m), ("vertical, m", c.vertical_m), ("time, s", c.time_s),
-        ("relative speed, m/s", c.closing_mps),
+        ("relative speed (m/s)", c.closing_mps),
     ):  # fmt: skip
         good = np.isfinite(values)
         weight = c.weight[good]
@@ -185,9 +185,9 @@ def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> Non
     with drawing(11.0, 6.5, path) as figure:
         axes: Any = figure.subplots(2, 3)
         parts = (
-            ("horizontal distance, m", c.horizontal_m), ("vertical distance, m", c.vertical_m),
-            ("closest at, s", c.time_s), ("relative speed, m/s", c.closing_mps),
-            ("course against the ownship's, °", c.course_deg),
+            ("horizontal distance (m)", c.horizontal_m), ("vertical distance (m)", c.vertical_m),
+            ("time of the closest approach (s)", c.time_s), ("relative speed (m/s)", c.closing_mps),
+            ("course against the ownship's (deg)", c.course_deg),
         )  # fmt: skip
         weight = c.weight / c.weight.sum() if c.weight.sum() > 0 else None
         for axis, (name, values) in zip(axes.flat, parts, strict=False):
@@ -203,7 +203,7 @@ def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> Non
                 axis.hist(values[good], edges, weights=weight[good], histtype="step",
                           color="#d94801", label="weighted")  # fmt: skip
             axis.set_xlabel(name)
-            axis.set_ylabel("share")
+            axis.set_ylabel("share of the encounters")
         axes.flat[0].legend()
         plan = axes.flat[5]
         for place in places[:: max(1, len(places) // _DRAWN)][:_DRAWN]:
@@ -214,8 +214,8 @@ def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> Non
                     east / 1000, north / 1000, lw=0.8, color="#08519c" if k == 0 else "#d94801"
                 )
         plan.set_aspect("equal", adjustable="datalim")
-        plan.set_xlabel("east, km")
-        plan.set_ylabel("north, km")
+        plan.set_xlabel("east (km)")
+        plan.set_ylabel("north (km)")
         plan.set_title("plan of a sample (ownship blue)")
         figure.tight_layout()
 

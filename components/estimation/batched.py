@@ -5,6 +5,8 @@ one over the last axis, so that a track's result is the same to the bit however 
 computed with it; sums run over components in a fixed order.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -95,6 +97,19 @@ def squared_length(vector: FloatArray) -> FloatArray:
     total = vector[0] * vector[0]
     for value in vector[1:]:
         total += value * value
+    return total
+
+
+def distance_squared(root: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return squared Mahalanobis distances of differences (d, n), by roots of covariances."""
+    return squared_length(solve_lower(root, apart))
+
+
+def sum_of(parts: Sequence[FloatArray] | FloatArray) -> FloatArray:
+    """Return the sum of arrays, or over the first axis of one, in their order."""
+    total: FloatArray = parts[0]
+    for part in parts[1:]:
+        total = total + part
     return total
 
 

@@ -81,11 +81,6 @@ class MotionWithErrors:
         return whole
 
 
-def errors_of(model: Motion) -> int:
-    """Return how many errors the states of a model carry."""
-    return len(model.lasts_s) if isinstance(model, MotionWithErrors) else 0
-
-
 @dataclass(frozen=True, eq=False)
 class ToldErrors:
     """What measurements, or pairs of them with tracks, say of their errors.

@@ -20,6 +20,7 @@ from components.estimation.batched import (
     product_transposed,
     solve_lower,
     solve_upper,
+    sum_of,
     symmetric,
     times,
 )
@@ -68,8 +69,8 @@ def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatA
         mixed = weight + (1.0 - weight) * eigenvalues
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             term = excess / mixed**power
-            value = _summed(term)
-            change = -power * _summed(term * (1.0 - eigenvalues) / mixed)
+            value = sum_of(term)
+            change = -power * sum_of(term * (1.0 - eigenvalues) / mixed)
         return value, change
 
     count = eigenvalues.shape[-1]
@@ -105,16 +106,3 @@ def inverse(covariance: FloatArray) -> FloatArray:
         for j in range(size)
     ]
     return symmetric(np.stack(whole, axis=1))
-
-
-def distance_squared(apart: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return squared Mahalanobis distances of differences (d, n) with covariances (d, d, n)."""
-    scaled = solve_lower(cholesky(covariance), apart)
-    return _summed(scaled * scaled)
-
-
-def _summed(values: FloatArray) -> FloatArray:
-    total = values[0].copy()
-    for value in values[1:]:
-        total += value
-    return total

@@ -7,25 +7,24 @@ one track again (`merge`) is the same for all that are Gaussian.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
 from components.estimation.batched import (
     cholesky,
+    distance_squared,
     is_everything,
     product_transposed,
     selected,
-    solve_lower,
-    squared_length,
+    sum_of,
     symmetric,
 )
-from components.estimation.carried_errors import MotionWithErrors, ToldErrors, errors_of
+from components.estimation.carried_errors import MotionWithErrors, ToldErrors
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import (
     Innovation,
     Moments,
-    distance_squared,
     linear_moments,
     log_likelihood,
     updated,
@@ -201,8 +200,8 @@ class Estimator(Protocol):
 
 
 @dataclass(frozen=True)
-class ExtendedKalmanFilter(Estimator):
-    """Linearises motion and measurement at the state."""
+class SingleModelFilter(Estimator):
+    """A filter of one motion model, which may carry errors of measurements."""
 
     model: Motion
 
@@ -211,19 +210,23 @@ class ExtendedKalmanFilter(Estimator):
         """The one model."""
         return (self.model,)
 
+    @property
+    def errors(self) -> int:
+        """How many errors its states carry."""
+        return len(self.model.lasts_s) if isinstance(self.model, MotionWithErrors) else 0
+
+    def carrying(self, lasts_s: tuple[float, ...]) -> Self:
+        """Return the filter with errors as states."""
+        return replace(self, model=MotionWithErrors(self.model, lasts_s))
+
+
+class ExtendedKalmanFilter(SingleModelFilter):
+    """Linearises motion and measurement at the state."""
+
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
         """Return tracks after times (n,)."""
         state, covariance = predict(self.model, tracks.states[0], tracks.covariances[0], dt_s)
         return Estimates([state], [covariance], tracks.weights)
-
-    @property
-    def errors(self) -> int:
-        """How many errors its states carry."""
-        return errors_of(self.model)
-
-    def carrying(self, lasts_s: tuple[float, ...]) -> "ExtendedKalmanFilter":
-        """Return the filter with errors as states."""
-        return replace(self, model=MotionWithErrors(self.model, lasts_s))
 
     def expect(
         self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
@@ -245,7 +248,7 @@ def pair_measurement(
     """Return what every model says of pairs."""
     innovations = [found.innovation(variance, track) for found in moments]
     residuals = [residual(measured, found.expected) for found in innovations]
-    distances = [distance_squared(i, r) for i, r in zip(innovations, residuals, strict=True)]
+    distances = [distance_squared(i.root, r) for i, r in zip(innovations, residuals, strict=True)]
     likelihoods = np.empty((len(innovations), len(track)))
     for i, (found, apart) in enumerate(zip(innovations, distances, strict=True)):
         likelihoods[i] = log_likelihood(found, apart)
@@ -262,7 +265,7 @@ def pair_measurement(
     learning = [found.innovation(new, track) for found in moments]
     odds = np.empty_like(likelihoods)
     for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
-        odds[i] = log_likelihood(found, distance_squared(found, apart))
+        odds[i] = log_likelihood(found, distance_squared(found.root, apart))
     return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
 
@@ -278,7 +281,7 @@ def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntAr
     for weight, apart, found in zip(weights, residuals, pairs.innovations, strict=True):
         root, off = selected(found.root, which), apart - mean
         spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
-    return squared_length(solve_lower(cholesky(spread), mean))
+    return distance_squared(cholesky(spread), mean)
 
 
 def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
@@ -332,11 +335,3 @@ def combined(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
             covariances[i][:6, :6] + apart[:, np.newaxis] * apart[np.newaxis]
         )
     return state, symmetric(covariance)
-
-
-def sum_of(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return the sum of arrays, in their order."""
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total

@@ -116,5 +116,5 @@ def frame_change(old_deg_m: FloatArray, new_deg_m: FloatArray) -> FrameChange:
     turn = np.empty((3, 3, np.size(north)))
     for i, to in enumerate(here):
         for j, along in enumerate(there):
-            turn[i, j] = to[0] * along[0] + to[1] * along[1] + to[2] * along[2]
+            turn[i, j] = dot(to, along)
     return FrameChange(np.stack([north, east, -up]), turn)

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from components.estimation.batched import symmetric
+from components.estimation.batched import product, sum_of, symmetric
 from components.estimation.carried_errors import ToldErrors
-from components.estimation.estimator import LEAST, Estimates, Estimator, sum_of
+from components.estimation.estimator import LEAST, Estimates, Estimator
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind
@@ -98,10 +98,10 @@ def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> Float
     identity = np.repeat(np.eye(size)[:, :, np.newaxis], len(dt_s), axis=2)
     total = identity.copy()
     for term in range(_TERMS, 0, -1):
-        total = identity + _product(positive, total) / term
+        total = identity + product(positive, total) / term
     total = total * np.exp(-fastest * short)
     for done in range(int(squarings.max(initial=0))):
-        total = np.where(squarings > done, _product(total, total), total)
+        total = np.where(squarings > done, product(total, total), total)
     sums = total.sum(axis=1, keepdims=True)
     return total / sums
 
@@ -178,17 +178,3 @@ def _freshen(covariance: FloatArray, shared: int, variance: float) -> None:
     covariance[shared:, shared:] = 0.0
     for i in range(shared, len(covariance)):
         covariance[i, i] = variance
-
-
-def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    return np.stack(
-        [
-            np.stack(
-                [
-                    sum_of([left[i, k] * right[k, j] for k in range(len(left))])
-                    for j in range(len(left))
-                ]
-            )
-            for i in range(len(left))
-        ]
-    )

@@ -17,7 +17,6 @@ from components.estimation.batched import (
     selected,
     solve_lower,
     solve_upper,
-    squared_length,
     symmetric,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -28,7 +27,7 @@ _TOGETHER = 2048
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """What a filter expects of a measurement, and how its covariance relates to it."""
+    """The predicted measurement, the covariance of the residual, and how states relate to it."""
 
     expected: FloatArray  # (m, n)
     root: FloatArray  # (m, m, n), lower triangular root of the covariance of the residual
@@ -49,7 +48,7 @@ class Innovation:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What a filter expects of any measurement of its tracks, before that one's own errors."""
+    """Moments of the predicted measurement, before the measurement's own errors."""
 
     expected: FloatArray  # (m, n)
     total: FloatArray  # (m, m, n), covariance of what is expected
@@ -182,11 +181,6 @@ def variance_of_what_is_new(
     left = np.maximum(spread - shared, 1e-6 * spread)
     new = spread * (spread * variance - shared * shared) / (left * left)
     return np.where(common > 0.0, np.clip(new, variance, _MOST * variance), variance)
-
-
-def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:
-    """Return the squared Mahalanobis distance of residuals (m, n), shape (n,)."""
-    return squared_length(solve_lower(found.root, residual))
 
 
 def log_likelihood(found: Innovation, distance: FloatArray) -> FloatArray:

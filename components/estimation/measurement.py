@@ -1,4 +1,4 @@
-"""What a sensor would measure of a target: angles in body axes, range, range rate.
+"""The measurement function: angles in body axes, range, range rate and velocity of a target.
 
 Azimuth is clockwise from the nose, elevation upward, both in the ownship's body axes; the range
 rate is positive when the range grows. Which of them a sensor measures is its `Kind`.

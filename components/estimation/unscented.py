@@ -4,7 +4,7 @@ Source: Julier, Uhlmann, *Unscented filtering and nonlinear estimation*, Proc. I
 weights of Wan, van der Merwe (2000). Means of angles are those of unit vectors.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from components.estimation.batched import (
     solve_upper,
     symmetric,
 )
-from components.estimation.carried_errors import MotionWithErrors, ToldErrors, errors_of
-from components.estimation.estimator import Estimates, Estimator
+from components.estimation.carried_errors import ToldErrors
+from components.estimation.estimator import Estimates, SingleModelFilter
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, residual
@@ -26,17 +26,14 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass(frozen=True)
 class SigmaPoints:
-    """How sigma points are spread and weighted."""
+    """Spread and weights of sigma points.
 
-    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
-    # defaults no weight is negative, so that no covariance can lose its sign
-    alpha: float = 1.0
-    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
-    # defaults no weight is negative, so that no covariance can lose its sign
-    beta: float = 2.0
-    # Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
-    # defaults no weight is negative, so that no covariance can lose its sign
-    kappa: float = 0.0
+    With the defaults no weight is negative, so that no covariance can lose its sign.
+    """
+
+    alpha: float = 1.0  # Spread
+    beta: float = 2.0  # Knowledge of the distribution, 2 for a Gaussian
+    kappa: float = 0.0  # Second spread
 
     def weights(self, size: int) -> tuple[FloatArray, FloatArray, float]:
         """Return weights of means and covariances, (2 d + 1,), and the spread d + lambda."""
@@ -58,31 +55,16 @@ class SigmaPoints:
 
 
 @dataclass(frozen=True)
-class UnscentedKalmanFilter(Estimator):
+class UnscentedKalmanFilter(SingleModelFilter):
     """Takes the moments of motion and measurement from sigma points."""
 
-    model: Motion
     sigma: SigmaPoints = SigmaPoints()
-
-    @property
-    def models(self) -> tuple[Motion, ...]:
-        """The one model."""
-        return (self.model,)
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
         """Return tracks after times (n,)."""
         (state,), (covariance,), weights = tracks
         state, covariance = predict_unscented(self.model, state, covariance, dt_s, self.sigma)
         return Estimates([state], [covariance], weights)
-
-    @property
-    def errors(self) -> int:
-        """How many errors its states carry."""
-        return errors_of(self.model)
-
-    def carrying(self, lasts_s: tuple[float, ...]) -> "UnscentedKalmanFilter":
-        """Return the filter with errors as states."""
-        return replace(self, model=MotionWithErrors(self.model, lasts_s))
 
     def expect(
         self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None

@@ -88,7 +88,7 @@ class Fusion(Component):
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: where navigation errs, with the believed pose."""
-        return [FusedWithPose if navigation_errs(self.context) else FusedDetections]
+        return [FusedWithPose] if navigation_errs(self.context) else [*super().records()]
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name, and how late they come."""
@@ -142,7 +142,21 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Build the fused rows of some instants from the best of what belongs together."""
+        """Build the fused rows of some instants from the best of what belongs together.
+
+        Parameters
+        ----------
+        instants : RunTicks
+            Of the rows that are sent, such as ``wake.instants``.
+        row : (fused,) of int
+            Which of these each fused detection is of, ascending.
+        target : (fused,) of int
+            Of whom each is, an index in the roster; -1 for a false alarm.
+        arrivals : dict of Arrivals
+            What came, by sensor; with what came before, as `with_recent` gives it.
+        entries : dict of (fused,) of int
+            By sensor, which entry of its message belongs to each fused detection; -1 for none.
+        """
         count = len(row)
         contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
@@ -255,7 +269,11 @@ def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
 def latest_in_gate(
     arrivals: Arrivals, asked: RunTicks, targets: IntArray, gate_ticks: int
 ) -> IntArray:
-    """Return the latest entry that arrived at the instant or at most `gate_ticks` before it."""
+    """Return the latest entry that arrived at the instant or at most `gate_ticks` before it.
+
+    `asked` (fused,) are instants and `targets` (fused,) whose entries are wanted; -1 where a sensor
+    has none.
+    """
     counts = np.diff(arrivals.message.offsets)
     if not counts.any():
         return np.full(len(asked), -1, dtype=np.int64)

@@ -26,7 +26,7 @@ from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
-from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
+from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -38,10 +38,8 @@ _PD = Quantity("detection_probability", "Pd")
 _STRONGEST = 1e12
 
 
-class LaserParameters(SensorParameters):
+class LaserParameters(RangeErrorParameters, SensorParameters):
     """Parameters of a scanning laser."""
-
-    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
 
     errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
         default="signal",
@@ -84,16 +82,6 @@ class LaserParameters(SensorParameters):
     )
     hits_needed: int = Field(
         default=1, ge=1, le=1000, description="Shots of a scan that must detect a target."
-    )
-    range_resolution_m: float = Field(
-        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
-    )
-    range_error_m: float = Field(
-        default=0.0, ge=0, description="Standard deviation of measured range, m."
-    )
-    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
-    range_correlation_time_s: CorrelationTime | None = Field(
-        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
     )
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""The beam: when it passes each target, and what a target off its axis loses.
+"""The beam: when it passes each target, and the beam-shape loss off its axis.
 
 The beam sweeps clockwise over the field of view once per scan, at an even rate, and flies back in
 what is left of the period: it looks one way only.
@@ -186,7 +186,7 @@ BEAM_SHAPE = Hook(
 
 
 class BeamShape(Effect[CellValues]):
-    """What a target off the beam's axis loses: between beam positions, or on average in a sweep.
+    """Beam-shape loss of a target off the axis: between beam positions, or the mean of a sweep.
 
     The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
     target is looked at by the nearest. A beam that sweeps passes over it in azimuth: its pulses

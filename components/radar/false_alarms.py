@@ -1,4 +1,4 @@
-"""False alarms: what noise alone, and clutter over a threshold set for noise, add to a report."""
+"""False alarms of noise alone, and of clutter over a threshold that is set for noise."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,10 @@ from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.detection.output import false_alarm_count, false_alarm_snr
 from components.radar.detection.threshold import Crossing
-from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, beamwidths_rad, terrain_of
+from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terrain_of
 from components.radar.measurement import FAINTEST
 from components.radar.rain import RainClutter
-from components.radar.resolution import cells_of_radar
+from components.radar.resolution import cell_size, cells_of_radar
 from components.sensor.look import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -32,7 +32,7 @@ _OF_CUED = 2**40
 
 @dataclass(frozen=True, eq=False)
 class Alarms:
-    """What crossed a threshold without a target, in ascending order of the reports' rows.
+    """Threshold crossings without a target, in ascending order of the reports' rows.
 
     `key` is that of its draws, `where` its place by quantity in the sensor's axes, `snr` how strong
     it came out (linear, above 0) and `rate` a uniform number that says its range rate.
@@ -216,7 +216,7 @@ class GroundReports:
     def __init__(self, block: Any) -> None:
         self._block, self._terrain = block, terrain_of(block)
         self._cells = cells = cells_of_radar(block)
-        self._beam_rad = beamwidths_rad(block)
+        _, self._elevation_beamwidth_rad, _ = cell_size(block.p)
         self._draws = block.stream("clutter false alarms")
         axes = (
             (cells.azimuth_rad, cells.azimuth),
@@ -318,7 +318,7 @@ class GroundReports:
                 yield depth, everywhere, elevation_rad
             return
         height_m = own_alt_m - self._terrain.height_m
-        reach_rad = BEAM_REACH_BEAMWIDTHS * self._beam_rad[1]
+        reach_rad = BEAM_REACH_BEAMWIDTHS * self._elevation_beamwidth_rad
         for depth, range_m in enumerate(self._range_m.tolist()):
             if range_m >= height_m:
                 off = elevation_rad + math.asin(height_m / range_m)
@@ -331,26 +331,23 @@ class GroundReports:
     ) -> tuple[FloatArray, FloatArray]:
         """Return how often the clutter in some cells crosses the threshold, and its CNR."""
         range_m = np.full(len(elevation_rad), self._range_m[depth])
-        mean, diffuse = np.zeros(len(range_m)), np.zeros(len(range_m))
-        for echo in self._block.echoes:
+        echoes, powers = self._block.echoes, []
+        for echo in echoes:
             alt_m = own_alt_m + range_m * np.sin(elevation_rad)
             if not echo.diffuse:
                 alt_m = np.full(len(range_m), self._terrain.height_m)
             cells: Any = _CellsWithoutTarget(range_m, own_alt_m, elevation_rad, alt_m)
-            cnr = self._block.echo_snr(cells, echo(cells))
-            if echo.diffuse:
-                diffuse = diffuse + cnr
-            else:
-                mean = mean + cnr
+            powers.append(self._block.echo_snr(cells, echo(cells)))
+        clutter = Clutter.summed(echoes, powers, len(range_m))
         pfa = clutter_detection_probability(
             0.0,
-            mean,
+            clutter.mean,
             false_alarm_probability=0.5,  # the threshold says more
-            diffuse_cnr=diffuse,
+            diffuse_cnr=clutter.diffuse,
             clutter=self._block.context.sections["terrain"].clutter_mean,
             noise_threshold=self._crossing.threshold,
         )
-        return pfa, mean + diffuse
+        return pfa, clutter.total
 
 
 #: Noise above the threshold in one look of a hundred is more than any radar's operator bears.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,7 +123,6 @@ def _or_height(distance: Any, height: Any) -> Any:
 
 
 Velocity = tuple[FloatArray, FloatArray, FloatArray]
-_CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
 
 
 @dataclass(frozen=True)
@@ -135,18 +135,29 @@ class Clutter:
     mean: FloatArray
     diffuse: FloatArray
 
+    @classmethod
+    def summed(cls, echoes: Sequence[Echo], powers: Iterable[FloatArray], cells: int) -> Clutter:
+        """Return the clutter of echoes with these powers over noise."""
+        mean, diffuse = np.zeros(cells), np.zeros(cells)
+        for echo, power in zip(echoes, powers, strict=True):
+            if echo.diffuse:
+                diffuse = diffuse + power
+            else:
+                mean = mean + power
+        return cls(mean, diffuse)
+
     @property
     def total(self) -> FloatArray:
         """Both together."""
         return self.mean + self.diffuse
 
-    def of(self, chosen: Any) -> Clutter:
+    def take(self, cells: Any) -> Clutter:
         """Return that of some cells."""
-        return Clutter(self.mean[chosen], self.diffuse[chosen])
+        return Clutter(self.mean[cells], self.diffuse[cells])
 
 
 class Echo:
-    """What gives an echo beside the target; called with cells, it returns its RCS in m²."""
+    """An echo beside the target; called with cells, it returns its RCS in m²."""
 
     #: Whether it adds to noise; else it is the mean that ``clutter_mean`` speaks of.
     diffuse = True
@@ -245,11 +256,11 @@ class GroundClutter(Effect[Echo]):
         terrain = terrain_of(block)
         if terrain is None:
             return NoEcho(block)
-        for width, name in zip(cell_size(block.p), _CELL, strict=True):
-            if width == 0:
-                raise ValueError(
-                    f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
-                )
+        if block.p.sizeless_steps:
+            raise ValueError(
+                f"{block.p.sizeless_steps[0]} is 0: ground clutter fills a resolution cell, it "
+                "must be above 0"
+            )
         if block.p.pulses_summed > 1:
             if block.p.budget == "dwell" and block.p.integration == "noncoherent":
                 raise ValueError(
@@ -260,14 +271,12 @@ class GroundClutter(Effect[Echo]):
                 f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
                 "set it to 1, with integration_gain_db for pulses integrated coherently"
             )
-
         if terrain.clutter_mean == "constant" and block.p.cfar_reference_cells is not None:
             raise ValueError(
                 f"cfar_reference_cells is {block.p.cfar_reference_cells} and [terrain] "
                 "clutter_mean is 'constant': an average of cells is known for clutter that "
                 "fluctuates; leave one of them out"
             )
-
         return GroundEcho(block, terrain)
 
 
@@ -279,9 +288,8 @@ class BoundaryClutter(GroundClutter):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] height_m``, and for a cell."""
         found = super().verdict(block)
-        zero = [name for width, name in zip(cell_size(block.p), _CELL, strict=True) if not width]
-        if found.simulated and zero:
-            return Verdict(False, f"{zero[0]} is 0: no cell, no ground in it")
+        if found.simulated and block.p.sizeless_steps:
+            return Verdict(False, f"{block.p.sizeless_steps[0]} is 0: no cell, no ground in it")
         return found
 
     def build(self, block: Any) -> Echo:
@@ -289,12 +297,6 @@ class BoundaryClutter(GroundClutter):
         if not self.verdict(block).simulated:
             return NoEcho(block)
         return super().build(block)
-
-
-def beamwidths_rad(block: Any) -> tuple[float, float]:
-    """Return a radar's beamwidths in azimuth and elevation, rad; by default its resolution."""
-    azimuth_rad, elevation_rad, _ = cell_size(block.p)
-    return azimuth_rad, elevation_rad
 
 
 def terrain_of(block: Any) -> Any:

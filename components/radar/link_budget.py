@@ -36,100 +36,6 @@ def wavelength(frequency_hz: ArrayLike) -> Any:
     return SPEED_OF_LIGHT_M_S / positive("frequency_hz", frequency_hz)[()]
 
 
-def radar_constant(
-    *,
-    power_w: float,
-    antenna_gain_db: float,
-    wavelength_m: float,
-    bandwidth_hz: float,
-    integration_gain_db: float = 0.0,
-    noise_figure_db: float = 0.0,
-    losses_db: float = 0.0,
-) -> float:
-    """Return what RCS/range⁴ is multiplied with to give the SNR, in m².
-
-    Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis eq. 7
-    and 8, completed by the coherent integration gain G_I, the noise figure F and the losses L,
-    which Table 2.2 lists (G_I, F) or forgets (L). Pulses that G_I counts are not to be counted
-    again as `pulses`.
-    """
-    quantities = {
-        "power_w": power_w,
-        "wavelength_m": wavelength_m,
-        "bandwidth_hz": bandwidth_hz,
-    }
-    for name, value in quantities.items():
-        positive(name, value)
-    decibels = {
-        "antenna_gain_db": antenna_gain_db,
-        "integration_gain_db": integration_gain_db,
-        "noise_figure_db": noise_figure_db,
-        "losses_db": losses_db,
-    }
-    for name, value in decibels.items():
-        if not abs(float(finite(name, value))) <= LARGEST_DB:
-            raise ValueError(f"{name} is {value:g}: it must lie in ±{LARGEST_DB:g} dB")
-    total_db = 2.0 * antenna_gain_db + integration_gain_db - noise_figure_db - losses_db
-    noise_w = BOLTZMANN_J_K * REFERENCE_TEMPERATURE_K * bandwidth_hz
-    return (
-        power_w
-        * wavelength_m
-        * wavelength_m
-        * 10.0 ** (total_db / 10.0)
-        / ((4.0 * math.pi) ** 3 * noise_w)
-    )
-
-
-def checked_minimum_range(minimum_range_m: float) -> float:
-    """Return the minimum range as a float, or refuse one below 1 mm."""
-    nearest = float(positive("minimum_range_m", minimum_range_m))
-    if nearest < SMALLEST_MINIMUM_RANGE_M:
-        raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
-    return nearest
-
-
-def snr(
-    range_m: ArrayLike, rcs_m2: ArrayLike, *, constant_m2: float, minimum_range_m: float
-) -> Any:
-    """Return the SNR per look (linear), or 0 closer than the minimum range.
-
-    Closer than `minimum_range_m`, at least 1 mm, the far-field equation does not hold and the
-    receiver is still blind from its own pulse: no echo is processed, and the SNR is 0. So range 0
-    is finite.
-    """
-    constant_m2 = float(positive("constant_m2", constant_m2))
-    nearest = checked_minimum_range(minimum_range_m)
-    shape, (distance, rcs) = broadcast_flat(
-        range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
-    )
-    return unflatten(echo_snr(distance, rcs, constant_m2, nearest), shape)
-
-
-def echo_snr(
-    distance: FloatArray, rcs: FloatArray, constant_m2: float, nearest: float
-) -> FloatArray:
-    """`snr` for flat contiguous arrays of one shape, all arguments checked."""
-    near = distance < nearest
-    safe = np.where(near, nearest, distance)
-    # Both factors are divided by the square: neither the fourth power of a large range nor their
-    # product overflows on the way. An echo from the end of the number range is 0.
-    with np.errstate(under="ignore", over="ignore"):
-        square = safe * safe
-        echo = (constant_m2 / square) * (rcs / square)
-    return np.where(near, 0.0, np.minimum(echo, _LARGEST))
-
-
-__all__ = [
-    "LinkBudget",
-    "calibrated_bandwidth",
-    "detection_range",
-    "radar_constant",
-    "snr",
-    "wavelength",
-    "with_bandwidth",
-]
-
-
 @dataclass(frozen=True)
 class LinkBudget:
     """One radar's link budget; all gains in dB, everything else in SI units.
@@ -159,7 +65,9 @@ class LinkBudget:
         if self.frequency_hz is not None:
             positive("frequency_hz", self.frequency_hz)
         if self.minimum_range_m is not None:
-            checked_minimum_range(self.minimum_range_m)
+            nearest = float(positive("minimum_range_m", self.minimum_range_m))
+            if nearest < SMALLEST_MINIMUM_RANGE_M:
+                raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
         positive("constant_m2", self.constant_m2)
 
     @property
@@ -171,15 +79,30 @@ class LinkBudget:
 
     @cached_property
     def constant_m2(self) -> float:
-        """`radar_constant` of this budget, m²."""
-        return radar_constant(
-            power_w=self.power_w,
-            antenna_gain_db=self.antenna_gain_db,
-            wavelength_m=self.wavelength,
-            bandwidth_hz=self.bandwidth_hz,
-            integration_gain_db=self.integration_gain_db,
-            noise_figure_db=self.noise_figure_db,
-            losses_db=self.losses_db,
+        """What RCS/range⁴ is multiplied with to give the SNR, m².
+
+        Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis
+        eq. 7 and 8, completed by the coherent integration gain G_I, the noise figure F and the
+        losses L, which Table 2.2 lists (G_I, F) or forgets (L). Pulses that G_I counts are not to
+        be counted again as `pulses`.
+        """
+        wavelength_m = self.wavelength
+        positive("power_w", self.power_w)
+        positive("wavelength_m", wavelength_m)
+        positive("bandwidth_hz", self.bandwidth_hz)
+        for name in ("antenna_gain_db", "integration_gain_db", "noise_figure_db", "losses_db"):
+            value = float(finite(name, getattr(self, name)))
+            if not abs(value) <= LARGEST_DB:
+                raise ValueError(f"{name} is {value:g}: it must lie in ±{LARGEST_DB:g} dB")
+        gain_db = 2.0 * self.antenna_gain_db + self.integration_gain_db
+        total_db = gain_db - self.noise_figure_db - self.losses_db
+        noise_w = BOLTZMANN_J_K * REFERENCE_TEMPERATURE_K * self.bandwidth_hz
+        return (
+            self.power_w
+            * wavelength_m
+            * wavelength_m
+            * 10.0 ** (total_db / 10.0)
+            / ((4.0 * math.pi) ** 3 * noise_w)
         )
 
     @cached_property
@@ -191,12 +114,27 @@ class LinkBudget:
         return max(far_field_m, SMALLEST_MINIMUM_RANGE_M)
 
     def snr(self, range_m: ArrayLike, rcs_m2: ArrayLike) -> Any:
-        """Return the SNR at a slant range for an RCS; see `components.radar.link_budget.snr`."""
-        return snr(range_m, rcs_m2, constant_m2=self.constant_m2, minimum_range_m=self.nearest_m)
+        """Return the SNR per look (linear) at slant ranges for RCSs, 0 closer than `nearest_m`."""
+        shape, (distance, rcs) = broadcast_flat(
+            range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
+        )
+        return unflatten(self.snr_of_cells(distance, rcs), shape)
 
     def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
-        """Return the same for flat arrays of one shape that are known to be 0 or more."""
-        return echo_snr(range_m, rcs_m2, self.constant_m2, self.nearest_m)
+        """Return the same for flat arrays of one shape that are known to be 0 or more.
+
+        Closer than `nearest_m` the far-field equation does not hold and the receiver is still
+        blind from its own pulse.
+        """
+        nearest = self.nearest_m
+        near = range_m < nearest
+        safe = np.where(near, nearest, range_m)
+        # Both factors are divided by the square: neither the fourth power of a large range nor
+        # their product overflows on the way. An echo from the end of the number range is 0.
+        with np.errstate(under="ignore", over="ignore"):
+            square = safe * safe
+            echo = (self.constant_m2 / square) * (rcs_m2 / square)
+        return np.where(near, 0.0, np.minimum(echo, _LARGEST))
 
     def range_for_snr(self, snr: ArrayLike, rcs_m2: ArrayLike) -> Any:
         """Return the slant range in metres at which the radar equation gives an SNR.

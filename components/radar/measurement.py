@@ -1,4 +1,4 @@
-"""What a radar measures of a detection: strength, and the errors that follow from it."""
+"""Measured strength of a radar's detections, and the errors of measurement that follow from it."""
 
 import math
 from collections.abc import Mapping
@@ -16,26 +16,19 @@ from components.radar.detection.output import measured_snr
 from components.radar.link_budget import wavelength
 from components.radar.resolution import ResolutionParameters
 from components.sensor.look import STRENGTH, Cells, Look, Strengthening
-from components.sensor.parameters import CorrelationTime, ErrorParameters, GlintParameters
+from components.sensor.parameters import CorrelationTime, GlintParameters
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.errors import Disagreements
 
 
 class RadarErrorParameters(ResolutionParameters):
-    """Errors of range and range rate, and whether the latter is measured."""
+    """Errors of range rate, and whether it is measured."""
 
     quantities: ClassVar[Mapping[str, str]] = {
-        **ErrorParameters.quantities, "range": "m", "range_rate": "m_s"
+        **ResolutionParameters.quantities, "range_rate": "m_s"
     }  # fmt: skip
 
-    range_error_m: float = Field(
-        default=0.0, ge=0, description="Standard deviation of measured range, m."
-    )
-    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
-    range_correlation_time_s: CorrelationTime | None = Field(
-        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
-    )
     measures_range_rate: bool = Field(
         default=False,
         description="Whether the rate of the slant range is measured, by its Doppler shift.",
@@ -216,7 +209,7 @@ FAINTEST = 1e-6
 
 
 class MeasuredStrength(Effect[Strengthening]):
-    """What a radar knows of a target's echo is what it knows of noise: how strong it came out.
+    """A target's echo is known as noise is: by how strong it came out.
 
     SNR and confidence of a detection are those of the output that crossed the threshold, by the
     target's own fluctuation and the noise of that look; errors by signal follow from that output

@@ -21,7 +21,7 @@ from dsa_des.block.component import Parameters
 
 
 class CuedRadarParameters(SensorParameters):
-    """What a radar does within a cue cone; its scan clock stays as it is."""
+    """Parameters of looks within a cue cone; the scan clock stays as it is."""
 
     cued_dwell_factor: float | None = Field(
         default=None,
@@ -48,7 +48,7 @@ def dwell_factor(parameters: Any) -> Any:
 
 
 class ClutterParameters(SensorParameters):
-    """What the threshold does where there is more than noise."""
+    """Parameters of threshold and moving-target filter where there is more than noise."""
 
     clutter_threshold: Literal["adaptive", "noise"] = Field(
         default="adaptive",
@@ -329,11 +329,6 @@ class LinkBudgetParameters(
             wrong = implausible(self)
             raise ValueError("; ".join([*wrong, str(error)])) from error
         return replace(budget, bandwidth_hz=bandwidth_hz)
-
-
-def budget_report(name: str, budget: LinkBudget) -> dict[str, Any]:
-    """Return the section of the run's summary that records the bandwidth in use."""
-    return {"link_budgets": {name: {"bandwidth_hz": float(budget.bandwidth_hz)}}}
 
 
 def moved_threshold(p: LinkBudgetParameters) -> list[str]:

@@ -31,12 +31,12 @@ from components.radar.ground_clutter import (
     clutter_as_signal,
     terrain_of,
 )
-from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.link_budget import wavelength
 from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.resolution import ONE_REPORT, Merging, OneReportByCell
-from components.radar.timing import unambiguous_range_m
+from components.radar.timing import check_unambiguous
 from components.radar.weather import (
     SNR,
     WEATHER_EFFECTS,
@@ -80,7 +80,6 @@ class Radar(SweepingSensor):
         self.snr_factors: list[CellValues] = []
         self._merging: Merging | None = None
         self.doppler: DopplerProcessing | None = None
-        self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
@@ -101,8 +100,7 @@ class Radar(SweepingSensor):
 
     def offer(self, port: str) -> Any:
         """Say beside what every sensor says whether range rates fold."""
-        folds = bool(getattr(self.p, "range_rate_folds", False))
-        return replace(super().offer(port), folds_range_rate=folds)
+        return replace(super().offer(port), folds_range_rate=self.p.range_rate_folds)
 
     def exact_because(self) -> str:
         """A rate divides the change of an error over hundredths of a second by these."""
@@ -115,9 +113,8 @@ class Radar(SweepingSensor):
     @property
     def steps(self) -> dict[str, float]:
         """Grid step of each quantity that is measured: rad, m and m/s."""
-        measured = getattr(self.p, "measures_range_rate", False)
-        rate = {"range_rate": self.range_rate_step_m_s} if measured else {}
-        return {**super().steps, **rate}
+        rate = {"range_rate": self.p.range_rate_resolution_m_s}
+        return super().steps | (rate if self.p.measures_range_rate else {})
 
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
@@ -234,12 +231,8 @@ class RangeBoundaryParameters(RadarParameters):
                     f"{key} is {getattr(self, key)!r} and frequency_hz is not given: blind speeds "
                     "and the unambiguous velocity follow from it"
                 )
-        if self.prf_hz is not None and self.range_km * 1000.0 > unambiguous_range_m(self.prf_hz):
-            raise ValueError(
-                f"prf_hz is {self.prf_hz:g}: echoes are unambiguous up to "
-                f"{unambiguous_range_m(self.prf_hz) / 1000:.4g} km and range_km is "
-                f"{self.range_km:g}; lower one of them"
-            )
+        if self.prf_hz is not None:
+            check_unambiguous(self.prf_hz, self.range_km)
         return self
 
     @property
@@ -284,7 +277,7 @@ class RangeBoundary(Radar):
         super().__init__(name, parameters, context)
         frequency_hz = parameters.frequency_hz
         self._echoes: list[Echo] = []
-        self.wavelength_m = None if frequency_hz is None else SPEED_OF_LIGHT_M_S / frequency_hz
+        self.wavelength_m = None if frequency_hz is None else float(wavelength(frequency_hz))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""

@@ -1,4 +1,4 @@
-"""The echo of rain, and what sidelobes hear of rain and ground all around."""
+"""Rain clutter, and clutter of rain and ground all around that sidelobes receive."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from components.arguments.checks import positive
 from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells
-from components.sensor.parameters import SensorParameters
+from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.errors import Disagreements
@@ -107,7 +107,7 @@ CELL_SIZES = (
 )
 
 
-class ResolutionParameters(SensorParameters):
+class ResolutionParameters(RangeErrorParameters, SensorParameters):
     """Beam, grid of range, and whether its cells are what the radar tells apart."""
 
     azimuth_beamwidth_deg: float | None = Field(
@@ -131,9 +131,6 @@ class ResolutionParameters(SensorParameters):
         lt=0,
         description="Mean level of the sidelobes over the main beam, one way, dB: ground and rain "
         "all around are heard through them. By default there are none.",
-    )
-    range_resolution_m: float = Field(
-        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
     )
     resolution_cells: bool | None = Field(
         default=None,
@@ -188,11 +185,11 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
     p = block.p
     azimuth_rad, elevation_rad, range_m = cell_size(p)
-    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), CELL_SIZES, strict=True):
-        if width == 0:
-            raise ValueError(
-                f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"
-            )
+    if p.sizeless_steps:
+        raise ValueError(
+            f"{p.sizeless_steps[0]} is 0: false alarms are counted by resolution cells, it must "
+            "be above 0"
+        )
     if p.range_km is None:
         raise ValueError(
             "range_km is not given: false alarms are counted by resolution cells up to it"

@@ -278,7 +278,7 @@ class SwerlingRadar(LinkBudgetRadar):
         cued = None if cells.cued is None else self._cued_detector
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
-            beside = None if clutter is None else clutter.of(chosen)
+            beside = None if clutter is None else clutter.take(chosen)
             found = self._pd(snr[chosen], model, beside, *usual)
             if cued is not None:
                 inside = cells.is_cued()[chosen]

@@ -37,7 +37,6 @@ from components.radar.link_budget import beam_against_gain, implausible
 from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
-    budget_report,
     dwell_factor,
     moved_threshold,
 )
@@ -178,18 +177,8 @@ class LinkBudgetRadar(Radar):
             passed, residues = self.doppler(cells, self.echoes)
             snr = snr * passed
             beside = [cnr * left for cnr, left in zip(beside, residues, strict=True)]
-        return self.resolved(cells, snr), self._clutter(cells, beside)
-
-    def _clutter(self, cells: Cells, beside: list[FloatArray]) -> Clutter | None:
-        if not beside:
-            return None
-        mean, diffuse = np.zeros(len(cells)), np.zeros(len(cells))
-        for echo, cnr in zip(self.echoes, beside, strict=True):
-            if echo.diffuse:
-                diffuse = diffuse + cnr
-            else:
-                mean = mean + cnr
-        return Clutter(mean, diffuse)
+        clutter = Clutter.summed(self.echoes, beside, len(cells)) if self.echoes else None
+        return self.resolved(cells, snr), clutter
 
     @property
     def crossing(self) -> Crossing:
@@ -297,7 +286,7 @@ class LinkBudgetRadar(Radar):
         """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
         return {
             **super().report(),
-            **budget_report(self.name, self.budget),
+            "link_budgets": {self.name: {"bandwidth_hz": float(self.budget.bandwidth_hz)}},
             **time_report(self.name, self.p),
         }
 

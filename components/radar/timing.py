@@ -77,6 +77,17 @@ def unambiguous_range_m(prf_hz: float) -> float:
     return SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
 
 
+def check_unambiguous(prf_hz: float, range_km: float) -> None:
+    """Raise ValueError if echoes from a range come after the next pulse has left."""
+    reach_m = unambiguous_range_m(prf_hz)
+    if range_km * 1000.0 > reach_m:
+        highest_hz = 1.0 / round_trip_s(range_km * 1000.0)
+        raise ValueError(
+            f"prf_hz is {prf_hz:g}: echoes are unambiguous up to {reach_m / 1000:.4g} km "
+            f"and range_km is {range_km:g}; it must be at most {_rounded_down(highest_hz)}"
+        )
+
+
 def round_trip_s(range_m: float) -> float:
     """Return the time an echo takes from a range, s."""
     return 2.0 * range_m / SPEED_OF_LIGHT_M_S
@@ -90,7 +101,7 @@ _ROUNDED_DB = 0.05
 
 @dataclass(frozen=True)
 class LookEnergy:
-    """What one look at a target consists of: its beams, its time and its pulses.
+    """The beams, time and pulses of one look at a target.
 
     `pulses` is None without a PRF. `gain` is that of the energy added up coherently over that of
     the look which the link budget is for, 1 where pulses are summed non-coherently, `summed` of
@@ -216,13 +227,8 @@ class TimeBudgetParameters(ResolutionParameters):
     def _check_pulse_interval(self) -> None:
         if self.prf_hz is None:
             return
-        reach_m = unambiguous_range_m(self.prf_hz)
-        if self.range_km is not None and self.range_km * 1000.0 > reach_m:
-            highest_hz = 1.0 / round_trip_s(self.range_km * 1000.0)
-            raise ValueError(
-                f"prf_hz is {self.prf_hz:g}: echoes are unambiguous up to {reach_m / 1000:.4g} km "
-                f"and range_km is {self.range_km:g}; it must be at most {_rounded_down(highest_hz)}"
-            )
+        if self.range_km is not None:
+            check_unambiguous(self.prf_hz, self.range_km)
         if self.dwell_s is not None and pulses_in(self.dwell_s, self.prf_hz) < 1:
             raise ValueError(
                 f"dwell_s is {self.dwell_s:g}: it must hold a pulse, so with prf_hz "

@@ -1,4 +1,4 @@
-"""What the way takes from a radar's echo: gas, rain and fog, and the blind range."""
+"""Attenuation of a radar's echo by gas, rain and fog, and the blind range."""
 
 import math
 from typing import Any, ClassVar
@@ -71,13 +71,9 @@ class Attenuation(Effect[CellValues]):
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's SNR."""
-        weather = block.context.sections["weather"]
         if block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
-        table = attenuation_table(
-            SPEED_OF_LIGHT_M_S / block.wavelength_m,
-            **{"gas": False, **self.settings(weather, block)},
-        )
+        table = self._table(block)
 
         def factor(cells: Cells) -> FloatArray:
             loss_db = one_way_attenuation_db(
@@ -86,6 +82,12 @@ class Attenuation(Effect[CellValues]):
             return two_way_transmission(loss_db)
 
         return factor
+
+    def _table(self, block: Any) -> AttenuationTable:
+        settings = self.settings(block.context.sections["weather"], block)
+        return attenuation_table(
+            SPEED_OF_LIGHT_M_S / block.wavelength_m, **{"gas": False, **settings}
+        )
 
     def bound(self, block: Any) -> dict[str, float]:
         """Return the largest influence on Pd inside the radar's range, where it has one.
@@ -97,12 +99,7 @@ class Attenuation(Effect[CellValues]):
         steepness = block.steepest_pd() if hasattr(block, "steepest_pd") else None
         if not math.isfinite(reach_m) or steepness is None:
             return {}
-        weather = block.context.sections["weather"]
-        table = attenuation_table(
-            SPEED_OF_LIGHT_M_S / block.budget.wavelength,
-            **{"gas": False, **self.settings(weather, block)},
-        )
-        most_db = 2.0 * worst_one_way_db(table, reach_m)
+        most_db = 2.0 * worst_one_way_db(self._table(block), reach_m)
         influence = steepness * most_db * math.log(10.0) / 10.0
         return {"detection_probability": min(1.0, influence)}
 

@@ -1,4 +1,4 @@
-"""Where a sensor acquires a target: nearer than it keeps one, by azimuth and the target's speed."""
+"""Acquisition range of a sensor: nearer than it keeps a target, by azimuth and target speed."""
 
 import math
 from itertools import pairwise
@@ -18,7 +18,7 @@ _Share = Annotated[float, Field(gt=0, le=1)]
 
 
 class AcquisitionRange(Parameters):
-    """How far off a sensor acquires targets up to some speed."""
+    """Range at which a sensor acquires targets up to some speed."""
 
     below_m_s: float | None = Field(
         default=None,

@@ -18,7 +18,7 @@ from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What a sensor's physics says of each cell.
+    """The outcome of a look: detection and confidence of each cell.
 
     Parameters
     ----------
@@ -69,7 +69,12 @@ class Look:
 class Cells:
     """The (scan, target) pairs that need a sensor's physics, as flat contiguous arrays.
 
-    Any field of `RelativeTargets` can be read as an attribute, for example ``cells.range_m``.
+    Any field of `RelativeTargets` can be read as an attribute, (cells,): ``range_m``; the line of
+    sight in body axes, ``body_azimuth_rad`` and ``body_elevation_rad``, and in the ownship's NED
+    frame, ``azimuth_rad`` and ``elevation_rad``; the target's altitude ``alt_m``, and how it is
+    turned: ``relative_heading_rad`` against the line of sight, ``target_pitch_rad``,
+    ``target_roll_rad``. ``scan``, ``target`` and ``run`` say which scan, which index in the
+    ``roster`` and which run each is of.
 
     Parameters
     ----------

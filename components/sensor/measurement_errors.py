@@ -78,7 +78,7 @@ _NEAREST_M = 1e-3
 _QUARTER = 0.5 * math.pi
 
 
-class Erring:
+class ErrorModel:
     """Measures with errors; called in place of the sensor's grid."""
 
     def __init__(self, block: Any) -> None:
@@ -234,10 +234,10 @@ class Erring:
         return found
 
 
-MEASUREMENT = Hook("measurement", Erring, "what is measured, and its variances")
+MEASUREMENT = Hook("measurement", ErrorModel, "what is measured, and its variances")
 
 
-class MeasurementErrors(Effect[Erring]):
+class MeasurementErrors(Effect[ErrorModel]):
     """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
 
     lockstep = True
@@ -251,9 +251,9 @@ class MeasurementErrors(Effect[Erring]):
             return Verdict(False, "errors is 'grid': values are rounded to the grid")
         return Verdict(True, f"errors is '{block.p.errors}'")
 
-    def build(self, block: Any) -> Erring:
+    def build(self, block: Any) -> ErrorModel:
         """Return what measures with errors."""
-        return Erring(block)
+        return ErrorModel(block)
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:

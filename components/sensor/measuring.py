@@ -1,4 +1,4 @@
-"""What a sensor reports of lines of sight: on its grid, with its errors, in the ownship's axes."""
+"""Measurement of lines of sight: on a sensor's grid, with its errors, in the ownship's axes."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from components.messages.reach import Reach
 from components.sensor.glint import APPARENT_PLACE, Wander
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
 from components.sensor.look import Cells, Look
-from components.sensor.measurement_errors import MEASUREMENT, Erring
+from components.sensor.measurement_errors import MEASUREMENT, ErrorModel
 from components.sensor.mounting import AXES, BodyAxes
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -41,7 +41,7 @@ class Measuring(Component):
         return self.built_one(AXES) or _BODY_AXES
 
     @cached_property
-    def _erring(self) -> Erring | None:
+    def _error_model(self) -> ErrorModel | None:
         return self.built_one(MEASUREMENT)
 
     @cached_property
@@ -96,8 +96,8 @@ class Measuring(Component):
         true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
         if (rate := self.range_rate(cells, found)) is not None:
             true["range_rate"] = rate
-        if self._erring is not None:
-            return self._in_body(*self._erring(cells, found, look, true))
+        if self._error_model is not None:
+            return self._in_body(*self._error_model(cells, found, look, true))
         return self._in_body(*self._on_grid(true))
 
     def report_noise(
@@ -113,8 +113,8 @@ class Measuring(Component):
         them a place by the edge of the field of view would never be reported beyond it. The last
         value holds the other measured columns of `Detections`.
         """
-        if self._erring is not None:
-            return self._in_body(*self._erring.of_noise(where, signal, drawn))
+        if self._error_model is not None:
+            return self._in_body(*self._error_model.of_noise(where, signal, drawn))
         return self._in_body(*self._on_grid(where))
 
     def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:

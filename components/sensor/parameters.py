@@ -19,7 +19,7 @@ CorrelationTime = Annotated[float, Field(gt=0, le=LONGEST_S)]
 
 @dataclass(frozen=True)
 class StatedError:
-    """What a scene states of the error of one measured quantity; in the scene's unit.
+    """Stated error of one measured quantity, in the scene's unit.
 
     The deviation is of what changes from look to look, for a correlation time (None where it is new
     at every look); the bias stays throughout a run, or is the largest that may.
@@ -108,6 +108,23 @@ class ErrorParameters(ClockedParameters):
         """Return what the scene states of one of the `quantities`."""
         values = (getattr(self, key) for key in self._keys(name, self.quantities[name]))
         return StatedError(*values)
+
+
+class RangeErrorParameters(ErrorParameters):
+    """Grid and errors of a measured range."""
+
+    quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
+
+    range_resolution_m: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
+    )
+    range_error_m: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range, m."
+    )
+    range_bias_m: float = Field(default=0.0, description="Bias of measured range, m; see biases.")
+    range_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_error_m, s."
+    )
 
 
 class GlintParameters(ErrorParameters):

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.association.assignment import gate_threshold, global_nearest
-from components.estimation.batched import product, product_transposed
-from components.estimation.covariance_intersection import distance_squared
+from components.estimation.batched import cholesky, distance_squared, product, product_transposed
 from components.estimation.measurement import Kind, linearised, residual
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
@@ -70,7 +69,9 @@ def gate_share(
         mine, theirs = leader.take(both), other.take(both)
         x, p = mine.at(time_s[both], rules.motion)
         y, q = theirs.at(time_s[both], rules.motion)
-        share[both] = distance_squared(x - y, p + q) / gate_threshold(rules.gate_probability, 6)
+        share[both] = distance_squared(cholesky(p + q), x - y) / gate_threshold(
+            rules.gate_probability, 6
+        )
     two = gate_threshold(rules.gate_probability, 2)
     if one.any():
         swap = other.ranged & one
@@ -82,7 +83,7 @@ def gate_share(
         spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
-        found = distance_squared(angles.residual, spread) / two
+        found = distance_squared(cholesky(spread), angles.residual) / two
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = found
     if none.any():

@@ -35,31 +35,19 @@ _LARGEST_LOG = 200.0
 Associated = tuple[TrackStore, BoolArray, FloatArray]
 
 
-class Association(Protocol):
-    """Decides which detections belong to which tracks."""
-
-    def update(
-        self,
-        rules: TrackerRules,
-        part: TrackStore,
-        kinds: list[GatedPairs],
-        sensors: IntArray,
-        pose: SensorPose,
-    ) -> Associated:
-        """Return predicted tracks after the detections in their gates.
-
-        `sensors` is the mask of the sensors of each detection, `pose` that of each track's look.
-        """
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """All pairs of a track and a detection in its gate, whatever their kind."""
+    """Predicted tracks, and all pairs of one and a detection in its gate, whatever their kind.
+
+    `track`, `detection` and `distance` are (pairs,) over all kinds; `kinds` has them by kind, with
+    what each measures.
+    """
 
     rules: TrackerRules
+    tracks: TrackStore
     kinds: list[GatedPairs]
-    sensors: IntArray
+    sensors: IntArray  # (detections,), mask of the sensors of each
+    pose: SensorPose  # Of each track's look
 
     @cached_property
     def track(self) -> IntArray:
@@ -78,7 +66,7 @@ class Candidates:
 
     @cached_property
     def volume(self) -> FloatArray:
-        """What makes distances of several kinds comparable: false alarms in the volume of |S|."""
+        """Logarithm of false alarms in the volume of |S|, by which kinds are comparable."""
         return np.concatenate(
             [
                 _log_volume(one)
@@ -100,6 +88,14 @@ class Candidates:
         return price[self.track]
 
 
+class Association(Protocol):
+    """Decides which detections belong to which tracks."""
+
+    def update(self, pairs: Candidates) -> Associated:
+        """Return the predicted tracks after the detections in their gates."""
+        ...
+
+
 class OneToOne(Association, Protocol):
     """Gives every track at most one detection, and every detection to at most one track."""
 
@@ -107,19 +103,12 @@ class OneToOne(Association, Protocol):
         """Return the pairs that are taken, ascending; no track and no detection is in two."""
         ...
 
-    def update(
-        self,
-        rules: TrackerRules,
-        part: TrackStore,
-        kinds: list[GatedPairs],
-        sensors: IntArray,
-        pose: SensorPose,
-    ) -> Associated:
+    def update(self, pairs: Candidates) -> Associated:
         """Return tracks, each updated by at most one detection."""
+        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensors
         hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
         if not kinds:
             return part, hit, gain
-        pairs = Candidates(rules, kinds, sensors)
         if bool(alone(pairs.track, pairs.detection).all()):
             taken = np.arange(len(pairs.track))
         else:
@@ -136,7 +125,7 @@ class OneToOne(Association, Protocol):
                 mine = mine[np.argsort(which)]
                 which = one.track[mine]
             estimates = rules.estimator.update(part.estimates(), which, one.measured, mine)
-            correct_angle_only(part, which, one, mine, pose, estimates)
+            correct_angle_only(part, which, one, mine, pairs.pose, estimates)
             mask = sensors[one.detection[mine]]
             gain[which] = log_gain(rules, part, one, sensors)[mine]
             hit[which] = True
@@ -183,20 +172,13 @@ class JointProbabilistic(Association):
     not that one of its detections is its own.
     """
 
-    def update(
-        self,
-        rules: TrackerRules,
-        part: TrackStore,
-        kinds: list[GatedPairs],
-        sensors: IntArray,
-        pose: SensorPose,
-    ) -> Associated:
+    def update(self, pairs: Candidates) -> Associated:
         """Return tracks updated by all detections in their gates."""
+        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensors
         count = len(part)
         if not any(len(one.track) for one in kinds):
             return part, np.zeros(count, dtype=bool), np.zeros(count)
-        track = np.concatenate([one.track for one in kinds])
-        entry = np.concatenate([one.detection for one in kinds])
+        track, entry = pairs.track, pairs.detection
         logs = np.concatenate([log_gain(rules, part, one, sensors) for one in kinds])
         missing = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
         weight = np.exp(np.minimum(logs - missing, _LARGEST_LOG))
@@ -208,7 +190,7 @@ class JointProbabilistic(Association):
         for one in kinds:
             which = np.arange(len(one.track))
             updated = rules.estimator.update(part.estimates(), one.track, one.measured, which)
-            correct_angle_only(part, one.track, one, which, pose, updated)
+            correct_angle_only(part, one.track, one, which, pairs.pose, updated)
             updates.append(updated)
         merged = rules.estimator.merge(
             part.estimates(), missed, track, share, Estimates.joined(updates)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.covariance_intersection import distance_squared
+from components.estimation.batched import cholesky, distance_squared
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import position_of
 from components.messages.columns import ORIGIN, POSE, POSITION, VELOCITY
@@ -59,7 +59,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     row, target = row_of_entry[entry[best]], fused.target[entry[best]]
     errors["position"][row, target] = distance[best]
     spread = full_covariance(tracks.covariance, mine[best], 3)
-    nees = distance_squared(error[:, best], spread) / 3.0
+    nees = distance_squared(cholesky(spread), error[:, best]) / 3.0
     # A covariance is not carried back: of late detections only the position counts.
     errors["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
     return errors

@@ -2,10 +2,10 @@
 
 Two rules confirm: m hits among the last n expected looks, or the sequential likelihood ratio of
 Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): the logarithm of the
-odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every look in
-vain by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the sensor,
-and only of sensors that see it: one that never hit it, or that has looked in vain for a while where
-another one hits, may be too far away, and says nothing.
+odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every
+misdetection by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the
+sensor, and only of sensors that see it: one that never hit it, or that has missed it for a while
+where another one hits, may be too far away, and says nothing.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Odds are kept within this: a track of an hour must not take an hour to be doubted.
 LARGEST_SCORE = 20.0
-#: After so many looks in vain a sensor is taken not to see a track that another one sees.
+#: After so many misdetections a sensor is taken not to see a track that another one sees.
 BLIND_AFTER = 5
 
 
@@ -65,9 +65,12 @@ def judged(
     return np.where(held & (misses >= p.delete_misses), DELETED, new)
 
 
-def seeing(vain: IntArray) -> BoolArray:
-    """Return which sensors see which tracks, (sensors, n), from their looks in vain."""
-    return np.asarray((vain < BLIND_AFTER) | ((vain == vain.min(axis=0)) & (vain < NEVER)))
+def seeing(misdetections: IntArray) -> BoolArray:
+    """Return which sensors see which tracks, (sensors, n), from their misdetections."""
+    return np.asarray(
+        (misdetections < BLIND_AFTER)
+        | ((misdetections == misdetections.min(axis=0)) & (misdetections < NEVER))
+    )
 
 
 def bits_set(values: IntArray) -> IntArray:
@@ -153,7 +156,7 @@ def initiated(
         ranged=ranged,
         nis=0.0 * ones,
         freedom=0 * whole,
-        vain=np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
+        misdetections=np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
         **estimate_columns(
@@ -182,7 +185,7 @@ def expected_looks(
     if used == 0:
         return looked
     mine = sensors[of]
-    sees = seeing(part.vain)
+    sees = seeing(part.misdetections)
     where: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for i, field in enumerate(rules.fields):
         if not used >> i & 1:
@@ -217,7 +220,7 @@ def managed(
     missed = ~hit
     missed &= looked.any(axis=0)
     by = np.where(hit, changed.updated_by, 0)
-    vain = misdetection_counts(part.vain, by, looked)
+    misdetections = misdetection_counts(part.misdetections, by, looked)
     gain[~hit] = 0.0
     gain[missed] = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
     history, count, misses = after_hits_and_misses(
@@ -228,7 +231,7 @@ def managed(
     if rules.lasting is not None:
         changed = changed.with_columns(**now_seen(changed, pose, by))
     changed = changed.with_columns(
-        history=history, looks=count, misses=misses, score=score, vain=vain,
+        history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),
     )  # fmt: skip
     ended = changed.ranged & (position_variance(changed) > rules.p.delete_above_m**2)
@@ -236,12 +239,12 @@ def managed(
     return changed.with_columns(status=np.where(ended, DELETED, status))
 
 
-def misdetection_counts(vain: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
-    """Return each sensor's looks in vain since its last hit, after a look.
+def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
+    """Return each sensor's misdetections since its last hit, after a look.
 
     `by` is the mask of the sensors that updated each track.
     """
-    new = vain.copy()
+    new = misdetections.copy()
     hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
     for i, mine in enumerate(looked):
         new[i] += mine
@@ -268,7 +271,7 @@ def position_variance(part: TrackStore) -> FloatArray:
 
 def now_seen(part: TrackStore, pose: SensorPose, mask: IntArray) -> dict[str, Any]:
     """Return the columns of where tracks were last seen after the sensors of a mask saw them."""
-    mine = (mask >> np.arange(len(part.vain))[:, np.newaxis] & 1).astype(bool)
+    mine = (mask >> np.arange(len(part.misdetections))[:, np.newaxis] & 1).astype(bool)
     here = expected(Kind(True), part.state0, pose)
     return {
         "seen": np.where(mine[np.newaxis], here[:, np.newaxis], part.seen),

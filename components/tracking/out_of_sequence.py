@@ -33,8 +33,8 @@ Key = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Before:
-    """How tracks of a replica were before a look was worked on."""
+class Snapshot:
+    """The tracks of a replica before a look was worked on."""
 
     store: TrackStore  # With this replica's tracks among others
     next_number: int
@@ -68,17 +68,17 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """What is remembered of a run's looks, for later ones that come late."""
+    """The looks of a run that later ones may still come before, with snapshots of its tracks."""
 
     replica: int
     scans: Scans
-    before: dict[int, Before]
+    before: dict[int, Snapshot]
 
     @classmethod
-    def of(cls, scans: Scans, memory: Memory, before: dict[int, Before], replica: int) -> "Past":
+    def of(cls, scans: Scans, memory: Memory, before: dict[int, Snapshot], replica: int) -> "Past":
         """Return the looks in memory, numbered anew in their order."""
         kept = {
-            new: Before(
+            new: Snapshot(
                 before[old].store.take(before[old].store.replica == replica),
                 before[old].next_number,
             )
@@ -90,7 +90,7 @@ class Past:
         """Return the looks in memory, numbered from `first` on."""
         return Memory(keys_of(self.scans), list(range(first, first + len(self.scans))))
 
-    def numbered(self, first: int) -> dict[int, Before]:
+    def numbered(self, first: int) -> dict[int, Snapshot]:
         """Return how tracks were before each of its looks, numbered from `first` on."""
         return {first + look: before for look, before in self.before.items()}
 
@@ -210,7 +210,7 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, l
     return plan, np.flatnonzero(~keep).tolist()
 
 
-def stores_before(before: dict[int, Before], looks: list[int], replicas: list[int]) -> TrackStore:
+def tracks_before(before: dict[int, Snapshot], looks: list[int], replicas: list[int]) -> TrackStore:
     """Return how tracks of some replicas (ascending) were, each before a look of its own."""
     return TrackStore.joined(
         [
@@ -220,7 +220,7 @@ def stores_before(before: dict[int, Before], looks: list[int], replicas: list[in
     ).in_order()
 
 
-def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> TrackStore:
+def restored(store: TrackStore, back: dict[int, Snapshot], replicas: Any) -> TrackStore:
     """Return tracks with those of some replicas as they were."""
     by_store: dict[int, tuple[TrackStore, list[int]]] = {}
     for number in replicas:
@@ -296,7 +296,7 @@ def warning(name: str, share: float, why: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class LookCount:
-    """How many looks of each sensor came, and how many of them too late."""
+    """Counts of each sensor's looks, and of those that came too late."""
 
     came: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor
     left_out: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor

@@ -115,7 +115,7 @@ def state_tracks(
 
 
 class _Columns:
-    """What was reported look by look, as columns in the order of the message."""
+    """Tracks that were reported look by look, as columns in the order of the message."""
 
     def __init__(self, reported: Sequence[Reported], order: IntArray) -> None:
         self._parts = [part.store.columns for part in reported]

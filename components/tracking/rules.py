@@ -1,4 +1,4 @@
-"""What a tracker decides by: the parameters of its block, and what follows from what sensors offer.
+"""Parameters of a tracker, and the rules that follow from them and from what sensors offer.
 
 Part of a measurement's error was in the same sensor's last one already. A value on a grid is off by
 the same as long as it stays in its cell, a bias throughout a run, an error with a correlation time
@@ -28,7 +28,7 @@ _OF_ROW = np.array([0, 1, 2, 3, 4, 4, 4])
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
-    """What of each sensor's errors lasts."""
+    """The part of each sensor's errors that is correlated from look to look."""
 
     step: FloatArray  # (5 quantities, sensors), of the grid; 0 for none
     # (parts, 5 quantities, sensors), as in `LastingPart`; 0 where there is none
@@ -173,7 +173,10 @@ class TrackerParameters(Parameters):
         "sensor states them with a variance; not those that fold, or that are exact.",
     )
     delete_misses: int = Field(
-        default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
+        default=10,
+        ge=1,
+        description="Misdetections (expected looks without a detection) in a row that end a "
+        "confirmed track.",
     )
     delete_after_s: float = Field(
         default=6.0, gt=0, description="Time without a detection after which any track ends, s."
@@ -224,7 +227,7 @@ class TrackerParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class TrackerRules:
-    """What a tracker decides by: its parameters, its filter, and what the sensors offer."""
+    """Rules of a tracker: its parameters, its filter, and what the sensors offer."""
 
     p: Any  # TrackerParameters, or those of a subclass
     estimator: Estimator

@@ -1,4 +1,4 @@
-"""What a tracker works on: looks in the order in which they came, and what each detected."""
+"""Looks of sensors in the order in which they came, with their detections."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

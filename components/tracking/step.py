@@ -13,7 +13,7 @@ from components.estimation.out_of_sequence import (
     retrodiction_by_motion,
 )
 from components.messages.state_tracks import DELETED
-from components.tracking.association import Association
+from components.tracking.association import Association, Candidates
 from components.tracking.gating import gated_pairs
 from components.tracking.management import expected_looks, initiated, managed, position_variance
 from components.tracking.rules import TrackerRules
@@ -78,7 +78,8 @@ def associated(
     pose = batch.pose(of)
     kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
     looked = expected_looks(rules, part, of, batch, pose, direction)
-    changed, hit, gain = association.update(rules, part, kinds, batch.contributors, pose)
+    pairs = Candidates(rules, part, kinds, batch.contributors, pose)
+    changed, hit, gain = association.update(pairs)
     return managed(rules, part, changed, pose, looked, hit, gain), held
 
 
@@ -98,9 +99,9 @@ def late_step(
     as in `before`, are taken back to it by what they were then, those that are newer by what they
     are now; others are carried on to it as ever.
 
-    With `unless_updated` tracks stay as they are that something later has updated (a later look in
-    vain does not count: it told nothing of where they are), and looks are left out that have a
-    detection that such a track would have had.
+    With `unless_updated` tracks stay as they are that something later has updated (a later
+    misdetection does not count: it said nothing of where they are), and looks are left out that
+    have a detection that such a track would have had.
     """
     replica, tick = batch.replica, batch.tick
     of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)

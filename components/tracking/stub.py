@@ -55,7 +55,7 @@ class TrackerStub(Component):
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: where navigation errs, with the pose believed then."""
-        return [TracksWithPose if navigation_errs(self.context) else Tracks]
+        return [TracksWithPose] if navigation_errs(self.context) else [*super().records()]
 
     def setup(self) -> None:
         """Start with no tracks."""

@@ -10,19 +10,19 @@ from components.estimation.estimator import Estimates
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
-#: Looks in vain of a sensor that never hit a track.
+#: Misdetections of a sensor that never hit a track.
 NEVER = 1 << 40
 
 
 class TrackStore(KeyedTable):
     """Columns over tracks, the tracks on their last axis.
 
-    States are ``state0``, ``state1``, … (d, n), one for each
-    motion model, covariances ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely
-    each model is. ``vain`` (sensors, n) counts each sensor's looks in vain since its last hit, from
-    `NEVER` where it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth,
-    elevation and range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that
-    was; NaN and -1 where none did.
+    States are ``state0``, ``state1``, … (d, n), one for each motion model, covariances
+    ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely each model is.
+    ``misdetections`` (sensors, n) are those of each sensor since its last hit, from `NEVER` where
+    it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth, elevation and
+    range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that was; NaN and
+    -1 where none did.
     """
 
     #: Columns beside states, with their types.
@@ -34,7 +34,7 @@ class TrackStore(KeyedTable):
         "updated_tick": np.int64,
         "history": np.int64,  # a bit for each expected look, 1 for a hit; the last look lowest
         "looks": np.int64,
-        "misses": np.int64,  # expected looks in vain since the last hit
+        "misses": np.int64,  # misdetections since the last hit
         "status": np.int64,
         "score": np.float64,  # logarithm of the odds that there is something
         "contributors": np.int64,
@@ -49,9 +49,14 @@ class TrackStore(KeyedTable):
     @classmethod
     def of_models(cls, sizes: Sequence[int], sensors: int) -> Self:
         """Return a store without tracks for models with states of these sizes."""
-        types: dict[str, type] = {**cls.PLAIN, "weights": float, "vain": np.int64, "seen": float}
+        types: dict[str, type] = {
+            **cls.PLAIN,
+            "weights": float,
+            "misdetections": np.int64,
+            "seen": float,
+        }
         types["seen_tick"] = np.int64
-        shapes: dict[str, tuple[int, ...]] = {"weights": (len(sizes),), "vain": (sensors,)}
+        shapes: dict[str, tuple[int, ...]] = {"weights": (len(sizes),), "misdetections": (sensors,)}
         shapes |= {"seen": (3, sensors), "seen_tick": (sensors,)}
         for i, size in enumerate(sizes):
             types |= {f"state{i}": float, f"covariance{i}": float}

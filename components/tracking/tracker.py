@@ -16,19 +16,19 @@ from components.sensor.marks import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.ladder import LADDERS
 from components.tracking.out_of_sequence import (
-    Before,
     LookCount,
     Memory,
     Past,
     Plan,
-    gone_back,
+    Snapshot,
     latest_s,
     left_out,
     may_come_late,
     one_step_plan,
     rerun_plan,
-    stores_before,
+    restored,
     straight_plan,
+    tracks_before,
     warning,
 )
 from components.tracking.report import Reported, state_tracks
@@ -177,7 +177,7 @@ class Tracker(Component):
         records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         begin = 0
-        before: dict[int, Before] = {}
+        before: dict[int, Snapshot] = {}
         memory: dict[int, Memory] = {}
         remembered = [
             (number, past)
@@ -207,14 +207,14 @@ class Tracker(Component):
             if len(late):
                 of_late = plan.of[late]
                 replicas = records.replica[of_late]
-                old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
+                old = tracks_before(before, plan.since[late].tolist(), replicas.tolist())
                 store, records.next_number[of_late], gone = late_step(
                     self.rules, self._association, store, old,
                     LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
-                in_vain = scans.sensors[plan.look[late[gone]]]
-                self._count = self._count.of(fused.sensors, in_vain[:0], in_vain)
+                late_sensors = scans.sensors[plan.look[late[gone]]]
+                self._count = self._count.of(fused.sensors, late_sensors[:0], late_sensors)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)
@@ -254,7 +254,7 @@ class Tracker(Component):
         records: KeyedTable,
         plan: Plan,
         works: IntArray,
-        before: dict[int, Before],
+        before: dict[int, Snapshot],
     ) -> TrackStore:
         """Go back where late looks ask for it, and note how things are before each look."""
         back = plan.back_to[works]
@@ -265,11 +265,11 @@ class Tracker(Component):
                 number: before[look]
                 for number, look in zip(replicas, back[late].tolist(), strict=True)
             }
-            store = gone_back(store, states, replicas)
+            store = restored(store, states, replicas)
             records.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
         for work in works.tolist():
             number = int(records.next_number[plan.of[work]])
-            before[int(plan.look[work])] = Before(store, number)
+            before[int(plan.look[work])] = Snapshot(store, number)
             for look in plan.forgotten[work]:
                 before.pop(look, None)
         return store

@@ -11,11 +11,11 @@ _Array = TypeVar("_Array", IntArray, FloatArray)
 
 
 def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
-    """Return every value once, ascending, and the place of each array's values among them.
+    """Return every value once, ascending, and the position of each array's values among them.
 
     A stable sort merges runs that are already in order; `numpy.unique` hashes integers, which
-    was measured to take ten times as long here. To search for the places afterwards was measured to
-    take six times as long as the sort.
+    was measured to take ten times as long here. A search for the positions afterwards was measured
+    to take six times as long as the sort.
 
     Parameters
     ----------
@@ -30,11 +30,11 @@ def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
     new = np.empty(len(values), dtype=bool)
     new[0] = True
     np.not_equal(values[1:], values[:-1], out=new[1:])
-    place = np.empty_like(order)
+    position = np.empty_like(order)
     if new.all():
-        place[order] = np.arange(len(values))
+        position[order] = np.arange(len(values))
     else:
-        place[order] = new.cumsum() - 1
+        position[order] = new.cumsum() - 1
         values = values[new]
     ends = np.cumsum([len(array) for array in arrays]).tolist()
-    return values, [place[end - len(a) : end] for a, end in zip(arrays, ends, strict=True)]
+    return values, [position[end - len(a) : end] for a, end in zip(arrays, ends, strict=True)]

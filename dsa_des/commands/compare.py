@@ -29,7 +29,7 @@ from dsa_des.results.curves import draw_scatter
 from dsa_des.results.figures import safe_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
 from dsa_des.results.labels import short
-from dsa_des.results.printing import rounded, times
+from dsa_des.results.printing import rounded
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.rows import paired_units
 from dsa_des.results.statistics import changes_of, difference
@@ -260,7 +260,7 @@ def _compare(
     own, known = ({result.name for result in side.results} for side in (one, other))
     metrics = [name for name in _shown(one, only) if name in kinds]
     headings = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
-             "unpaired interval", "narrower"]  # fmt: skip
+             "unpaired interval"]  # fmt: skip
     lines: list[list[str]] = []
     theirs = dict(other.rows.each_place())
     places: list[tuple[str, Pair]] = []
@@ -284,7 +284,7 @@ def _compare(
             d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             lines.append(
                 [*map(short, at), metric, *rounded(d.paired), str(d.paired.count),
-                 rounded(d.unpaired)[1].rstrip(" *"), times(d.narrower)]
+                 rounded(d.unpaired)[1].rstrip(" *")]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
     shown = [r for r in one.results if r.name in known and (not only or r.name in only)]

@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from dsa_des.costs.climb import Comparison, RungCost, shown
@@ -122,7 +123,8 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
     with drawing(4.3 * columns, 3.5 * rows + 0.5, path) as figure:
-        figure.suptitle(f"{figure_text(title, 80)}: what each model costs and what it gets wrong")
+        heading = f"{figure_text(title, 80)}: what each model costs and what it gets wrong"
+        figure.suptitle("\n".join(wrap(heading, _LETTERS * columns)))
         drawn = []
         for number, rungs in enumerate(panels):
             axes = figure.add_subplot(rows, columns, number + 1)
@@ -131,6 +133,9 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
         for axes, labels in drawn:  # where points are is known only now
             _put_labels(axes, labels)
 
+
+#: So many letters of the figure's title stand above one panel.
+_LETTERS = 46
 
 #: What is written, at which point, how far its error bar reaches, in which colour.
 _Label = tuple[str, tuple[float, float], float, str]

@@ -245,9 +245,9 @@ class HostDriven:
         scans: dict[str, int] = {}
         missed: dict[str, int] = {}
         for name, cursor in self._cursors.items():
-            found = cursor.due(tick)
-            if found is not None:
-                scans[name], late = found
+            due = cursor.due(tick)
+            if due is not None:
+                scans[name], late = due
                 if late:
                     missed[name] = late
         return Step(tick, scans, missed)
@@ -324,23 +324,23 @@ def _rows_of(
 
 def _refusals(scene: Scene, source: str) -> list[Problem]:
     """Say what of a scene needs an event queue."""
-    found: list[tuple[str, str]] = []
+    refusals: list[tuple[str, str]] = []
     looped = in_cycles(scene.graph)
     if looped:
-        found.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
+        refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
     for wire in scene.wires:
         if wire.delayed or wire.jitter_s or wire.drop_probability:
-            found.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
+            refusals.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
     for name, block in scene.blocks.items():
         if block.options.processor is not None:
             message = f"its messages queue for processor {block.options.processor!r}"
-            found.append((f"blocks.{name}", message))
+            refusals.append((f"blocks.{name}", message))
         if block.cls.process is not None:
-            found.append((f"blocks.{name}", "it has a process of its own"))
+            refusals.append((f"blocks.{name}", "it has a process of its own"))
         if ends_its_run(block.cls):
-            found.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
+            refusals.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
         fed = any(port.required for port in block.cls.inputs.values())
         if not fed and name != source:
-            found.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
+            refusals.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
     why = "; a host drives an open-loop scene only: every message at the instant of the call"
-    return [Problem(str(scene.path), key, message + why) for key, message in found]
+    return [Problem(str(scene.path), key, message + why) for key, message in refusals]

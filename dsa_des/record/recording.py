@@ -22,7 +22,7 @@ from dsa_des.block.recorded_columns import (
 )
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
-from dsa_des.time.runs import RunEnds
+from dsa_des.time.runs import Runs
 
 # Declared names that an error lists.
 _MOST_NAMES = 30
@@ -130,7 +130,7 @@ class Recorder:
         self._texts: dict[tuple[str, str], _TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
-        self._ends: RunEnds | None = None
+        self._ends: Runs | None = None
         #: Rows and pieces noted since some were handed on; more where a window was undone.
         self._noted = [0, 0]
 
@@ -143,7 +143,7 @@ class Recorder:
         self,
         messages: Iterable[type[Message]],
         ticks_per_s: int,
-        ends: RunEnds | None = None,
+        ends: Runs | None = None,
         *,
         replicas: bool = False,
     ) -> None:
@@ -253,7 +253,7 @@ class Recorder:
         instants = RunTicks.joined([_instants(columns) for _, columns in pieces])
         order = instants.order()
         if self._ends is not None and self._ends.early:
-            kept = self._ends.before(instants)
+            kept = self._ends.before_ends(instants)
             order = np.flatnonzero(kept) if order is None else order[kept[order]]
         if order is not None:
             instants = instants.take(order)

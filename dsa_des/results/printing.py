@@ -173,7 +173,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
     axis, baseline = tables.baseline
     others = [name for name in tables.rows.axes if name != axis]
     headings = [axis, *others, "result", "difference", "paired interval", "pairs",
-             "only one has it", "unpaired interval", "narrower"]  # fmt: skip
+             "only one has it", "unpaired interval"]  # fmt: skip
     rows = []
     shown = [item for item in tables.compared if item.result.name in names]
     for item in shown[:_MOST_SHOWN]:
@@ -181,7 +181,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         rows.append(
             [short(item.value), *map(short, item.at), item.result.name, *rounded(d.paired),
-             str(d.paired.count), only, rounded(d.unpaired)[1].rstrip(" *"), times(d.narrower)]
+             str(d.paired.count), only, rounded(d.unpaired)[1].rstrip(" *")]
         )  # fmt: skip
     title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
     print_table(console, title, headings, rows, group=1 + len(others))
@@ -234,10 +234,3 @@ def rounded(estimate: Estimate) -> tuple[str, str]:
 
 #: What is smaller is the rounding of equal numbers: nothing that is measured is so small.
 _NOTHING = 1e-12
-#: Intervals that shrink more than this rest on the rounding of equal numbers.
-_ROUNDING = 1e9
-
-
-def times(ratio: float) -> str:
-    """Return how many times narrower for a table; empty where nothing but rounding differs."""
-    return f"{ratio:.1f} times" if ratio < _ROUNDING else ""

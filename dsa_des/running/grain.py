@@ -13,7 +13,7 @@ from dsa_des.running.node import Node
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime
+from dsa_des.time.runs import Runs
 
 #: From which block to which.
 Edge = tuple[str, str]
@@ -127,15 +127,15 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
 
 def _without_windows(scene: Scene) -> dict[str, str]:
     """Return the blocks of a scene that no window of a loop can hold, and why each."""
-    found = {}
+    reasons = {}
     for name, block in sorted(scene.blocks.items()):
         if block.cls.process is not None:
-            found[name] = "has a process of its own"
+            reasons[name] = "has a process of its own"
         elif not block.cls.windowed:
-            found[name] = "runs scan by scan (windowed is False)"
+            reasons[name] = "runs scan by scan (windowed is False)"
         elif block.options.processor:
-            found[name] = "shares a processor"
-    return found
+            reasons[name] = "shares a processor"
+    return reasons
 
 
 def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
@@ -235,9 +235,9 @@ def _takes_windows(cls: type[Component]) -> bool:
 CELLS_PER_WINDOW = 131072
 
 
-def scans_of(nodes: Mapping[str, Node], time: ReplicaTime) -> float:
+def scans_of(nodes: Mapping[str, Node], runs: Runs) -> float:
     """Return how many scans of all clocks together each run has, about."""
-    return float(sum(time.run_ticks / clock.period for clock in _clocks(nodes.values())))
+    return float(sum(runs.run_ticks / clock.period for clock in _clocks(nodes.values())))
 
 
 def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
@@ -250,13 +250,13 @@ def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
         raise SceneError([scene.problem("duration_s", message)])
 
 
-def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | None) -> int:
+def longest_window(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
     """Return the ticks of a window that holds about the wanted number of scans.
 
     Parameters
     ----------
     nodes : mapping
-    time : ReplicaTime
+    runs : Runs
     window : int, optional
         Scans of all clocks together; by default, and where blocks run scan by scan anyway, as
         many as make a window of `CELLS_PER_WINDOW`.
@@ -264,7 +264,7 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
     per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
-    return max(1, int(scans / per_tick)) if per_tick else time.run_ticks
+    return max(1, int(scans / per_tick)) if per_tick else runs.run_ticks
 
 
 def _clocks(nodes: Iterable[Node]) -> list[RunClock]:

@@ -17,7 +17,7 @@ from dsa_des.arrays.run_ticks import (
     RunTicks,
     last_of_run,
     no_runs,
-    place_among,
+    positions_among,
     says_no_runs,
     union,
 )
@@ -30,10 +30,8 @@ from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
-from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.running.windows import Window
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime
 
 
 @dataclass
@@ -43,16 +41,14 @@ class Demand:
     block: str
     clock: RunClock
     lead_ticks: int
-    time: ReplicaTime
 
     def between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which this block needs a row."""
-        if not self.lead_ticks:
-            return self.clock.between(start, end)[1]
-        # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.time.run_ticks)
-        _, instants = self.clock.between(start + self.lead_ticks, last)
-        return instants.later(-self.lead_ticks)
+        """Return the instants in [start, end) at which this block needs a row.
+
+        None of these rows would arrive after the end of the run, where the clock has no scan.
+        """
+        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
+        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
 
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
@@ -85,7 +81,7 @@ class Node:
     clock: RunClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
-    processor: Processor | WindowedQueue | None = None
+    processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
@@ -193,8 +189,8 @@ class Node:
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
-        ends = self.simulation.ends
-        if ends.early and ends.passed(tick):
+        runs = self.simulation.runs
+        if runs.early and runs.over(tick):
             return
         if self.processor is not None and self.processor.refuses(self.name):
             return
@@ -219,17 +215,17 @@ class Node:
             if len(own) and self.clock is not None:
                 scans = scans.copy()
                 scans[last_of_run(instants, own)] = numbers
-        ends = self.simulation.ends
-        if ends.early:
-            kept = ends.before(instants)
-            instants, scans, end = instants.take(kept), scans[kept], ends.cut(end)
+        runs = self.simulation.runs
+        if runs.early:
+            kept = runs.before_ends(instants)
+            instants, scans, end = instants.take(kept), scans[kept], runs.cut(end)
         if len(instants):
             self._run(instants, scans, end)
 
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
-        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
+        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.runs)
 
     def _run(self, instants: RunTicks, scans: IntArray, end: int) -> None:
         before = None if self.clock is None else self.clock.before
@@ -237,8 +233,6 @@ class Node:
         if wake is None:
             return
         ticks = wake.ticks
-        if self.simulation.trace is not None:
-            self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
             self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):
@@ -258,8 +252,8 @@ class Node:
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)
-            place, here = place_among(instants, asked)
-            rows[demand.block] = place if here is None else place[here]
+            rows_asked, there = positions_among(instants, asked)
+            rows[demand.block] = rows_asked if there is None else rows_asked[there]
         return rows
 
     def receive(self) -> Wake:
@@ -299,7 +293,7 @@ class Node:
             message.check()
             message = _of_their_runs(port, message, ran)
             if isinstance(message, RunEnd):
-                self.simulation.ends.note(message.instants, self.name)
+                self.simulation.runs.note_ends(message.instants, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
             if leaves is not None and leaves > ran.tick[0]:
@@ -368,8 +362,8 @@ def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
                     f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
                     "runs: the message must say of which run each is (`run = wake.run[rows]`)"
                 )
-        place, there = place_among(ran, message.instants)
-        if there is None and bool((place[1:] >= place[:-1]).all()):
+        position, there = positions_among(ran, message.instants)
+        if there is None and bool((position[1:] >= position[:-1]).all()):
             return message
     raise ValueError(
         f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "

@@ -13,13 +13,11 @@ from dsa_des.running.grain import Edge, Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.scene.graph import depths, queue_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import ReplicaTime
 
 
 def build_nodes(
@@ -27,7 +25,7 @@ def build_nodes(
     timeline: Timeline,
     components: Mapping[str, Component],
     grain: Grain,
-    processors: Mapping[str, Processor | WindowedQueue],
+    processors: Mapping[str, Processor],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
     """Return the running blocks, which no wire connects yet.
@@ -36,7 +34,7 @@ def build_nodes(
     ----------
     run : RunState
     timeline : Timeline
-        Has been laid.
+        Knows how long runs are.
     components : mapping
     grain : Grain
     processors : mapping
@@ -64,14 +62,10 @@ def build_nodes(
     return nodes
 
 
-def start_processors(
-    scene: Scene,
-    grain: Grain,
-    end_tick: int,
-    env: simpy.Environment,
-    record: Callable[[str, Message], None],
-) -> dict[str, Processor | WindowedQueue]:
-    """Start the shared processors of a scene: message by message, or a window at once.
+def build_processors(
+    scene: Scene, grain: Grain, env: simpy.Environment, record: Callable[[str, Message], None]
+) -> dict[str, Processor]:
+    """Return the shared processors of a scene.
 
     Raises
     ------
@@ -81,26 +75,14 @@ def start_processors(
     streams = Streams(scene.seed)
     order = grain.order(scene)
     ticks_per_s = scene.ticks_per_s
-    processors: dict[str, Processor | WindowedQueue] = {}
+    processors: dict[str, Processor] = {}
     for name, p in scene.processors.items():
         try:
             service = Service(name, p, ticks_per_s, streams.stream(name, "service time"))
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
-        if name in grain.queues:
-            processors[name] = WindowedQueue(
-                name,
-                service,
-                p.when_busy == "drop_oldest",
-                env,
-                ticks_per_s,
-                end_tick,
-                record,
-                WINDOW_PRIORITY + order[queue_key(name)],
-            )
-        else:
-            processors[name] = Processor(name, p, service, env, ticks_per_s, record)
-        processors[name].start()
+        at_once = WINDOW_PRIORITY + order[queue_key(name)] if name in grain.queues else None
+        processors[name] = Processor(name, p, service, env, ticks_per_s, record, at_once)
     return processors
 
 
@@ -119,7 +101,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
     nodes : mapping
         Running blocks by name.
     timeline : Timeline
-        Makes the channels; has been laid.
+        Makes the channels; knows how long runs are.
 
     Raises
     ------
@@ -139,15 +121,15 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
             (channel, target, wire.input)
         )
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name, timeline.time)
+        node.demands = find_demands(nodes, name)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
             raise SceneError([scene.problem(f"blocks.{name}", message)])
 
 
-def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> list[Demand]:
+def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
     """Return the first clocked blocks on every way downstream, and the delay on the way."""
-    found: dict[tuple[str, int], Demand] = {}
+    demands: dict[tuple[str, int], Demand] = {}
     seen = {(name, 0)}
     todo = [(name, 0)]
     while todo:
@@ -157,11 +139,11 @@ def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> lis
         ):
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
-                found[reached] = Demand(node.name, node.clock, reached[1], time)
+                demands[reached] = Demand(node.name, node.clock, reached[1])
             elif reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)
-    return [found[key] for key in sorted(found)]
+    return [demands[key] for key in sorted(demands)]
 
 
 def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:

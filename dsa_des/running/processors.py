@@ -4,11 +4,17 @@ A block whose table says ``processor = "gpu"`` looks at the world at its own ins
 its messages leave only when the processor has worked on them. The processor serves one message at
 a time; blocks that scan at the same instant line up in the order of their names. What became of
 every message is recorded in the table ``processing``.
+
+Where no block on a processor waits for another one on it, when each message enters is known before
+any of them is served: the line of a whole window is then worked through in one go, in closed form
+if all wait their turn. Elsewhere it is worked through at the instants at which something enters or
+is done. Both give the same.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,15 +22,16 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, static
-from dsa_des.running.events import Bell, WakeUp
+from dsa_des.running.events import WakeUp
 from dsa_des.scene.block_table import ProcessorParameters
-from dsa_des.scene.queue_policy import find_policy
+from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream, key_of
 
-# Messages are finished before, and taken in after, every block of an instant.
-FINISH_PRIORITY = 0.5
+# Messages are done before, and enter after, every block of an instant.
+DONE_PRIORITY = 0.5
 ENTRY_PRIORITY = 1e9
+_NEVER = np.iinfo(np.int64).max
 
 DONE, DROPPED, SKIPPED = range(3)
 _OUTCOMES = ("done", "dropped", "skipped")
@@ -81,27 +88,6 @@ class Processing(Message):
         return {"processing": columns}
 
 
-def noted(
-    tick: IntArray,
-    entered: IntArray,
-    started: IntArray,
-    queue_length: IntArray,
-    outcome: int,
-    processor: str,
-    ticks_per_s: int,
-) -> Processing:
-    """Return the rows for messages with the same outcome."""
-    return Processing(
-        tick,
-        entered,
-        started,
-        queue_length,
-        np.full(len(tick), outcome, dtype=np.int64),
-        processor=processor,
-        ticks_per_s=ticks_per_s,
-    )
-
-
 class Service:
     """How long a processor works on each message.
 
@@ -140,19 +126,53 @@ class Service:
 
 
 @dataclass(eq=False)
+class _Entry:
+    """What one block sent over one output at a time: a job for each instant."""
+
+    block: str
+    message: Message
+    deliver: Deliver
+    #: First row of each job, and one past the last row.
+    bounds: IntArray
+    #: Tick at which each job will be done; `_NEVER` while it waits, if it goes, once it was sent.
+    done: IntArray
+
+    @classmethod
+    def of(cls, block: str, message: Message, deliver: Deliver) -> "_Entry":
+        first = np.flatnonzero(np.append(True, message.tick[1:] != message.tick[:-1]))
+        done = np.full(len(first), _NEVER, dtype=np.int64)
+        return cls(block, message, deliver, np.append(first, len(message)), done)
+
+    def send(self) -> None:
+        """Deliver the jobs whose end is known, once."""
+        if len(known := np.flatnonzero(self.done < _NEVER)) == 0:
+            return
+        done = np.repeat(self.done, np.diff(self.bounds))
+        rows = np.flatnonzero(done < _NEVER)
+        message = self.message if len(rows) == len(done) else self.message.take(rows)
+        self.done[known] = _NEVER
+        self.deliver(message, done[rows])
+
+
+@dataclass(eq=False)
 class _Job:
+    """The rows of one instant: when they entered, how long they take, and whose they are."""
+
     block: str
     entered: int
-    message: Message | None = None
-    deliver: Deliver | None = None
+    service: int = 0
+    entry: _Entry | None = None
+    number: int = 0
+    started: int = -1
 
 
 class Processor:
-    """One processor, as a SimPy process that serves a line of messages.
+    """One processor and the line of those that wait for it.
 
     Invariants: it works on at most one message at a time; messages of one instant enter in the
-    order of their blocks' names; whatever finishes at an instant is delivered before any block of
-    that instant runs.
+    order of their blocks' names; whatever is done at an instant has left before any block of that
+    instant runs. In a window it comes after all of its blocks and before every block that hears of
+    them.
 
     Parameters
     ----------
@@ -163,6 +183,8 @@ class Processor:
     ticks_per_s : int
     record : callable
         Takes the block's name and a `Processing` message.
+    window_priority : float, optional
+        Its place among the blocks at the start of a window, where it serves whole windows.
     """
 
     def __init__(
@@ -173,46 +195,72 @@ class Processor:
         env: simpy.Environment,
         ticks_per_s: int,
         record: Callable[[str, Message], None],
+        window_priority: float | None = None,
     ) -> None:
         self.name = name
         self._policy = find_policy(parameters.when_busy)()
+        self._service = service
         self._env = env
         self._ticks_per_s = ticks_per_s
-        self._service = service
         self._record = record
-        self._entering: list[_Job] = []
+        self._window_priority = window_priority
+        self._window: tuple[int, int] | None = None
+        self._entries: list[_Entry] = []
         self._line: deque[_Job] = deque()
-        self._busy = False
-        self._bell = Bell(env)
-
-    def start(self) -> None:
-        """Start the processor's SimPy process."""
-        self._env.process(self._serve())
+        self._working: _Job | None = None
+        self._free_from = 0
+        #: What became of jobs, and entries of which something leaves, since `_hand_on`.
+        self._notes: list[tuple[_Job, int, int, int]] = []
+        self._leaving: dict[_Entry, None] = {}
+        #: In closed form, jobs that are done after the last window: entered, started, done, block.
+        self._under_way = (*[np.empty(0, dtype=np.int64)] * 3, np.empty(0, dtype=object))
 
     def refuses(self, block: str) -> bool:
         """Whether a scan at this instant is to be left out because the processor is busy."""
-        if not self._policy.skips(self._busy):
+        if not self._policy.skips(self._working is not None):
             return False
         now = int(self._env.now)
         self._note(_Job(block, now), now, SKIPPED)
+        self._hand_on()
         return True
 
     def open_window(self, start: int, end: int) -> None:
-        """Do nothing: it works message by message."""
+        """Let the messages of [start, end) be served once all blocks have sent theirs."""
+        if self._window_priority is None or self._window == (start, end):
+            return  # each of its blocks says so
+        self._window = start, end
+        wake_up = WakeUp(self._env, start - int(self._env.now), self._window_priority)
+        wake_up.callbacks.append(lambda event: self._serve_window(end))
 
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
-        """Hand in what `block` made at this instant; `deliver` is called when it is worked on."""
-        now = int(self._env.now)
-        if not self._entering:
-            entry = WakeUp(self._env, 0, ENTRY_PRIORITY)
-            entry.callbacks.append(self._enter)
-        self._entering.append(_Job(block, now, message, deliver))
+        """Take what a block sent over one output; `deliver` is told when work on it ends."""
+        if self._window_priority is None and not self._entries:
+            WakeUp(self._env, 0, ENTRY_PRIORITY).callbacks.append(self._serve_instant)
+        self._entries.append(_Entry.of(block, message, deliver))
 
-    def _enter(self, event: simpy.Event) -> None:
-        entering, self._entering = sorted(self._entering, key=lambda job: job.block), []
-        now = int(self._env.now)
-        for job in entering:
-            if self._policy.skips(self._busy or bool(self._line)):
+    def _entered(self) -> list[_Entry]:
+        entries, self._entries = self._entries, []
+        return sorted(entries, key=lambda entry: entry.block)
+
+    # -- at an instant -------------------------------------------------------------------------
+
+    def _serve_instant(self, event: simpy.Event) -> None:
+        entries, now = self._entered(), int(self._env.now)
+        ticks = np.full(len(entries), now, dtype=np.int64)
+        services = self._service.ticks([entry.block for entry in entries], ticks).tolist()
+        jobs = zip(entries, services, strict=True)
+        self._enter(now, [_Job(entry.block, now, service, entry) for entry, service in jobs])
+        self._hand_on()
+
+    def _is_done(self, event: simpy.Event) -> None:
+        self._finish(int(self._env.now))
+        self._hand_on()
+
+    # -- the line ------------------------------------------------------------------------------
+
+    def _enter(self, now: int, jobs: Iterable[_Job]) -> None:
+        for job in jobs:
+            if self._policy.skips(self._working is not None or bool(self._line)):
                 self._note(job, now, SKIPPED)  # another block of this instant was first
                 continue
             gone: Any = self._policy.dropped(tuple(self._line), job)
@@ -222,27 +270,96 @@ class Processor:
                 self._note(left, now, DROPPED)
             if job not in gone:
                 self._line.append(job)
-        if self._line and not self._busy and self._bell.callbacks:
-            self._bell.ring()
+        if self._working is None:
+            self._begin(now)
 
-    def _serve(self) -> Generator[simpy.Event, None, None]:
-        while True:
-            if not self._line:
-                self._bell = Bell(self._env)
-                yield self._bell
-            job = self._line.popleft()
-            self._busy = True
-            started = int(self._env.now)
-            service = self._service.ticks([job.block], np.array([job.entered], dtype=np.int64))
-            yield WakeUp(self._env, int(service[0]), FINISH_PRIORITY)
-            self._busy = False
-            now = int(self._env.now)
-            self._note(job, now, DONE, started)
-            assert job.deliver is not None and job.message is not None
-            job.deliver(job.message, now)
+    def _begin(self, now: int) -> None:
+        if not self._line:
+            return
+        self._working = job = self._line.popleft()
+        job.started, self._free_from = now, now + job.service
+        assert job.entry is not None
+        job.entry.done[job.number] = self._free_from
+        self._leaving[job.entry] = None
+        if self._window_priority is None:
+            WakeUp(self._env, job.service, DONE_PRIORITY).callbacks.append(self._is_done)
 
-    def _note(self, job: _Job, tick: int, outcome: int, started: int = -1) -> None:
-        values = (tick, job.entered, started, len(self._line))
-        row = [np.array([value], dtype=np.int64) for value in values]
-        message = noted(row[0], row[1], row[2], row[3], outcome, self.name, self._ticks_per_s)
-        self._record(job.block, message)
+    def _finish(self, until: int) -> None:
+        while self._working is not None and self._free_from <= until:
+            job, now, self._working = self._working, self._free_from, None
+            self._note(job, now, DONE)
+            self._begin(now)
+
+    def _note(self, job: _Job, tick: int, outcome: int) -> None:
+        self._notes.append((job, tick, len(self._line), outcome))
+
+    def _hand_on(self) -> None:
+        """Record what became of jobs, and send those whose end is known."""
+        if notes := self._notes:
+            self._notes = []
+            columns = [(t, j.entered, j.started, behind, what) for j, t, behind, what in notes]
+            self._record_all([job.block for job, *_ in notes], *np.array(columns).T)
+        leaving, self._leaving = self._leaving, {}
+        for entry in leaving:
+            entry.send()
+
+    def _record_all(self, blocks: Iterable[str], *columns: IntArray) -> None:
+        of = np.array(blocks, dtype=object)
+        for block in sorted(set(of.tolist())):
+            tick, entered, started, behind, outcome = (c[of == block] for c in columns)
+            rows = Processing(
+                tick, entered, started, behind, outcome,
+                processor=self.name, ticks_per_s=self._ticks_per_s,
+            )  # fmt: skip
+            self._record(block, rows)
+
+    # -- in a window ---------------------------------------------------------------------------
+
+    def _serve_window(self, end: int) -> None:
+        entries = self._entered()
+        ticks = [entry.message.tick[entry.bounds[:-1]] for entry in entries]
+        tick = np.concatenate([*ticks, np.empty(0, dtype=np.int64)])
+        order = np.argsort(tick, kind="stable")  # blocks of one instant enter by name
+        tick = tick[order]
+        of = np.repeat(np.arange(len(entries)), [len(part) for part in ticks])[order]
+        number = np.concatenate([*map(np.arange, map(len, ticks)), np.empty(0, dtype=np.int64)])
+        number = number[order].astype(np.int64)
+        blocks = np.array([*(entry.block for entry in entries), ""], dtype=object)[of]
+        service = self._service.ticks(blocks, tick)
+        if type(self._policy) is QueuePolicy:
+            done = self._all_in_turn(tick, service, blocks, end)
+            for n, entry in enumerate(entries):
+                entry.done[number[of == n]] = done[of == n]
+                entry.send()
+            return
+        rows = (blocks, tick, service, [entries[n] for n in of.tolist()], number)
+        jobs = [_Job(*row) for row in zip(*(_plain(values) for values in rows), strict=True)]
+        for now, group in groupby(jobs, key=lambda job: job.entered):
+            self._finish(now)
+            self._enter(now, group)
+        self._finish(end - 1)
+        self._hand_on()
+
+    def _all_in_turn(
+        self, tick: IntArray, service: IntArray, blocks: np.ndarray, end: int
+    ) -> IntArray:
+        """Return when each job is done: it starts when it has entered and that before is done."""
+        worked = np.cumsum(service)
+        idle = np.maximum(tick, self._free_from) - (worked - service)
+        ends: IntArray = np.maximum.accumulate(idle) + worked
+        if len(ends):
+            self._free_from = int(ends[-1])
+        new = (tick, ends - service, ends, blocks)
+        under_way = [np.concatenate(parts) for parts in zip(self._under_way, new, strict=True)]
+        entered, started, done, blocks = under_way
+        now = int(np.searchsorted(done, end))
+        # Who entered before this instant and comes later waits behind it.
+        behind = np.searchsorted(entered, done[:now]) - np.arange(1, now + 1)
+        outcome = np.full(now, DONE, dtype=np.int64)
+        self._record_all(blocks[:now], done[:now], entered[:now], started[:now], behind, outcome)
+        self._under_way = (entered[now:], started[now:], done[now:], blocks[now:])
+        return ends
+
+
+def _plain(values: Any) -> list[Any]:
+    return values.tolist() if isinstance(values, np.ndarray) else values

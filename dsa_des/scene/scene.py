@@ -33,6 +33,7 @@ from dsa_des.scene.graph import (
     windowed_queues,
 )
 from dsa_des.scene.overrides import apply_sets, apply_swap
+from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
@@ -135,9 +136,9 @@ class Scene(Changeable):
 
     def windowed_queues(self) -> set[str]:
         """Return the shared processors that serve a look-ahead window at once."""
-        # Those whose line can be worked through at once (`dsa_des.running.windowed_queue`).
-        closed = ("wait", "drop_oldest")
-        able = [name for name, p in self.processors.items() if p.when_busy in closed]
+        # Who leaves out scans must know of each whether the processor is busy.
+        policies = {name: find_policy(p.when_busy) for name, p in self.processors.items()}
+        able = [name for name, policy in policies.items() if policy.skips is QueuePolicy.skips]
         return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
 
     def resolved(self) -> dict[str, Any]:

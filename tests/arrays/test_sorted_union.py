@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, no_runs, place_among, union
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, no_runs, positions_among, union
 from dsa_des.arrays.sorted_union import sorted_union
 
 
@@ -38,7 +38,7 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             asked = list(zip(part.run.tolist(), part.tick.tolist(), strict=True))
             for instants in (part, twin):
                 assert last_of_run(every, instants).tolist() == [pairs.index(p) for p in asked]
-                place, there = place_among(every, instants)
+                place, there = positions_among(every, instants)
                 assert there is None
                 assert [pairs[row] for row in place.tolist()] == asked
         with pytest.raises(ValueError, match="read-only"):

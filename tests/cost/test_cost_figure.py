@@ -3,10 +3,15 @@
 from itertools import combinations
 
 import numpy as np
+import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from dsa_des.costs.output import _put_labels
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.costs.climb import RungCost
+from dsa_des.costs.output import _put_labels, draw_costs
+from dsa_des.costs.replay import Spread
+from dsa_des.record.drawing import kept_figures
 
 
 def test_labels_cover_neither_each_other_nor_a_point():
@@ -28,3 +33,27 @@ def test_labels_cover_neither_each_other_nor_a_point():
         assert not [name for name, box in boxes.items() if box.contains(*place)]
     for name, box in boxes.items():
         assert axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1, name
+
+
+def _costs(block: str) -> list[RungCost]:
+    rungs = (Rung("crude", "less"), Rung("exact", "more"))
+    errors = Quantity("detection_probability", "Pd")
+    ladder = Ladder("detection", rungs, "exact", (errors,), lambda *_: {})
+    return [
+        RungCost(block, ladder, rung.name, "exact", cpu_us_per_target_scan=place + 1.0,
+                 cpu_spread_us=0.1, errors={"detection_probability": Spread(0.1, 0.2, 0.3, 9)})
+        for place, rung in enumerate(rungs)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("panels", [1, 2])
+def test_the_title_is_whole_and_off_the_panels(panels, tmp_path):
+    costs = [cost for panel in range(panels) for cost in _costs(f"block_{panel}")]
+    with kept_figures() as kept:
+        draw_costs(tmp_path / "cost.png", "A lookout who sees another aircraft", costs)
+    figure = kept["cost"]
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    box = figure._suptitle.get_window_extent(renderer)
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+    for axes in figure.axes:
+        assert not box.overlaps(axes.title.get_window_extent(renderer))

@@ -335,7 +335,7 @@ def test_the_close_up_shows_each_scan_on_its_clock(drawn):
     assert not inside and not collections(above)  # nothing is fused here: the tracker fuses
     seen_s = min(drawn.seen(name)["time_s"][0] for name in CLOCKS)
     assert start_s == pytest.approx(max(0.0, seen_s - 0.3 * 2.1))
-    assert above.get_title(loc="left") == "Banked: around the first detection"
+    assert above.get_title(loc="left") == "Banked\nAround the first detection"
 
 
 def states(drawn):

@@ -180,7 +180,7 @@ def test_the_close_up_shows_the_first_fusion(tmp_path):
 
 def test_the_close_up_falls_back_to_the_first_detection_and_the_start(tmp_path):
     for targets, what in ((a_target("seen", east=4000, north=6000), "first detection"),
-                          (a_target("far", east=90000), "at the start")):  # fmt: skip
+                          (a_target("far", east=90000), "At the start")):  # fmt: skip
         _, folder, _ = run(tmp_path, targets, 5)
         close_up = find_close_up(read_scans(folder), folder, 5.0)
         assert what in close_up.what

@@ -153,6 +153,18 @@ def test_a_line_for_each_block():
                 "targets": {f"t{i}": {"time_s": 9.0 - i, "range_m": 1e3 * i} for i in range(1, 7)},
             },
             "eo": {"confirmed": 1, "first_confirmed": {"time_s": 4.0, "range_m": None}},
+            "camera": {
+                "confirmed": 2,
+                "false": None,
+                "position_error_m": None,
+                "targets": {},
+                "first_confirmed": {"time_s": 4.5, "range_m": None},
+            },
+            "one": {
+                "confirmed": 1,
+                "false": 0,
+                "first_confirmed": {"time_s": 5.0, "range_m": 7e3},
+            },
             "ir": {"confirmed": 0},
         },
         "alerts": {
@@ -184,10 +196,12 @@ def test_a_line_for_each_block():
     }
     assert outcome_lines(summary) == [
         "ekf: 3 confirmed tracks, 1 of them false; position error 34.6 m rms; "
-        "first confirmed: t6 at 3.0 s "
+        "first within 300 m of t6 at 3.0 s "
         "(6.00 km away), t5 at 4.0 s (5.00 km away), t4 at 5.0 s (4.00 km away), t3 at 6.0 s "
-        "(3.00 km away) and 2 more",
+        "(3.00 km away) and 2 more targets",
         "eo: 1 confirmed track; first confirmed at 4.0 s",
+        "camera: 2 confirmed tracks, all without a range; first confirmed at 4.5 s",
+        "one: 1 confirmed track, none false; first confirmed at 5.0 s (7.00 km away)",
         "ir: no confirmed track",
         "alerting (by ekf and eo): level 1 from 12.0 s to 30.0 s "
         "(b from 12.0 s to 30.0 s, a at 14.2 s)",

@@ -1,13 +1,14 @@
 """The blocks and the metric that docs/extending.md shows do what the page says of them."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from snippets import file_of, read_snippets
+from snippets import ROOT, file_of, read_snippets
 
 from dsa_des.block.message import Text
 from dsa_des.cli import main
@@ -236,3 +237,46 @@ def test_the_metric_counts_scans_of_every_replica(configs: Path) -> None:
 
 def radar_rows(count: int) -> Text:
     return Text(np.zeros(count, dtype=np.int64), ("radar",))
+
+
+#: Files that a newcomer may have to open, the page counted.
+MOST_FILES = {
+    "a sensor": 6, "a fusion": 4, "a filter": 4, "an association": 4, "a metric": 2,
+    "an association with its own `update`": 4, "a column of a message": 2,
+    "an effect of a radar": 3, "a reader of traffic": 3, "a policy of a shared processor": 3,
+}  # fmt: skip
+
+
+def test_the_files_that_a_newcomer_opens_are_there_and_as_few_as_the_page_says():
+    page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (an? [^|]+) \| (\d+) \| (.+) \|$", page, re.MULTILINE)
+    opened = {what: re.findall(r"`([\w/]+\.py)`", files) for what, _, files in rows}
+    assert opened.keys() >= MOST_FILES.keys()
+    for what, count, _ in rows:
+        assert all((ROOT / file).is_file() for file in opened[what]), what
+        assert int(count) == 1 + len(opened[what]) <= MOST_FILES.get(what, 6), what
+
+
+def test_a_stub_of_one_s_own_records_its_column_too(configs: Path, tmp_path: Path) -> None:
+    (tmp_path / "aged.py").write_text(
+        "from dataclasses import dataclass\n"
+        "import numpy as np\n"
+        "from components.messages import Tracks\n"
+        "from components.tracking.stub import TrackerStub\n"
+        "from dsa_des.block.component import Output\n"
+        "from dsa_des.block.message import column\n"
+        "@dataclass(eq=False)\n"
+        "class Aged(Tracks):\n"
+        "    half_s: np.ndarray = column('s', '', 'half the age', default=None, kw_only=True)\n"
+        "class AgedStub(TrackerStub):\n"
+        "    outputs = {'tracks': Output(Aged, 'Held lines of sight.')}\n"
+        "    def run(self, wake):\n"
+        "        tracks = super().run(wake)\n"
+        "        return tracks and Aged(**vars(tracks), half_s=0.5 * tracks.age_s)\n",
+        encoding="utf-8",
+    )
+    tracks = recorded(
+        configs / "first_light.toml", sets=["duration_s=5"], swaps=["tracker=aged:AgedStub"]
+    )["tracks"]
+    assert len(tracks["age_s"]) > 0
+    np.testing.assert_array_equal(tracks["half_s"], 0.5 * tracks["age_s"])

@@ -27,7 +27,7 @@ def test_an_avoidance_that_turns_each_ownship_by_itself(lock):
     scene = load_scene(CROSSING, duration_s="40", sets=NEARER)
     simulation = lock.same_as_alone(lock.replicas_of(scene, *FLIGHTS), window=9)
     _, tables = lock.tables_of(lock_step, lock.replicas_of(scene, *FLIGHTS))
-    assert len(simulation.time.runs) > 1
+    assert len(simulation.runs.going) > 1
     assert len(set(tables["manoeuvres"]["replica"].to_pylist())) > 1
 
 

@@ -129,7 +129,7 @@ def cfar_loss_db(
 
 @dataclass(frozen=True)
 class _Terms:
-    """What the sums need to know: of k quanta, how often the cell is missed and detected."""
+    """Terms of the sums: how often a cell with k quanta is missed and detected."""
 
     pulses: int
     cells: int

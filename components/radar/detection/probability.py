@@ -29,9 +29,6 @@ from components.radar.detection.approximations import (
     table_probability,
 )
 from components.radar.detection.exact import exact_probability
-from components.radar.detection.threshold import detection_threshold
-
-__all__ = ["METHODS", "detection_probability", "detection_threshold", "miss_probability"]
 
 # A rung computes Pd for flat SNR and one (pulses, false_alarm_probability, model).
 Rung = Callable[[FloatArray, int, float, str], FloatArray]

@@ -211,7 +211,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """What the detection series need to know of the noise and the threshold V_T.
+    """Poisson terms of noise about the threshold V_T, which the detection series sum.
 
     `term` holds g(pulses + j) for j = 0, 1, …, the Poisson probabilities with mean V_T; `missed`
     their sums from j on, P(pulses + j, V_T), the probability that noise of pulses + j pulses stays

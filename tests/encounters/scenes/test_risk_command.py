@@ -1,6 +1,7 @@
 """``dsa-des encounters risk``: what it prints, and what it says of damaged tables."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -33,9 +34,31 @@ def table(folder: Path, text: str = TABLE) -> Path:
 def test_published_ratio_on_the_command_line() -> None:
     path = reference_file("degas_sample/sample_results.csv")
     names = ("--nominal", "nmac_nominal", "--mitigated", "nmac_mitigated", "--weight", "weight")
-    told = call(path, *names).stdout.splitlines()
-    line = next(line for line in told if line.startswith("risk ratio"))
-    assert abs(float(line.split()[-1]) - 0.126765133837) < 1e-12
+    found = json.loads(call(path, *names, "--json").stdout)
+    assert abs(found["ratio"] - 0.126765133837) < 1e-12
+
+
+def told(rows: list[str], tmp_path: Path, *more: str) -> dict[str, str]:
+    """Return what is printed: how a line begins → what stands behind two blanks."""
+    text = "\n".join(["n,m", *rows]) + "\n"
+    done = call(table(tmp_path, text), "--nominal", "n", "--mitigated", "m", *more)
+    return {
+        words[0]: words[-1]
+        for words in (re.split(r"  +", line.strip()) for line in done.stdout.splitlines())
+    }
+
+
+def test_printed_numbers_have_no_more_digits_than_their_interval_gives_sense(
+    tmp_path: Path,
+) -> None:
+    few = told(["1,1", "1,0", "1,0", "0,0"], tmp_path)
+    assert few["risk ratio"] == few["unresolved"] == "0.333"
+    assert re.fullmatch(r"0\.\d{3,4} to \d\.\d\d \(gamma\)", few["95 % interval"])
+    delta = told(["1,1", "1,0", "1,0", "0,0"], tmp_path, "--interval", "delta")
+    assert delta["95 % interval"].endswith(" (delta)")
+    many = told(["1,1"] * 30_000 + ["1,0"] * 60_000, tmp_path)
+    low, high = map(float, many["95 % interval"].split(" (")[0].split(" to "))
+    assert many["risk ratio"] == "0.3333" and 0.001 < (high - low) / 2 < 0.01
 
 
 def test_numbers_as_json_and_by_class(tmp_path: Path) -> None:
@@ -80,7 +103,7 @@ def test_damaged_encounters_are_skipped_and_counted_on_request(tmp_path: Path) -
     done = call(path, *COLUMNS, "--skip-damaged")
     assert done.exit_code == 0
     assert "1 damaged encounters were skipped" in done.stdout
-    assert "risk ratio              0.666666666666667" in done.stdout
+    assert re.search(r"^risk ratio +0\.667$", done.stdout, re.MULTILINE)
 
 
 def test_rows_that_hang_together_are_told_apart_from_encounters(tmp_path: Path) -> None:

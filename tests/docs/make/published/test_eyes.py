@@ -76,7 +76,7 @@ def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path
 def test_other_assumptions_reach_the_flights(few, monkeypatch):
     # Who never looks out prevents nothing; one who takes half a minute to turn, less than one who
     # turns in half a second; and another block may decide.
-    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:6])
+    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:3])
     changes = {
         "blind": ("blocks.pilot.left_looking=0",),
         "quick": ("wires[4].delay_s=0.5",),
