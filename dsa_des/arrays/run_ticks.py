@@ -250,15 +250,12 @@ def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
     if (known := _positions(instants, asked)) is not None:
         return known, True
     one_run = _one_run((instants, asked))
-    if one_run:
-        keys = [instants.tick, asked.tick]
-    else:
-        keys, _ = _keys(instants, asked)
+    known_keys, keys = (instants.tick, asked.tick) if one_run else _keys(instants, asked)[0]
     # As for blocks that run at the same instants; a search would take a tenth of a whole run.
-    same = len(instants) == len(asked) and bool((keys[0] == keys[1]).all())
-    if same and bool((keys[0][1:] > keys[0][:-1]).all()):
+    same = len(instants) == len(asked) and bool((known_keys == keys).all())
+    if same and bool((keys[1:] > keys[:-1]).all()):
         return np.arange(len(asked)), True
-    positions = np.searchsorted(*keys, side="right") - 1
+    positions = np.searchsorted(known_keys, keys, side="right") - 1
     if not one_run:
         other = instants.run[positions] != asked.run
         if other.any():
