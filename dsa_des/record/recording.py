@@ -1,4 +1,4 @@
-"""Columns that messages declare: what was not declared is an error, not a column less."""
+"""The recorder: what blocks send, checked against what messages declare, in canonical order."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any

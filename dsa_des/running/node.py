@@ -99,6 +99,11 @@ class Node:
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
+    @property
+    def wires(self) -> list[Channel]:
+        """The wires into all inputs."""
+        return [wire for wires in self.channels.values() for wire in wires]
+
     # -- the life of the process ---------------------------------------------------------------
 
     def start(self) -> None:
@@ -218,7 +223,7 @@ class Node:
         runs = self.simulation.runs
         if runs.early:
             kept = runs.before_ends(instants)
-            instants, scans, end = instants.take(kept), scans[kept], runs.cut(end)
+            instants, scans = instants.take(kept), scans[kept]
         if len(instants):
             self._run(instants, scans, end)
 
