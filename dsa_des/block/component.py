@@ -1,4 +1,4 @@
-"""Typed inputs and outputs of a block."""
+"""What a block is: its inputs and outputs, what it is told, and the class it derives from."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field

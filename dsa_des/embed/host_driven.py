@@ -21,12 +21,12 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, ends_its_run
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
-from dsa_des.block.foreign_calls import error_at, must_pass
+from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message
-from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node
-from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation, block_failure
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire as WireOfScene
@@ -292,7 +292,8 @@ class HostDriven:
             except BaseException as error:
                 if must_pass(error):
                     raise
-                raise self._failure(runner, step, error) from error
+                time_s = tick / self.ticks_per_s
+                raise block_failure(runner.component, time_s, error, scan) from error
             if result is None:
                 continue
             if isinstance(result, Message):
@@ -303,11 +304,6 @@ class HostDriven:
                     given.check()
                     sent[runner.name, output] = given
         return step
-
-    def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
-        reason = error_at(error, type(runner.component))
-        path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
-        return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
 
 
 def _last_row(message: Message) -> IntArray:

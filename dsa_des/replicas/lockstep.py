@@ -18,7 +18,8 @@ from dsa_des.record.recording import Recorder
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import plan, unspent
-from dsa_des.running.grain import Grain, opened_loops
+from dsa_des.running.grain import Grain
+from dsa_des.running.loops import opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Windows

@@ -10,7 +10,7 @@ from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, plan, unspent
-from dsa_des.running.grain import telling_order
+from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK

@@ -9,7 +9,8 @@ from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.message import Message
 from dsa_des.errors import SceneError
 from dsa_des.running.events import RunState
-from dsa_des.running.grain import Edge, Grain
+from dsa_des.running.grain import Grain
+from dsa_des.running.loops import Edge
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
@@ -148,26 +149,18 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
 
 def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
     """Return how long what is sent takes at least over some edges, or None without any."""
-    return min(
-        (
-            channel.delay_ticks
-            for name, node in nodes.items()
-            for channels in node.channels.values()
-            for channel in channels
-            if (channel.source, name) in opened
-        ),
-        default=None,
+    delays = (
+        channel.delay_ticks
+        for name, node in nodes.items()
+        for channel in node.wires
+        if (channel.source, name) in opened
     )
+    return min(delays, default=None)
 
 
 def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
     """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
-    delays = sum(
-        channel.delay_ticks
-        for node in nodes.values()
-        for channels in node.channels.values()
-        for channel in channels
-    )
+    delays = sum(channel.delay_ticks for node in nodes.values() for channel in node.wires)
     jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
     if run_ticks + delays + jitter >= MAX_TICK:
         longest_s = MAX_TICK / scene.ticks_per_s

@@ -67,14 +67,14 @@ class Outcome:
     def report(self) -> dict[str, Any]:
         """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
         sections: dict[str, Any] = {}
-        for name, component in self.components.items():
+        for component in self.components.values():
             try:
                 for section, content in component.report().items():
                     sections.setdefault(section, {}).update(content)
             except BaseException as error:
                 if must_pass(error):
                     raise
-                raise _failure(name, type(component), self.duration_s, error) from error
+                raise block_failure(component, self.duration_s, error) from error
         return sections
 
 
@@ -300,9 +300,8 @@ class Simulation:
     ) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
         if self.failure is None:  # a provisional window goes on; the first failure counts
-            said = _failure(
-                node.name, type(node.component), int(ticks[0]) / self.ticks_per_s, error, scan
-            )
+            time_s, number = int(ticks[0]) / self.ticks_per_s, scan if scan >= 0 else None
+            said = block_failure(node.component, time_s, error, number)
             self.failure = Failure(said, error, ticks)
         if not self.window.provisional:
             raise Abort
@@ -322,7 +321,9 @@ class Simulation:
         raise failure.said from failure.cause
 
 
-def _failure(
-    name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
+def block_failure(
+    component: Component, time_s: float, error: BaseException, scan: int | None = None
 ) -> BlockFailure:
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, error_at(error, cls))
+    """Return what is said of an exception that a block raised at an instant."""
+    cls = type(component)
+    return BlockFailure(component.name, cls.path(), time_s, scan, error_at(error, cls))

@@ -64,8 +64,8 @@ class RunningBlock(Protocol):
         """The block itself."""
 
     @property
-    def channels(self) -> Mapping[str, Sequence[Channel]]:
-        """The wires into it, by input."""
+    def wires(self) -> Sequence[Channel]:
+        """The wires into it."""
 
 
 class Windows:
@@ -173,7 +173,7 @@ class Rewinder:
             if hasattr(thing, "__dict__")
         ]
         self._things.append(runs)
-        into = [(n.name, c) for n in nodes for wires in n.channels.values() for c in wires]
+        into = [(node.name, channel) for node in nodes for channel in node.wires]
         self._channels = [channel for _, channel in into]
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 

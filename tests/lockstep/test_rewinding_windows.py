@@ -7,7 +7,7 @@ import pytest
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.running.grain import cut_loops
+from dsa_des.running.loops import cut_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene

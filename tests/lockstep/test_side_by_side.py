@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.running.grain import opened_loops
+from dsa_des.running.loops import opened_loops
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
 
