@@ -115,6 +115,9 @@ class Message:
         are of one run, or where they are those of its wake.
     """
 
+    # What was worked out once is no field: `vars` of a message are what it is made of.
+    __slots__ = ("__dict__", "__weakref__", "_instants", "_row_of_entries")
+
     tick: IntArray
     run: IntArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
@@ -152,22 +155,22 @@ class Message:
     @property
     def instants(self) -> RunTicks:
         """Run and tick of each row, for searches among them (`dsa_des.arrays.run_ticks`)."""
-        run, known = self._runs(), self.__dict__.get("_instants")
+        run, known = self._runs(), getattr(self, "_instants", None)
         if known is None or known.tick is not self.tick or known.run is not run:
-            known = self.__dict__["_instants"] = RunTicks(run, self.tick)
+            known = self._instants = RunTicks(run, self.tick)
         return known
 
     @instants.setter
     def instants(self, known: RunTicks) -> None:
-        self.run, self.tick, self.__dict__["_instants"] = known.run, known.tick, known
+        self.run, self.tick, self._instants = known.run, known.tick, known
 
     @property
     def row_of_entries(self) -> IntArray:
         """Row of each entry, where a class has `offsets`."""
         offsets = self.offsets  # type: ignore[attr-defined]
-        known = self.__dict__.get("_row_of_entries")
+        known = getattr(self, "_row_of_entries", None)
         if known is None or known[0] is not offsets:
-            known = self.__dict__["_row_of_entries"] = offsets, row_of_entries(offsets)
+            known = self._row_of_entries = offsets, row_of_entries(offsets)
         return known[1]
 
     @classmethod
