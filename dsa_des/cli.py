@@ -266,7 +266,7 @@ def compare(**options: Any) -> None:
 
 @main.command()
 @click.argument("case", metavar="CASE", shell_complete=completing("cases"))
-@click.option("--out", required=True, metavar="PACK", help="Folder of the pack.")
+@click.option("--out", metavar="PACK", help="Folder of the pack [default: packs/CASE-NNN].")
 @set_option
 @click.option(
     "--encounters", type=int, metavar="N", help="Of the system and what stands beside it."

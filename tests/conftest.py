@@ -8,15 +8,13 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
 
 # Tests share helpers and scenes; importlib mode by itself puts nothing on the path.
 sys.path.extend(sorted({str(p.parent) for p in Path(__file__).parent.rglob("*.py")} - {*sys.path}))
-# A machine that is busy with something else is no defect of what is tested.
-settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("busy")
 # What runs tests in parallel sets the width of its own terminal, which our tables would obey.
 os.environ.pop("COLUMNS", None)
+# As many workers as processors: threads of linear algebra would spin while others compute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def keep_bytecode_elsewhere() -> None:
@@ -36,6 +34,13 @@ def keep_bytecode_elsewhere() -> None:
 
 if sys.dont_write_bytecode and hasattr(os, "getuid"):
     keep_bytecode_elsewhere()
+
+# Only now: pytest rewrites hypothesis too, some hundred files, and keeps what it makes of them.
+from hypothesis import HealthCheck, settings  # noqa: E402
+
+# A machine that is busy with something else is no defect of what is tested.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 
 ROOT = Path(__file__).parent.parent
 

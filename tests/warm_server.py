@@ -5,6 +5,7 @@ import atexit
 import contextlib
 import gc
 import importlib
+import importlib.metadata
 import io
 import json
 import os
@@ -15,6 +16,8 @@ import socket
 import sys
 import threading
 import types
+
+from dsa_des.block.entry_points import registered
 
 _LIBRARIES = (
     "numpy", "scipy.special", "scipy.optimize", "pydantic", "pyarrow.parquet", "simpy", "networkx",
@@ -34,8 +37,28 @@ def load() -> None:
             if not any(part in found.name for part in _NOT_LOADED):
                 with contextlib.suppress(ImportError):  # an extra that is not installed here
                     importlib.import_module(found.name)
+    build_models()
+    for group in importlib.metadata.entry_points().groups:
+        if group.startswith("dsa_des."):
+            registered(group)
     gc.collect()
     gc.freeze()
+
+
+def build_models() -> None:
+    """Do what each process would otherwise do by itself: parameters' schemas, and pandas for Arrow.
+
+    Pydantic builds a schema when it is first needed; Arrow looks for pandas with its first array.
+    """
+    import pyarrow
+    from pydantic import BaseModel
+
+    pyarrow.array([0])
+    models = BaseModel.__subclasses__()
+    for model in models:
+        models.extend(model.__subclasses__())
+        if not model.__pydantic_complete__:
+            model.model_rebuild(raise_errors=False)
 
 
 def next_job(source: socket.socket) -> dict:
@@ -112,6 +135,8 @@ def _take(job: dict, stdout: int, stderr: int) -> None:
         path.insert(0, first.get(words[0], os.path.dirname(os.path.abspath(words[0]))))
     sys.path[:] = path
     importlib.invalidate_caches()
+    if asked != before:
+        registered.cache_clear()
 
 
 def begin(job: dict) -> None:

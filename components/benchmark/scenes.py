@@ -189,8 +189,8 @@ def _scans(simulation: Simulation) -> int:
     """Count the scans of all sensors, one replica at a time so that it takes no memory."""
     clocks = [node.clock for node in simulation.nodes.values() if node.clock is not None]
     found = 0
-    for run in range(simulation.time.replicas):
-        simulation.time.runs = range(run, run + 1)
+    for run in range(simulation.runs.count):
+        simulation.runs.going = range(run, run + 1)
         found += sum(len(clock.between(0, simulation.end_tick)[0]) for clock in clocks)
     return found
 

@@ -6,14 +6,12 @@ target cannot close in by more than their two largest speeds allow. What a row h
 its own epoch and so does not depend on the window that it is in.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 
 from components.flights.fleet import Fleet
+from components.flights.many_flights import SteeredFleet
 from components.geometry import line_of_sight
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -42,6 +40,22 @@ class NearIntervals:
     target: IntArray
     start_s: FloatArray
     end_s: FloatArray
+
+    def near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
+        """Return which targets may be near during looks from times on, (rows, targets).
+
+        A window holds targets that are near at some of its instants; this says at which, so that
+        what is counted does not depend on the window.
+        """
+        last_s = float(time_s.max())
+        if self.throughout(float(time_s.min()) + lasts_s, last_s) == len(columns):
+            return np.ones((len(time_s), len(columns)), dtype=bool)
+        if bool((time_s[1:] >= time_s[:-1]).all()):
+            return self.at_each(columns, time_s, time_s + lasts_s)
+        order = np.argsort(time_s, kind="stable")  # replicas, one after the other
+        near: BoolArray = np.empty((len(time_s), len(columns)), dtype=bool)
+        near[order] = self.at_each(columns, time_s[order], time_s[order] + lasts_s)
+        return near
 
     def during(self, first_s: float, last_s: float) -> IntArray:
         """Return the targets that may be near at some time in [first_s, last_s], ascending."""
@@ -85,23 +99,24 @@ class NearIntervals:
         return int(np.cumsum(change[order]).max(initial=0))
 
 
-def near_intervals(
-    range_at: Callable[[IntArray, FloatArray], FloatArray],
-    *,
-    closing_speed_mps: FloatArray,
-    present_s: tuple[FloatArray, FloatArray],
-    reach_m: float,
-    end_s: float,
-    of_run: int | None = None,
-) -> NearIntervals:
+def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> NearIntervals:
     """Find when targets may be within a range of the ownship, between time 0 and an end.
 
     Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
     true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
-    few metres of the edge). Where targets are those of many runs, `of_run` says how many each run
-    has.
+    few metres of the edge).
+
+    Parameters
+    ----------
+    own, targets : Fleet
+        The ownship of each run, and the targets of all, as many in each run, one run after the
+        other.
     """
-    closing = closing_speed_mps * _SPEED_MARGIN
+    of_run = max(1, len(targets) // len(own))
+    run = np.arange(len(targets)) // of_run
+    own_s, targets_s = own.intervals_present_s[run], targets.intervals_present_s
+    present_s = np.maximum(targets_s[:, 0], own_s[:, 0]), np.minimum(targets_s[:, 1], own_s[:, 1])
+    closing = (targets.max_speeds_mps + own.max_speeds_mps[run]) * _SPEED_MARGIN
     target = np.arange(len(closing))
     piece: FloatArray = np.zeros(len(closing))
     found = [(target[:0], closing[:0], closing[:0])]
@@ -109,11 +124,11 @@ def near_intervals(
     while len(target):
         start: FloatArray = piece * length
         half = 0.5 * length
-        range_m = range_at(target, start + half)
+        range_m = ranges_m(own, targets, run[target], target, start + half)
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
-        fine = length <= FINEST_S or _too_many(target, of_run or len(closing))
+        fine = length <= FINEST_S or _too_many(run[target], of_run)
         settled = maybe & ((range_m <= reach_m - drift) | fine)
         found.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
@@ -126,25 +141,22 @@ def near_intervals(
     return _merged(near[some], start[some], end[some])
 
 
-def _too_many(target: IntArray, of_run: int) -> BoolArray:
+def _too_many(run: IntArray, of_run: int) -> BoolArray:
     """Return for each piece whether its run has become too many of them."""
-    run = target // of_run
     too_many: BoolArray = 2 * np.bincount(run) > _MOST_PIECES_PER_TARGET * of_run
     return too_many[run]
 
 
-def range_between(
-    own_at: Callable[[FloatArray], Any],
-    targets_at: Callable[[IntArray, FloatArray], Any],
-    target: IntArray,
-    time_s: FloatArray,
+def ranges_m(
+    own: Fleet, targets: Fleet, run: IntArray, target: IntArray, time_s: FloatArray
 ) -> FloatArray:
-    """Return the range from an ownship to targets (n,), each at a time (n,) of its own, m."""
-    times, which = np.unique(time_s, return_inverse=True)
-    own, other = own_at(times), targets_at(target, time_s)
+    """Return the range from the ownships of runs to targets (n,), each at a time (n,) of its own.
+
+    The targets of all runs are numbered through.
+    """
+    here, there = own.each(run, time_s), targets.each(target, time_s)
     _, _, range_m = line_of_sight(
-        own.lat_deg[which], own.lon_deg[which], own.alt_m[which],
-        other.lat_deg, other.lon_deg, other.alt_m,
+        here.lat_deg, here.lon_deg, here.alt_m, there.lat_deg, there.lon_deg, there.alt_m,
         validate=False,
     )  # fmt: skip
     return range_m
@@ -161,48 +173,6 @@ def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearInt
     )
 
 
-class Culling:
-    """The targets that can come within a range of the ownship, by intervals of entry and exit.
-
-    The intervals are found once, for all targets together; which targets a window needs is then
-    a look at them, so the answer for an instant does not depend on how instants are grouped.
-    """
-
-    def __init__(
-        self, own: Any, fleet: Fleet, reach_m: float, end_s: float, lasts_s: float = 0.0
-    ) -> None:
-        self.reach_m, self.lasts_s = reach_m, lasts_s
-        there = fleet.intervals_present_s
-        first, last = own.interval_present()
-        self.intervals: NearIntervals = near_intervals(
-            partial(range_between, own.at, fleet.each),
-            closing_speed_mps=fleet.max_speeds_mps + own.max_speed_mps,
-            present_s=(np.maximum(there[:, 0], first), np.minimum(there[:, 1], last)),
-            reach_m=reach_m,
-            end_s=end_s + lasts_s,
-        )
-
-    def active(self, first_s: float, last_s: float) -> IntArray:
-        """Return the targets that may come in reach between two times, ascending."""
-        return self.intervals.during(first_s, last_s + self.lasts_s)
-
-    def near(self, columns: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may come in reach during a look from each time on.
-
-        A window holds targets that are near at some of its instants; this says at which, so that
-        what is counted does not depend on the window.
-        """
-        last_s = float(time_s.max())
-        if self.intervals.throughout(float(time_s.min()) + self.lasts_s, last_s) == len(columns):
-            return np.ones((len(time_s), len(columns)), dtype=bool)
-        if bool((time_s[1:] >= time_s[:-1]).all()):
-            return self.intervals.at_each(columns, time_s, time_s + self.lasts_s)
-        order = np.argsort(time_s, kind="stable")  # replicas, one after the other
-        near: BoolArray = np.empty((len(time_s), len(columns)), dtype=bool)
-        near[order] = self.near(columns, time_s[order])
-        return near
-
-
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
@@ -215,21 +185,23 @@ class SteeredCulling:
 
     Parameters
     ----------
-    own_mps : (runs,)
-        Largest speeds of the ownships before they are steered.
-    targets_mps : (runs, targets)
-        Those of the targets of each run.
+    own : Fleet
+        The ownship of each run as it flies before it is steered.
+    targets : Fleet
+        The targets of all runs, as many in each, one run after the other.
     reach_m : float
     """
 
-    def __init__(self, own_mps: FloatArray, targets_mps: FloatArray, reach_m: float) -> None:
-        self._own_mps, self._targets_mps, self.reach_m = own_mps, targets_mps, reach_m
-        fastest = self._closing_mps(targets_mps, own_mps).max(axis=1, initial=1e-3)
+    def __init__(self, own: Fleet, targets: Fleet, reach_m: float) -> None:
+        self._own_mps, self._targets, self._reach_m = own.max_speeds_mps, targets, reach_m
+        runs = len(own), len(targets) // len(own)
+        self._targets_mps: FloatArray = targets.max_speeds_mps.reshape(runs)
+        fastest = self._closing_mps(self._targets_mps, self._own_mps).max(axis=1, initial=1e-3)
         #: How long an epoch lasts around each ownship.
         self.epoch_s: FloatArray = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
         # The last epoch that is known of each run, and ranges at its start.
-        self._last: IntArray = np.full(len(own_mps), -1, dtype=np.int64)
-        self._range_m: FloatArray = np.zeros_like(targets_mps)
+        self._last: IntArray = np.full(len(own), -1, dtype=np.int64)
+        self._range_m: FloatArray = np.zeros_like(self._targets_mps)
 
     @staticmethod
     def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
@@ -242,27 +214,19 @@ class SteeredCulling:
         """Take note that the ownships of some runs fly on otherwise than was known."""
         self._last[run] = -1
 
-    def near(
-        self,
-        run: IntArray,
-        time_s: FloatArray,
-        told_mps: FloatArray,
-        range_m: Callable[[IntArray, IntArray, FloatArray], FloatArray],
-    ) -> BoolArray:
+    def near(self, own: SteeredFleet, run: IntArray, time_s: FloatArray) -> BoolArray:
         """Return which targets may be in reach at each row, (rows, targets).
 
         Parameters
         ----------
+        own : SteeredFleet
+            The ownships as they are steered by now.
         run, time_s : (rows,)
             Ascending by run.
-        told_mps : (rows,)
-            Largest speed that the ownship was told to fly by then, or 0.
-        range_m : callable
-            Gives the ranges from ownships to targets of runs, numbered through, at times, all (n,).
         """
         width = self._targets_mps.shape[1]
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
-        fastest = np.maximum(told_mps, self._own_mps[run])
+        fastest = np.maximum(own.fastest_by(run, time_s), self._own_mps[run])
         begins = np.ones(len(run), dtype=bool)
         begins[1:] = (run[1:] != run[:-1]) | (epoch[1:] != epoch[:-1])
         begins[1:] |= fastest[1:] != fastest[:-1]
@@ -273,9 +237,9 @@ class SteeredCulling:
         if len(new):
             target = (of[new][:, np.newaxis] * width + np.arange(width)).reshape(-1)
             start_s = np.repeat(number[new] * self.epoch_s[of[new]], width)
-            ranges = range_m(np.repeat(of[new], width), target, start_s)
+            ranges = ranges_m(own, self._targets, np.repeat(of[new], width), target, start_s)
             found[new] = ranges.reshape(len(new), width)
         self._last[of], self._range_m[of] = number, found
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
-        within_m = self.reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
+        within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
         return np.asarray((found <= within_m)[np.cumsum(begins) - 1])

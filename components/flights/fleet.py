@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,22 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
+
+
+class Trajectory(Protocol):
+    """The flight of one aircraft."""
+
+    name: str
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along its path."""
+
+    def interval_present(self) -> tuple[float, float]:
+        """Return the first and the last time at which it is there."""
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return its state at some times."""
 
 
 class Fleet(Sequence[Any]):
@@ -34,6 +50,14 @@ class Fleet(Sequence[Any]):
     @abstractmethod
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states of flights (n,), each at a time (n,) of its own, in s."""
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        return np.full(len(time_s), np.nan)
+
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        return np.full((3, len(time_s)), np.nan)
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Return the states of all at times (n,), shape (n, flights)."""

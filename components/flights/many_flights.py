@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from math import atan2, cos, inf, isnan, radians
@@ -10,17 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.fleet import Fleet, in_rows
+from components.flights.fleet import Fleet, Trajectory, in_rows
 from components.flights.geodesic_motion import geodesic_parameter_table
 from components.flights.leg_motion import KINDS
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
-from components.flights.steered_flight import (
-    SteeredFlight,
-    SteeredPart,
-    flown_from,
-    times_around_s,
-)
+from components.flights.steering_plan import SteeredPart, flown_from, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -99,10 +95,19 @@ Parts = tuple[tuple[float, SteeredPart], ...]
 
 
 class SteeredFleet(Fleet):
-    """Ownships, each with its own flight, and after manoeuvres with what each of them led to."""
+    """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
+
+    A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
+    climb. The flight's own script ends with the first one.
+
+    It never changes: `steered` returns another one, so that a run can go back to the flights it
+    had, and rows of a message keep those that they know.
+    """
 
     def __init__(self, flights: Fleet, parts: Sequence[Parts] = ()) -> None:
         self._flights = flights
+        #: The only flight, which answers faster by itself.
+        self._alone = flights[0] if len(flights) == 1 else None
         #: How many parts each of them has.
         self.manoeuvre_count = np.zeros(len(flights), dtype=np.int64)
         self.manoeuvre_count[: len(parts)] = [len(of_one) for of_one in parts]
@@ -119,11 +124,14 @@ class SteeredFleet(Fleet):
         return len(self._flights)
 
     def __getitem__(self, ownship: int) -> SteeredFlight:  # type: ignore[override]
+        return SteeredFlight(self._flights[ownship], self, ownship)
+
+    def parts_of(self, ownship: int) -> Parts:
+        """Return what an ownship flies after its manoeuvres."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
         flown = (self._flown[number] for number in numbers.tolist())
-        parts = tuple(zip(starts_s.tolist(), flown, strict=True))
-        return SteeredFlight(self._flights[ownship], parts)
+        return tuple(zip(starts_s.tolist(), flown, strict=True))
 
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
@@ -132,15 +140,56 @@ class SteeredFleet(Fleet):
 
         `known` says how many of the ownship's manoeuvres count; all by default.
         """
+        own, after, which = self._part_flown(aircraft, time_s, known)
+        if not len(after):
+            return self._before(aircraft, time_s)
+        steered = self._parts.each(which, time_s[after])
+        if not len(own):
+            return steered
+        return in_rows([own, after], [self._before(aircraft[own], time_s[own]), steered])
+
+    def _before(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states before any manoeuvre."""
+        if self._alone is None:
+            return self._flights.each(aircraft, time_s)
+        state: TrajectoryState = self._alone.at(time_s)
+        return state
+
+    def _part_flown(
+        self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
+    ) -> tuple[IntArray, IntArray, IntArray]:
+        """Return which (n,) are before their first manoeuvre, which after, and in which part."""
+        if not self._flown:
+            return np.arange(len(time_s)), _NOBODY, _NOBODY
         part = (self._start_s[aircraft] <= time_s[:, np.newaxis]).sum(axis=1)
         if known is not None:
             part = np.minimum(part, known)
-        own, after = np.flatnonzero(part == 0), np.flatnonzero(part)
-        if not len(after):
-            return self._flights.each(aircraft, time_s)
-        which = self._part[aircraft[after], part[after] - 1]
-        steered = self._parts.each(which, time_s[after])
-        return in_rows([own, after], [self._flights.each(aircraft[own], time_s[own]), steered])
+        after = np.flatnonzero(part)
+        return np.flatnonzero(part == 0), after, self._part[aircraft[after], part[after] - 1]
+
+    @property
+    def max_speeds_mps(self) -> FloatArray:
+        """Largest speed of each along its path as it is now, shape (flights,)."""
+        return np.array([flight.max_speed_mps for flight in self], dtype=np.float64)
+
+    def ground_speeds_mps(
+        self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
+    ) -> FloatArray:
+        """Return the speeds over ground of ownships, asked for as in `each`."""
+        own, after, which = self._part_flown(aircraft, time_s, known)
+        speed_mps = np.empty(len(time_s))
+        speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
+        speed_mps[after] = self._parts.ground_speeds_mps(which, time_s[after])
+        return speed_mps
+
+    def fixed_attitudes_rad(
+        self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
+    ) -> FloatArray:
+        """Return fixed angles (3, n) as the flights have them until they are steered."""
+        own, _, _ = self._part_flown(aircraft, time_s, known)
+        fixed_rad = np.full((3, len(time_s)), np.nan)
+        fixed_rad[:, own] = self._flights.fixed_attitudes_rad(aircraft[own], time_s[own])
+        return fixed_rad
 
     def fastest_by(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
@@ -150,8 +199,15 @@ class SteeredFleet(Fleet):
         begun = self._start_s[ownship] <= time_s[:, np.newaxis]
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
-    def steer(self, ownship: IntArray, time_s: FloatArray, manoeuvres: Sequence[Manoeuvre]) -> None:
-        """Let ownships (each once) fly manoeuvres from times on, none before an earlier one."""
+    def steered(
+        self, ownship: IntArray, time_s: FloatArray, manoeuvres: Sequence[Manoeuvre]
+    ) -> SteeredFleet:
+        """Return the flights with manoeuvres of ownships (each once) from times on, none before
+        an earlier one, beside what they still do.
+
+        A turn or a change of altitude begins and ends at once, without a change of speed along the
+        path's projection and without acceleration upward; speeds change steadily.
+        """
         times_s = times_around_s(time_s)
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         around = around.reshaped(times_s.shape)
@@ -160,16 +216,58 @@ class SteeredFleet(Fleet):
             for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
         ]
         new = flown_from("ownship", around, time_s, manoeuvres, before)
-        self._parts = ScriptedFleet.joined(self._parts, ScriptedFleet(new))
-        if int(self.manoeuvre_count[ownship].max()) + 1 >= self._start_s.shape[1]:
-            room = self._start_s.shape
-            self._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
-            self._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
+        found = copy(self)
+        found._parts = ScriptedFleet.joined(self._parts, ScriptedFleet(new))
         place = self.manoeuvre_count[ownship]
-        self._start_s[ownship, place] = time_s
-        self._part[ownship, place] = len(self._flown) + np.arange(len(new))
-        self.manoeuvre_count[ownship] += 1
-        self._flown += new
+        room = len(self), int(int(place.max()) + 2 > self._start_s.shape[1])
+        found._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
+        found._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
+        found._start_s[ownship, place] = time_s
+        found._part[ownship, place] = len(self._flown) + np.arange(len(new))
+        found.manoeuvre_count = self.manoeuvre_count.copy()
+        found.manoeuvre_count[ownship] += 1
+        found._flown = self._flown + new
+        return found
+
+
+_NOBODY: IntArray = np.empty(0, dtype=np.int64)
+
+
+class SteeredFlight:
+    """One of the flights of a `SteeredFleet`; of a flight alone a fleet is made."""
+
+    def __init__(
+        self, flight: Trajectory, fleet: SteeredFleet | None = None, number: int = 0
+    ) -> None:
+        self.name, self.flight = flight.name, flight
+        self._fleet = SteeredFleet(fleet_of([flight])) if fleet is None else fleet
+        self._number = number
+
+    @property
+    def parts(self) -> Parts:
+        """What it flies after its manoeuvres, and from when on, s."""
+        return self._fleet.parts_of(self._number)
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along the path as it is now."""
+        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
+
+    def interval_present(self) -> tuple[float, float]:
+        """Return from when to when it is there: from 0 on, as what is flown has no end."""
+        return 0.0, inf
+
+    def steered(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
+        """Return the flight with a manoeuvre from a time on; see `SteeredFleet.steered`."""
+        fleet = self._fleet.steered(np.array([self._number]), np.array([time_s]), [manoeuvre])
+        return SteeredFlight(self.flight, fleet, self._number)
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return the state at some times, of any shape."""
+        times = np.asarray(time_s, dtype=np.float64)
+        flat = times.reshape(-1)
+        state = self._fleet.each(np.full(len(flat), self._number), flat)
+        return state.reshaped(times.shape)
 
 
 class MixedFleet(Fleet):

@@ -281,11 +281,6 @@ class ScriptedFleet(Fleet):
         """First and last time at which each is there, shape (flights, 2)."""
         return self._between_s[:, self._columns].T
 
-    @property
-    def fixed_rad(self) -> FloatArray:
-        """Fixed yaw, pitch and roll of each, NaN where the motion gives them, (3, flights)."""
-        return self._fixed_rad[:, self._columns]
-
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times."""
         times = checked_times(time_s)
@@ -341,6 +336,10 @@ class ScriptedFleet(Fleet):
         leg, _ = self._legs_at(self._columns[aircraft], time_s)
         level = self._legs[3][leg] * np.cos(self._legs[1][leg])
         return np.where(self._kind[leg] == _HOLD, 0.0, level)
+
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), NaN where the motion gives them."""
+        return self._fixed_rad[:, self._columns[aircraft]]
 
     @cached_property
     def _parts(self) -> tuple[list[_Group], IntArray]:

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.many_flights import SteeredFleet, fleet_of
-from components.flights.steered_flight import SteeredFlight
+from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import RelativeFlight, separations, traffic_block
 from dsa_des.arrays.types import FloatArray
@@ -27,7 +26,9 @@ def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[S
     for turn in range(max(map(len, steering), default=0)):
         now = [number for number, one in enumerate(steering) if len(one) > turn]
         times_s = np.array([steering[number][turn][0] for number in now])
-        flights.steer(np.array(now), times_s, [steering[number][turn][1] for number in now])
+        flights = flights.steered(
+            np.array(now), times_s, [steering[number][turn][1] for number in now]
+        )
     return list(flights)
 
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, finite, positive, unflatten
+from components.arguments.checks import finite, positive
 from components.geometry import TWO_PI, wrap_pi
 from components.messages.detections import REPORT, Detections, OwnOfEntries, Reporting
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision, farthest_look
@@ -43,38 +43,20 @@ def illumination_offset_s(
     start_rad: float,
     width_rad: float,
     scan_period_s: float,
-    sweep_fraction: float = 1.0,
-    azimuth_rate_rad_s: ArrayLike = 0.0,
 ) -> Any:
-    """Return how long after the start of its scan a target is illuminated, s.
+    """Return how long after the start of its scan the beam points to an azimuth, s.
 
-    The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π], within
-    `sweep_fraction` of the period; a target outside counts as at the nearer edge. It is at start +
-    w t, the target at azimuth + r t: they meet at (azimuth - start) / (w - r), exact for a constant
-    rate. Without the rate, a target that crosses at r is dated early or late by about r/w of the
-    offset: 0.5 % for 1 deg/s under a beam of 220 deg/s.
+    The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π], within the
+    period; an azimuth outside counts as the nearer edge.
     """
     positive("width_rad", width_rad)
     if not width_rad <= TWO_PI * (1.0 + 1e-12):
         raise ValueError(f"width_rad is {width_rad:g}: it must be at most 2π")
     positive("scan_period_s", scan_period_s)
-    if not 0.0 < sweep_fraction <= 1.0:
-        raise ValueError(f"sweep_fraction is {sweep_fraction:g}: it must lie in (0, 1]")
     start = float(finite("start_rad", start_rad))
-    sweep_s = scan_period_s * sweep_fraction
-    beam_rate = width_rad / sweep_s
-    shape, (azimuth, rate) = broadcast_flat(
-        azimuth_rad=finite("azimuth_rad", azimuth_rad),
-        azimuth_rate_rad_s=finite("azimuth_rate_rad_s", azimuth_rate_rad_s),
-    )
-    too_fast = rate >= beam_rate
-    if too_fast.any():
-        raise ValueError(
-            f"azimuth_rate_rad_s is {rate[too_fast][0]:g}: it must be below the beam's rate, "
-            f"{beam_rate:g} rad/s"
-        )
+    azimuth = np.asarray(finite("azimuth_rad", azimuth_rad))
     swept = _into_sweep(azimuth - start, width_rad)
-    return unflatten(np.minimum(swept / (beam_rate - rate), sweep_s), shape)
+    return np.minimum(swept / (width_rad / scan_period_s), scan_period_s)[()]
 
 
 def first_illumination(

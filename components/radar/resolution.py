@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.arguments.checks import positive
+from components.messages.reach import Reach
 from components.radar.detection.output import MOST_CELLS
 from components.sensor.look import Cells
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
@@ -18,11 +18,20 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.errors import Disagreements
 
 
+def steps_across(width: float, step: float) -> int:
+    """Return how many steps fill a width, 1 or more; a remainder counts as one.
+
+    A width that is a whole number of steps up to rounding has that many.
+    """
+    return max(1, math.ceil(width / step - 1e-9))
+
+
 @dataclass(frozen=True)
 class ResolutionCells:
-    """The grid of resolution cells that fills a field of view: `resolution_cells` builds it.
+    """The grid of resolution cells that fills a field of view.
 
-    By axis the number of cells, and the first edge and width of the field of view.
+    By axis the number of cells, and the first edge and width of the field of view. Where there is
+    a remainder the cells of an axis are equally a little smaller.
     """
 
     azimuth: int
@@ -32,70 +41,32 @@ class ResolutionCells:
     elevation_rad: tuple[float, float]
     range_m: tuple[float, float]
 
+    @classmethod
+    def filling(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
+        """Return the grid of cells (rad, rad, m) of a reach, or refuse over 1e15 of them."""
+        across_rad, upward_rad = reach.width_rad
+        depth_m = reach.range_max_m - nearest_m
+        widths = (across_rad, upward_rad, depth_m)
+        azimuth, elevation, depth = map(steps_across, widths, cell)
+        cells = cls(
+            azimuth,
+            elevation,
+            depth,
+            azimuth_rad=(reach.azimuth_rad[0], across_rad),
+            elevation_rad=(reach.elevation_rad[0], upward_rad),
+            range_m=(nearest_m, depth_m),
+        )
+        if cells.count > MOST_CELLS:
+            raise ValueError(
+                f"the field of view has {cells.count:g} resolution cells: it must have at most "
+                "1e15; make the cells larger"
+            )
+        return cells
+
     @property
     def count(self) -> int:
         """Number of resolution cells."""
         return self.azimuth * self.elevation * self.range
-
-
-def resolution_cells(
-    *,
-    azimuth_width_rad: float,
-    lowest_elevation_rad: float,
-    highest_elevation_rad: float,
-    nearest_m: float,
-    farthest_m: float,
-    azimuth_cell_rad: float,
-    elevation_cell_rad: float,
-    range_cell_m: float,
-    azimuth_start_rad: float = 0.0,
-) -> ResolutionCells:
-    """Return the grid of resolution cells of a field of view, or refuse over 1e15 of them.
-
-    A remainder counts as a cell; the cells of an axis are then made equally a little smaller, so
-    that they fill the field of view, which runs clockwise from its start.
-    """
-    values = {
-        "azimuth_cell_rad": azimuth_cell_rad,
-        "elevation_cell_rad": elevation_cell_rad,
-        "range_cell_m": range_cell_m,
-        "azimuth_width_rad": azimuth_width_rad,
-    }
-    for name, value in values.items():
-        positive(name, value)
-    if not azimuth_width_rad <= 2.0 * math.pi * (1.0 + 1e-12):
-        raise ValueError(f"azimuth_width_rad is {azimuth_width_rad:g}: it must be at most 2π")
-    if not lowest_elevation_rad <= highest_elevation_rad:
-        raise ValueError(
-            f"highest_elevation_rad is {highest_elevation_rad:g}: it must be at least "
-            f"lowest_elevation_rad, {lowest_elevation_rad:g}"
-        )
-    if not (0.0 <= nearest_m < farthest_m and math.isfinite(farthest_m)):
-        raise ValueError(
-            f"farthest_m is {farthest_m:g}: it must be finite and above nearest_m, {nearest_m:g}, "
-            "which must be 0 or more"
-        )
-    widths = (
-        (azimuth_width_rad, azimuth_cell_rad),
-        (highest_elevation_rad - lowest_elevation_rad, elevation_cell_rad),
-        (farthest_m - nearest_m, range_cell_m),
-    )
-    # A width that is a whole number of cells up to rounding has that many.
-    counts = [max(1, math.ceil(width / cell - 1e-9)) for width, cell in widths]
-    cells = ResolutionCells(
-        azimuth=counts[0],
-        elevation=counts[1],
-        range=counts[2],
-        azimuth_rad=(azimuth_start_rad, widths[0][0]),
-        elevation_rad=(lowest_elevation_rad, widths[1][0]),
-        range_m=(nearest_m, widths[2][0]),
-    )
-    if cells.count > MOST_CELLS:
-        raise ValueError(
-            f"the field of view has {cells.count:g} resolution cells: it must have at most 1e15; "
-            "make the cells larger"
-        )
-    return cells
 
 
 #: Keys of a cell's size, which come before the grid step: what is told apart is seldom as fine as
@@ -184,7 +155,6 @@ def cell_size(parameters: Any) -> tuple[float, float, float]:
 def cells_of_radar(block: Any) -> ResolutionCells:
     """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
     p = block.p
-    azimuth_rad, elevation_rad, range_m = cell_size(p)
     if p.sizeless_steps:
         raise ValueError(
             f"{p.sizeless_steps[0]} is 0: false alarms are counted by resolution cells, it must "
@@ -199,17 +169,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
             f"range_km is {p.range_km:g}: it must be above the minimum range, "
             f"{block.budget.nearest_m / 1000:g} km"
         )
-    return resolution_cells(
-        azimuth_start_rad=block.reach.azimuth_rad[0],
-        azimuth_width_rad=block.reach.width_rad[0],
-        lowest_elevation_rad=block.reach.elevation_rad[0],
-        highest_elevation_rad=block.reach.elevation_rad[1],
-        nearest_m=block.budget.nearest_m,
-        farthest_m=block.reach.range_max_m,
-        azimuth_cell_rad=azimuth_rad,
-        elevation_cell_rad=elevation_rad,
-        range_cell_m=range_m,
-    )
+    return ResolutionCells.filling(block.reach, block.budget.nearest_m, cell_size(p))
 
 
 class Merging:

@@ -8,12 +8,11 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from components.arguments.checks import positive
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
-from components.radar.resolution import ResolutionParameters
+from components.radar.resolution import ResolutionParameters, steps_across
 from dsa_des.block.effect import Effect, Hook, Verdict
 
-# A width that is a whole number of steps up to rounding has that many; likewise pulses in a dwell.
+# A dwell that is a whole number of pulses up to rounding has that many.
 _ROUNDING = 1e-9
 
 
@@ -23,6 +22,23 @@ class BeamPositions:
 
     azimuth: int
     elevation: int
+
+    @classmethod
+    def searching(
+        cls, width_rad: tuple[float, float], beamwidth_rad: tuple[float, float], spacing: float
+    ) -> Self:
+        """Return the beam positions that search a field of view, `spacing` beamwidths apart.
+
+        The number of beams is the solid angle searched over that of a beam, ``n_B = (Θ_A Θ_E) /
+        (θ_a θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z. Elsherbeni,
+        *MATLAB Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65. Here each
+        axis is rounded up to whole beams, as a radar steps them. A beam that sweeps goes through
+        one column of beams after the other, so that it lights an azimuth once per scan. At an
+        elevation ε beams one step of azimuth apart overlap by 1 - cos ε more; nobody saves beams
+        by it.
+        """
+        axes = zip(width_rad, beamwidth_rad, strict=True)
+        return cls(*(steps_across(width, spacing * beam) for width, beam in axes))
 
     @property
     def count(self) -> int:
@@ -36,35 +52,6 @@ class BeamPositions:
     def highest_rate_hz(self, dwell_s: float) -> float:
         """Return the scan rate at which each beam has so much time and no more, Hz."""
         return 1.0 / (dwell_s * self.count)
-
-
-def beam_positions(
-    *,
-    azimuth_width_rad: float,
-    elevation_width_rad: float,
-    azimuth_beamwidth_rad: float,
-    elevation_beamwidth_rad: float,
-    spacing: float = 1.0,
-) -> BeamPositions:
-    """Return the beam positions that search a field of view, `spacing` beamwidths apart.
-
-    The number of beams is the solid angle searched over that of a beam, ``n_B = (Θ_A Θ_E) / (θ_a
-    θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z. Elsherbeni, *MATLAB
-    Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65. Here each axis is
-    rounded up to whole beams, as a radar steps them. A beam that sweeps goes through one column of
-    beams after the other, so that it lights an azimuth once per scan. At an elevation ε beams one
-    step of azimuth apart overlap by 1 - cos ε more; nobody saves beams by it.
-    """
-    counts = []
-    for name, width, beam in (
-        ("azimuth", azimuth_width_rad, azimuth_beamwidth_rad),
-        ("elevation", elevation_width_rad, elevation_beamwidth_rad),
-    ):
-        positive(f"{name}_width_rad", width)
-        positive(f"{name}_beamwidth_rad", beam)
-        positive("spacing", spacing)
-        counts.append(max(1, math.ceil(width / (spacing * beam) - _ROUNDING)))
-    return BeamPositions(*counts)
 
 
 def pulses_in(dwell_s: float, prf_hz: float) -> int:
@@ -185,14 +172,10 @@ class TimeBudgetParameters(ResolutionParameters):
         """The beam positions of a scan over the field of view, where beamwidths are given."""
         if self.azimuth_beamwidth_deg is None or self.elevation_beamwidth_deg is None:
             return None
-        across_rad, upward_rad = self.reach().width_rad
-        return beam_positions(
-            azimuth_width_rad=across_rad,
-            elevation_width_rad=upward_rad,
-            azimuth_beamwidth_rad=math.radians(self.azimuth_beamwidth_deg),
-            elevation_beamwidth_rad=math.radians(self.elevation_beamwidth_deg),
-            spacing=self.beam_spacing,
-        )
+        beamwidth_rad = (
+            math.radians(self.azimuth_beamwidth_deg), math.radians(self.elevation_beamwidth_deg),
+        )  # fmt: skip
+        return BeamPositions.searching(self.reach().width_rad, beamwidth_rad, self.beam_spacing)
 
     @property
     def stated_dwell_s(self) -> float | None:

@@ -15,7 +15,7 @@ from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import enu_to_geodetic
-from components.traffic.flown_together import AllFlown
+from components.traffic.flown_flights import FlightsOfRuns
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from components.traffic.wires import OverheadWire
@@ -190,7 +190,7 @@ class ScriptedTraffic(TrafficSource):
         self.targets = _intruders(crafts, reference, self.wind)
         self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 
-    def flown_of(self, parameters: Sequence[Any]) -> AllFlown | None:
+    def flown_of(self, parameters: Sequence[Any]) -> FlightsOfRuns | None:
         """Return the flights of replicas with these parameters, where all only fly straight on."""
         if self.wind is not None:
             return None
@@ -206,7 +206,7 @@ class ScriptedTraffic(TrafficSource):
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         starts = _start_positions(crafts, references)
         ownships, targets = _starts(own, places, None), _starts(crafts, starts, None)
-        return AllFlown(ownships.fleet(), targets.fleet(), roster)
+        return FlightsOfRuns(ownships.fleet(), targets.fleet(), roster)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

@@ -1,7 +1,8 @@
 """The base class of traffic sources: states at the instants that sensors ask for."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -27,19 +28,29 @@ from components.flights.closest_approach import (
     closest_approaches,
     present_together_s,
 )
-from components.flights.culling import Culling, SteeredCulling, range_between
-from components.flights.fleet import Fleet
-from components.flights.steered_flight import SteeredFlight
+from components.flights.culling import SteeredCulling, near_intervals
+from components.flights.fleet import Fleet, Trajectory
+from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.geometry import TrajectoryState
-from components.messages.reach import FarthestLook, farthest_look
+from components.messages.known_flights import KnownFlights
+from components.messages.reach import farthest_look
+from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates, TrueStates
-from components.traffic.flown_together import FlownTogether, flown_by
-from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
+from components.traffic.flown_flights import (
+    Coming,
+    FlightsOfRuns,
+    FlownFlights,
+    arrived_manoeuvres,
+    due_manoeuvres,
+    flights_of_runs,
+    steered,
+)
 from components.traffic.wind_effect import ATTITUDE
+from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Output, Parameters, PositiveRational
+from dsa_des.block.component import Component, Context, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
-from dsa_des.block.wake import ReplicaRuns, Wake
+from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 
@@ -54,15 +65,47 @@ class SourceParameters(Parameters):
     )
 
 
-class TrafficSource(SteeredOwnship):
+#: The truth is recorded without being asked for where aircraft times seconds, of all runs that are
+#: recorded together, are at most this: some ten thousand rows with the usual sensors.
+SMALL_S = 600.0
+_TABLE = "truth"
+
+
+def truth_is_recorded(context: Context, targets: int) -> bool:
+    """Return whether a scene records where all aircraft are.
+
+    Where tables are chosen, as a study chooses those that its metrics read, that one is among them
+    or it is not made.
+
+    How often sensors look does not count: replicas whose clocks differ record the same tables.
+    """
+    record = context.sections.get("record")
+    asked = "auto" if record is None else record.truth
+    if context.recorded_tables is not None:
+        return asked is not False and _TABLE in context.recorded_tables
+    if asked == "auto":
+        seconds = context.recorded_runs * float(context.duration_s)
+        return (1 + targets) * seconds <= SMALL_S
+    return bool(asked)
+
+
+class TrafficSource(Component):
     """Publishes where the ownship and its targets are.
 
     When manoeuvres are wired to it, its ownship flies them from the time they come.
 
-    Subclasses set `own`, `targets` and `roster` in `setup`, and say at which times their data hold
-    samples.
+    Subclasses set `own`, `targets` and `roster` when they are made, and say at which times their
+    data hold samples.
     """
 
+    inputs = {
+        "manoeuvres": Input(
+            Manoeuvres,
+            "queued",
+            "Turns and climbs that the ownship is told to fly.",
+            required=False,
+        )
+    }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
     Parameters: ClassVar[Any] = SourceParameters
     windowed = True
@@ -70,9 +113,15 @@ class TrafficSource(SteeredOwnship):
     clocked = "demand"
     hooks = (ATTITUDE,)
 
+    own: Trajectory
+    targets: Fleet
     roster: Roster
     also_records = (TrueStates,)
     _offered: KnownTraffic | None = None
+
+    def serves_replicas(self) -> bool:
+        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        return super().serves_replicas() and not self.context.producers
 
     @property
     def wind(self) -> Wind | None:
@@ -108,18 +157,39 @@ class TrafficSource(SteeredOwnship):
     def setup(self) -> None:
         """Learn how far sensors look; what stays beyond it is not moved."""
         self._check_terrain(self.own.at)
+        self._look = farthest_look(c.request for c in self.context.consumers)
+        #: Whether the truth is recorded.
+        self.says_truth = truth_is_recorded(self.context, len(self.roster))
+        flights = FlightsOfRuns(fleet_of([self.own]), self.targets, self.roster)
+        self._fly(flights, [self.p.update_rate_hz])
+        if self.context.producers:
+            self.own = SteeredFlight(self.own, self._flown.own)
+
+    def _fly(self, flights: FlightsOfRuns, rates_hz: Sequence[Any]) -> None:
+        """Take the flights of all runs, of which this one is the first, and how they publish."""
+        self.roster = flights.roster
+        self._flown = FlownFlights(
+            SteeredFleet(flights.own),
+            flights.targets,
+            self.built(ATTITUDE),
+            rates_hz=None if None in rates_hz else np.array(rates_hz, dtype=np.float64),
+        )
+        #: Manoeuvres that have come, and are not flown by any row yet.
+        self._pending: list[Coming] = []
         self._all_columns = np.arange(len(self.roster))
-        self._crabbing = self.built(ATTITUDE)
         #: The targets that were moved last, and their fleet.
         self._moved: tuple[IntArray, Fleet] = self._all_columns, self.targets
-        self._steered_culling: SteeredCulling | None = None
-        self._culled_around: Any = None
-        look = farthest_look(c.request for c in self.context.consumers)
-        self.flights_asked_for = look.lasts_s > 0.0
-        if not self.context.simulate_everything and self.clock_of(self.p) is None:
-            self._cull(look)
-        self.says_truth = truth_is_recorded(self.context, len(self.roster))
-        self._be_steered()
+        self._epochs: SteeredCulling | None = None
+        reach_m, lasts_s = self._look.range_m, self._look.lasts_s
+        culls = not self.context.simulate_everything and self.clock_of(self.p) is None
+        if not culls or not math.isfinite(reach_m):
+            return
+        if not self.context.producers:
+            end_s = float(self.context.duration_s) + lasts_s
+            found = near_intervals(flights.own, flights.targets, reach_m, end_s)
+            self._flown = replace(self._flown, intervals=found)
+        elif lasts_s == 0.0:
+            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m)
 
     def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
@@ -129,73 +199,60 @@ class TrafficSource(SteeredOwnship):
         if terrain is not None and terrain.raster is not None:
             check_on_raster(own_at, terrain.raster.raster, terrain.raster_offset_m, end_s)
 
-    def _cull(self, look: FarthestLook) -> None:
-        """Learn which targets matter, where it is known how far sensors look."""
-        if not math.isfinite(look.range_m):
-            return
-        if not self.context.producers:
-            end_s = float(self.context.duration_s)
-            self._culling = Culling(self.own, self.targets, look.range_m, end_s, look.lasts_s)
-        elif not self.flights_asked_for:
-            own_mps = np.array([self.own.max_speed_mps])
-            targets_mps = self.targets.max_speeds_mps[np.newaxis]
-            self._steered_culling = SteeredCulling(own_mps, targets_mps, look.range_m)
-
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Do what can be done at once for blocks with these parameters, which will be made."""
 
-    def together(self, replicas: ReplicaRuns) -> FlownTogether | None:
-        """Return what flies the flights of all replicas."""
+    def together(
+        self, parameters: Sequence[Any], make: Callable[[int], Component]
+    ) -> "TrafficSource | None":
+        """Return what flies the flights of all runs."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
         asked = self._offered is not None and self._offered.asked
-        if asked or self._crabbing:
+        if asked or self.built(ATTITUDE):
             return None
-        flown = flown_by(self, replicas)
+        flights = flights_of_runs(self, parameters, make)
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
-        if flown is None or (allows and flown.roster is not self.roster):
+        if flights is None or (allows and flights.roster is not self.roster):
             return None
         # A flight into the ground is said of its own replica, by itself.
-        for number in range(len(replicas)):
-            self._check_terrain(partial(_one_of, flown.own, number))
-        rates = [p.update_rate_hz for p in replicas.parameters]
-        published = None not in rates
-        return FlownTogether(self, flown, np.array(rates, dtype=np.float64) if published else None)
+        for number in range(len(parameters)):
+            self._check_terrain(partial(_one_of, flights.own, number))
+        found = copy(self)
+        found._fly(flights, [p.update_rate_hz for p in parameters])
+        return found
 
     @property
     def width(self) -> int:
         """Most targets that are moved at one time."""
-        if self._culling is None:
-            return len(self.roster)
-        return self._culling.intervals.most_at_once()
+        intervals = self._flown.intervals
+        return len(self.roster) if intervals is None else intervals.most_at_once()
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
-        culling = self._culling or self._steered_culling
-        if culling is None:
+        if self._flown.intervals is None and self._epochs is None:
             return []
-        reach_km = culling.reach_m / 1000.0
+        reach_km = self._look.range_m / 1000.0
         return [f"targets beyond {reach_km:.2f} km: not moved, no sensor looks farther"]
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        flights, truth = self._steer(wake)
+        # Flights that all runs share are those of one.
+        run = no_runs(len(wake)) if len(self._flown.own) == 1 else wake.run
         time_s = wake.time_s
-        columns, near = self._near(time_s)
-        if not np.array_equal(columns, self._moved[0]):
-            self._moved = columns, self.targets.subset(columns)
-        states = self._moved[1].at(time_s)
-        own = self.own_at(time_s)
-        for crabbing in self._crabbing:
-            times = np.broadcast_to(time_s[:, np.newaxis], states.lat_deg.shape)
-            states = crabbing.of_targets(columns, states, times)
+        known = self._steer(wake, run)
+        own = self._flown.own_at(run, time_s)
+        columns, near = self._near(run, time_s)
+        states = self._targets_at(run, columns, time_s)
         present = states.present & own.present[:, np.newaxis]
         culled = None
         if near is not None:
             present &= near
             culled = len(self._all_columns) - near.sum(axis=1)
+        asked = self._look.lasts_s > 0.0
+        truth = replace(self._flown, intervals=None, rates_hz=None) if self.says_truth else None
         return TrafficStates.of(
             wake.ticks,
             own,
@@ -204,33 +261,64 @@ class TrafficSource(SteeredOwnship):
             roster=self.roster,
             columns=columns,
             culled=culled,
-            flights=flights,
-            true_flights=truth,
+            flights=KnownFlights(self._flown, run, known) if asked else None,
+            true_flights=None if truth is None else KnownFlights(truth, run, known),
             run_time_s=None if truth is None else time_s,
         )
 
-    def _near(self, time_s: FloatArray) -> tuple[IntArray, BoolArray | None]:
-        """Return which targets may come in reach, and when (rows, targets); None for always."""
-        if self._steered_culling is not None:
-            assert isinstance(self.own, SteeredFlight)
-            if self.own is not self._culled_around:
-                self._culled_around = self.own
-                self._steered_culling.forget(np.zeros(1, dtype=np.int64))
-            run, told_mps = np.zeros(len(time_s), dtype=np.int64), self.own.fastest_by(time_s)
-            near = self._steered_culling.near(run, time_s, told_mps, self._range_m)
-            columns = np.flatnonzero(near.any(axis=0))
-            return columns, near[:, columns]
-        if self._culling is None:
-            return self._all_columns, None
-        columns = self._culling.active(float(time_s.min()), float(time_s.max()))
-        return columns, self._culling.near(columns, time_s)
+    def _steer(self, wake: Wake, run: IntArray) -> IntArray:
+        """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
+        self._pending += arrived_manoeuvres(wake)
+        if not self._pending:
+            return self._flown.own.manoeuvre_count[run]
+        due, self._pending = due_manoeuvres(wake, self._pending)
+        own, known = steered(self._flown.own, due, wake, run)
+        self._flown = replace(self._flown, own=own)
+        if self._epochs is not None:
+            self._epochs.forget(np.array([one.run for one in due], dtype=np.int64))
+        assert isinstance(self.own, SteeredFlight)
+        self.own = SteeredFlight(self.own.flight, own)
+        return known
 
-    def _range_m(self, _: IntArray, target: IntArray, time_s: FloatArray) -> FloatArray:
-        return range_between(self.own.at, self.targets.each, target, time_s)
+    def _near(self, run: IntArray, time_s: FloatArray) -> tuple[IntArray, BoolArray | None]:
+        """Return which targets may come in reach, and when (rows, targets); None for always."""
+        flown, lasts_s, columns = self._flown, self._look.lasts_s, self._all_columns
+        if self._epochs is not None:
+            near = self._epochs.near(flown.own, run, time_s)
+            if len(flown.own) == 1:
+                columns = np.flatnonzero(near.any(axis=0))
+            return columns, near[:, columns]
+        if flown.intervals is None:
+            return columns, None
+        if len(flown.own) == 1:
+            columns = flown.intervals.during(float(time_s.min()), float(time_s.max()) + lasts_s)
+            return columns, flown.intervals.near(columns, time_s, lasts_s)
+        each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
+        times = np.repeat(time_s, len(columns))
+        found = flown.intervals.holds(each, times, times + lasts_s)
+        return columns, found.reshape(len(time_s), len(columns))
+
+    def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return the states (rows, columns) of targets of each row's run."""
+        flown, shape = self._flown, (len(time_s), len(columns))
+        state: TrajectoryState | None = None
+        if len(flown.own) == 1:
+            if not np.array_equal(columns, self._moved[0]):
+                self._moved = columns, flown.targets.subset(columns)
+            state = self._moved[1].at(time_s)
+            if not flown.crabbing:
+                return state
+            state = state.reshaped((-1,))
+        each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
+        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshaped(shape)
+
+    def own_at(self, time_s: FloatArray) -> TrajectoryState:
+        """Return the ownship's state, as it is known now, at times (n,), in wind."""
+        return self._flown.own_at(np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: the truth where a scene is small, or asks for it."""
-        return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
+        return [TrafficStates, TrueStates] if self.says_truth else [TrafficStates]
 
     def sample_times(self) -> list[SampleTimes]:
         """Return the times at which the source itself knows ownship and targets.

@@ -8,50 +8,31 @@ from typing import Any
 import numpy as np
 
 from components.flights.attitude import Wind, attitude_in_wind, scene_wind
-from components.flights.fleet import Fleet
-from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.flights.steered_flight import SteeredFlight
 from components.geometry import TrajectoryState
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Crabbing:
     """Turns attitudes that follow from paths over the ground into those in wind."""
 
-    def __init__(self, wind: Wind, targets: Fleet) -> None:
-        self._wind, self._targets = wind, targets
+    def __init__(self, wind: Wind) -> None:
+        self._wind = wind
 
-    def of_own(self, flight: Any, state: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
-        """Return the ownship's state (any shape) in wind."""
-        speed = ground_speeds(flight, time_s)
-        base = flight.flight if isinstance(flight, SteeredFlight) else flight
-        fixed = getattr(base, "fixed_attitude_rad", (None, None, None))
-        if isinstance(flight, SteeredFlight) and flight.parts:
-            # A fixed attitude is that of the flight as written; manoeuvres fly by their own.
-            before = np.asarray(time_s) < flight.parts[0][0]
-        else:
-            before = np.ones(np.shape(time_s), dtype=bool)
-        keep = np.stack([before & (angle is not None) for angle in fixed])
-        return self._crabbed(state, speed, keep)
-
-    def of_targets(
-        self, columns: IntArray, states: TrajectoryState, time_s: FloatArray
+    def __call__(
+        self, state: TrajectoryState, speed_mps: FloatArray, fixed_rad: FloatArray
     ) -> TrajectoryState:
-        """Return the states (rows, columns) of some targets in wind, at times (rows, columns)."""
-        fleet, shape = self._targets, time_s.shape
-        if not isinstance(fleet, ScriptedFleet):
-            return states
-        each = np.broadcast_to(columns, shape).reshape(-1)
-        speed = fleet.ground_speeds_mps(each, time_s.reshape(-1)).reshape(shape)
-        fixed = ~np.isnan(fleet.fixed_rad[:, np.newaxis, columns])
-        return self._crabbed(states, speed, np.broadcast_to(fixed, (3, *shape)))
+        """Return states (n,) in wind, by speeds over ground (n,), NaN where they are not known.
 
-    def _crabbed(self, state: TrajectoryState, speed: FloatArray, keep: Any) -> TrajectoryState:
+        Fixed angles (3, n) stay; NaN where the motion gives them.
+        """
+        if not np.isfinite(speed_mps).any():
+            return state
+        keep = ~np.isnan(fixed_rad)
         # Where the yaw is fixed, the track is not known from it, and nothing can be derived.
-        speed = np.where(keep[0], np.nan, speed)
+        speed_mps = np.where(keep[0], np.nan, speed_mps)
         yaw, pitch, roll = attitude_in_wind(
-            state.yaw_rad, state.pitch_rad, state.roll_rad, speed, self._wind
+            state.yaw_rad, state.pitch_rad, state.roll_rad, speed_mps, self._wind
         )
         return replace(
             state,
@@ -86,18 +67,4 @@ class CrabAngles(Effect[Crabbing]):
         """Return what turns the noses."""
         wind = scene_wind(block.context.sections["weather"])
         assert wind is not None
-        return Crabbing(wind, block.targets)
-
-
-def ground_speeds(flight: Any, time_s: FloatArray) -> FloatArray:
-    """Return a flight's ground speed at some times (any shape), m/s; NaN where it is no script."""
-    times = np.asarray(time_s, dtype=np.float64)
-    if isinstance(flight, SteeredFlight):
-        speed = ground_speeds(flight.flight, times)
-        for start_s, part in flight.parts:
-            speed = np.where(times >= start_s, ground_speeds(part, times), speed)
-        return speed
-    if not isinstance(flight, ScriptedTrajectory):
-        return np.full(times.shape, np.nan)
-    one: IntArray = np.zeros(times.size, dtype=np.int64)
-    return flight.as_fleet.ground_speeds_mps(one, times.reshape(-1)).reshape(times.shape)
+        return Crabbing(wind)

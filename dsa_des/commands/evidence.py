@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from dsa_des.commands.study import check_workers, report_crashes, run_into
+from dsa_des.commands.study import check_workers, report_crashes, run_into, target_of
 from dsa_des.errors import UsageError
 from dsa_des.evidence.case import ASSESSED, read_case
 from dsa_des.evidence.figures import draw_convergence, draw_sensitivity
@@ -12,7 +12,7 @@ from dsa_des.evidence.inputs import files_of_case
 from dsa_des.evidence.pack import INPUTS, MACHINE, PAGE, STUDIES, Pack
 from dsa_des.evidence.page import evidence_page
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_names import check_place, named, why_not_written
+from dsa_des.files.output_names import check_place, why_not_written
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
@@ -20,10 +20,12 @@ from dsa_des.studies.runner import tables_of
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shell_line
 
+_HOME = Path("packs")
+
 
 def evidence_command(
     case: str,
-    out: str,
+    out: str | None,
     sets: tuple[str, ...],
     encounters: int | None,
     workers: int | None,
@@ -33,17 +35,24 @@ def evidence_command(
     check_workers(workers)
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
-    found = read_case(chosen_file(case, "case"), sets, encounters)
-    target = named(out)
-    check_place(target)
-    if target.is_dir() and any(target.iterdir()) and not resume:
-        raise UsageError(f"--out {target}: is not empty; --resume continues a pack")
-    words = ["dsa-des", "evidence", "--resume", "--out", out]
+    path = chosen_file(case, "case")
+    found = read_case(path, sets, encounters)
+    place = target_of(_HOME, path.stem, out, resume)
+    if isinstance(place, Path):
+        check_place(place)
+        if place.is_dir() and any(place.iterdir()) and not resume:
+            raise UsageError(f"--out {place}: is not empty; --resume continues a pack")
+    try:
+        inputs = files_of_case(found).copies()
+    except OSError as error:
+        raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    target = place if isinstance(place, Path) else place()
+    words = ["dsa-des", "evidence", "--resume", "--out", str(target)]
     words += [word for one in sets for word in ("--set", one)]
     words += ["--encounters", str(encounters)] if encounters else []
     again = shell_line([*words, case])
     try:
-        for name, content in files_of_case(found).copies().items():
+        for name, content in inputs.items():
             _write(target / INPUTS / name, content)
     except OSError as error:
         why = why_not_written(error, target)

@@ -11,6 +11,7 @@ from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import named
 from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.running.grain import grain_of
 from dsa_des.scene.graph import depths
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
@@ -58,7 +59,7 @@ def _print_table(scene: Scene) -> None:
     from rich.table import Table
 
     depth = depths(scene.graph)
-    windowed = scene.look_ahead_blocks()
+    windowed = grain_of(scene, None).windowed
     table = Table(title=f"{shortened(scene.title)}: blocks in the order they run within an instant")
     for heading in ("depth", "block", "type", "runs", "fed by"):
         table.add_column(heading)

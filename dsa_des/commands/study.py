@@ -62,7 +62,7 @@ def study_command(
     def again(folder: Path) -> str:
         return _resume_command(name, folder, sets, workers, executor, scheduler)
 
-    target = _target(described, out, resume)
+    target = target_of(_HOME, described.path.stem, out, resume)
     folder = run_into(described, target, workers, resume, executor, scheduler, again)
     try:
         tables = finish(
@@ -95,17 +95,16 @@ def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
     show_study(Path(folder), draw=not no_figures, as_json=as_json)
 
 
-def _target(study: Study, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
-    """Return the study's folder, or how to make a new one when all is well."""
-    stem = study.path.stem
+def target_of(home: Path, stem: str, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
+    """Return the folder that --out names, or the latest to go on with, or what makes a new one."""
     if out is not None:
         return named(out)
     if resume:
-        earlier = latest_folder(_HOME, stem)
+        earlier = latest_folder(home, stem)
         if earlier is None:
-            raise UsageError(f"--resume: there is no {_HOME / stem}-NNN to continue")
+            raise UsageError(f"--resume: there is no {home / stem}-NNN to continue")
         return earlier
-    return lambda: claim_folder(_HOME, stem)
+    return lambda: claim_folder(home, stem)
 
 
 def _resume_command(

@@ -21,12 +21,12 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, ends_its_run
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
-from dsa_des.block.foreign_calls import error_at, must_pass
+from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message
-from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node
-from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation, block_failure
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire as WireOfScene
@@ -245,9 +245,9 @@ class HostDriven:
         scans: dict[str, int] = {}
         missed: dict[str, int] = {}
         for name, cursor in self._cursors.items():
-            found = cursor.due(tick)
-            if found is not None:
-                scans[name], late = found
+            due = cursor.due(tick)
+            if due is not None:
+                scans[name], late = due
                 if late:
                     missed[name] = late
         return Step(tick, scans, missed)
@@ -292,7 +292,8 @@ class HostDriven:
             except BaseException as error:
                 if must_pass(error):
                     raise
-                raise self._failure(runner, step, error) from error
+                time_s = tick / self.ticks_per_s
+                raise block_failure(runner.component, time_s, error, scan) from error
             if result is None:
                 continue
             if isinstance(result, Message):
@@ -303,11 +304,6 @@ class HostDriven:
                     given.check()
                     sent[runner.name, output] = given
         return step
-
-    def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
-        reason = error_at(error, type(runner.component))
-        path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
-        return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
 
 
 def _last_row(message: Message) -> IntArray:
@@ -324,23 +320,23 @@ def _rows_of(
 
 def _refusals(scene: Scene, source: str) -> list[Problem]:
     """Say what of a scene needs an event queue."""
-    found: list[tuple[str, str]] = []
+    refusals: list[tuple[str, str]] = []
     looped = in_cycles(scene.graph)
     if looped:
-        found.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
+        refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
     for wire in scene.wires:
         if wire.delayed or wire.jitter_s or wire.drop_probability:
-            found.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
+            refusals.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
     for name, block in scene.blocks.items():
         if block.options.processor is not None:
             message = f"its messages queue for processor {block.options.processor!r}"
-            found.append((f"blocks.{name}", message))
+            refusals.append((f"blocks.{name}", message))
         if block.cls.process is not None:
-            found.append((f"blocks.{name}", "it has a process of its own"))
+            refusals.append((f"blocks.{name}", "it has a process of its own"))
         if ends_its_run(block.cls):
-            found.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
+            refusals.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
         fed = any(port.required for port in block.cls.inputs.values())
         if not fed and name != source:
-            found.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
+            refusals.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
     why = "; a host drives an open-loop scene only: every message at the instant of the call"
-    return [Problem(str(scene.path), key, message + why) for key, message in found]
+    return [Problem(str(scene.path), key, message + why) for key, message in refusals]

@@ -65,7 +65,7 @@ def run(
         loaded,
         target,
         simulate_everything=simulate_everything,
-        told=False,
+        say_notes=False,
         progress=progress,
     )
     return read_run(target.path)

@@ -1,4 +1,4 @@
-"""Attempts that may fail without spoiling what is done: a summary, a figure of a run."""
+"""Where recorded rows go: into memory or to observers; attempts that may fail and end no run."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, Protocol

@@ -132,8 +132,8 @@ def _each_changed(
                 problems.append(_problem(scene, key, f"is no key of this scene{hint}", value))
         except ValidationError as error:
             file = SceneFile(scene.path, {})
-            for found in explain(file, (), key, BlockOptions, error):
-                problems.append(_problem(scene, key, found.message, value))
+            for problem in explain(file, (), key, BlockOptions, error):
+                problems.append(_problem(scene, key, problem.message, value))
         except (ValueError, LookupError, TypeError) as error:
             problems.append(_problem(scene, key, str(error), value))
     return blocks, sections, duration
@@ -193,8 +193,8 @@ def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
-        place, rest = item_of(items, path)
-        items[place] = _changed(items[place], rest, value)
+        index, rest = item_of(items, path)
+        items[index] = _changed(items[index], rest, value)
         return items
     if isinstance(old, dict):
         return {**old, first: _changed(old.get(first), rest, value)}
@@ -224,8 +224,8 @@ def _changed_together(old: Any, changes: Mapping[tuple[str | int, ...], Any]) ->
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
-        for place, mine in parts.items():
-            items[place] = _changed_together(items[place], mine)
+        for index, mine in parts.items():
+            items[index] = _changed_together(items[index], mine)
         return items
     if isinstance(old, dict):
         return {**old, **{n: _changed_together(old.get(n), mine) for n, mine in parts.items()}}
@@ -238,7 +238,7 @@ def item_of(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[s
     Names may hold the dots at which the path was split.
     """
     for length in range(len(path), 0, -1):
-        place = place_of(items, ".".join(map(str, path[:length])))
-        if place is not None:
-            return place, path[length:]
+        index = place_of(items, ".".join(map(str, path[:length])))
+        if index is not None:
+            return index, path[length:]
     raise ValueError(no_item(items, str(path[0])))

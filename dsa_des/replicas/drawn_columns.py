@@ -71,20 +71,20 @@ class ReplicaScenes(Sequence[Scene]):
         return len(self.seeds)
 
     @overload
-    def __getitem__(self, place: int) -> Scene: ...
+    def __getitem__(self, index: int) -> Scene: ...
 
     @overload
-    def __getitem__(self, place: slice) -> "ReplicaScenes": ...
+    def __getitem__(self, index: slice) -> "ReplicaScenes": ...
 
-    def __getitem__(self, place: int | slice) -> "Scene | ReplicaScenes":
-        if isinstance(place, slice):
-            columns = [replace(column, values=column.values[place]) for column in self._drawn]
-            return ReplicaScenes(self._scene, self.seeds[place], columns)
+    def __getitem__(self, index: int | slice) -> "Scene | ReplicaScenes":
+        if isinstance(index, slice):
+            columns = [replace(column, values=column.values[index]) for column in self._drawn]
+            return ReplicaScenes(self._scene, self.seeds[index], columns)
         blocks = dict(self._scene.blocks)
         for name in {column.block for column in self._drawn}:
-            parameters = self._parameters_of(name, place)
+            parameters = self._parameters_of(name, index)
             blocks[name] = replace(blocks[name], parameters=parameters)
-        return replace(self._scene, seed=self.seeds[place], blocks=blocks)
+        return replace(self._scene, seed=self.seeds[index], blocks=blocks)
 
     def parameters_of(self, block: str) -> list[Any]:
         """Return a block's parameters in every replica."""
@@ -112,8 +112,8 @@ def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
         parts.setdefault(path[0], {})[path[1:]] = value
     if not isinstance(old, BaseModel):
         items = list(old)
-        for place, mine in parts.items():
-            items[place] = mine[()] if () in mine else _with(items[place], mine)
+        for index, mine in parts.items():
+            items[index] = mine[()] if () in mine else _with(items[index], mine)
         return type(old)(items)
     fields = {name: old.__dict__[name] for name in type(old).model_fields}
     for name, mine in parts.items():
@@ -142,8 +142,6 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
         return None
     try:
         columns = {key: _column(scene, key, [r.changes[key] for r in replicas]) for key in keys}
-        if len({(column.block, column.path) for column in columns.values()}) < len(columns):
-            return None
         seeds = [replica.seed for replica in replicas]
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
         made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]
@@ -201,11 +199,11 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
                 return tuple(found), model, name
         elif type(old) in (list, tuple):
             try:
-                place, path = item_of(old, path)
+                index, path = item_of(old, path)
             except ValueError:
                 raise _NoColumn from None
-            found.append(place)
-            old = old[place]
+            found.append(index)
+            old = old[index]
         else:
             break
     raise _NoColumn
@@ -316,8 +314,8 @@ def _validated(old: Any, paths: Sequence[Path]) -> Any:
         parts.setdefault(path[0], []).append(path[1:])
     if not isinstance(old, BaseModel):
         items = list(old)
-        for place, mine in parts.items():
-            items[place] = _validated(items[place], mine)
+        for index, mine in parts.items():
+            items[index] = _validated(items[index], mine)
         return items
     given = {name: getattr(old, name) for name in old.model_fields_set | parts.keys()}
     for name, mine in parts.items():

@@ -13,20 +13,18 @@ from typing import Any
 
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
-from dsa_des.block.wake import ReplicaRuns, Runner
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import plan, unspent
-from dsa_des.running.grain import Grain, opened_loops
+from dsa_des.running.grain import Grain
+from dsa_des.running.loops import opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
-from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime, RunEnds
 
 __all__ = ["NotInLockStep", "Replicas", "lock_step"]
 
@@ -86,22 +84,18 @@ class Replicas(Timeline):
         super().__init__(scenes[0])
         self._scenes = scenes if isinstance(scenes, ReplicaScenes) else list(scenes)
         self._report = report
-        self.runs = len(self._scenes)
+        self.count = len(self._scenes)
         #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
-        self.together: dict[str, Runner] = {}
-        self._clocks: list[RunClock] = []
+        self.together: dict[str, Component] = {}
         _check_alike(self._scenes)
         self.seeds = _seeds_of(self._scenes)
-        #: Wires at which feedback loops are opened: a window is no longer than their delay.
-        self._opened = opened_loops(self.scene)
         self.streams = Streams(self.seeds)
 
-    def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
+    def set_length(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Split the blocks that cannot serve all runs."""
-        self.time = ReplicaTime(len(self._scenes), self._run_ticks(duration_s))
-        self.ends = RunEnds(self.time)
+        super().set_length(components, duration_s)
         self._faces = components
         for name, component in components.items():
             if self._shared(name, component):
@@ -130,20 +124,20 @@ class Replicas(Timeline):
         if isinstance(self._scenes, ReplicaScenes):
             return self._scenes.differing(name)
         first = self._scenes[0].blocks[name].parameters
-        found: set[str] = set()
+        names: set[str] = set()
         for scene in self._scenes[1:]:
             other = scene.blocks[name].parameters
             if other is not first and other != first:
                 fields = type(first).model_fields
-                found.update(n for n in fields if getattr(other, n) != getattr(first, n))
-        return found
+                names.update(n for n in fields if getattr(other, n) != getattr(first, n))
+        return names
 
-    def _together(self, name: str, face: Component) -> Runner | None:
+    def _together(self, name: str, face: Component) -> Component | None:
         """Return what runs a block for all replicas though they differ, if it offers that."""
         if self.scene.duration_s is None and face.natural_duration_s() is not None:
             return None
         try:
-            return face.together(ReplicaRuns(self._parameters_of(name), partial(self._made, name)))
+            return face.together(self._parameters_of(name), partial(self._made, name))
         except BaseException as error:
             if must_pass(error):
                 raise
@@ -212,27 +206,21 @@ class Replicas(Timeline):
 
     def _finished(self, number: int, component: Component) -> None:
         if self._report is not None:
-            if number in self.ends.by:
-                ended = Fraction(int(self.ends.ticks[number]), self.scene.ticks_per_s)
+            if number in self.runs.ended_by:
+                ended = Fraction(int(self.runs.ends[number]), self.scene.ticks_per_s)
                 component.context.duration_s = ended
             self._report(number, component.report())
 
-    def clock(self, name: str, component: Component) -> RunClock | None:
-        """Return the clocks of all replicas as one."""
-        if (clock := super().clock(name, component)) is not None:
-            self._clocks.append(clock)
-        return clock
-
     def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
         """Return what each replica says of a block's clock."""
-        found: list[Any] = []
+        every: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
         for parameters in self._parameters_of(name):
             if id(parameters) not in known:
                 known[id(parameters)] = component.clock_of(parameters)
-            found.append(known[id(parameters)])
-        specs = [spec for spec in found if spec is not None]
-        if 0 < len(specs) < len(found):
+            every.append(known[id(parameters)])
+        specs = [spec for spec in every if spec is not None]
+        if 0 < len(specs) < len(every):
             raise NotInLockStep(f"block {name} has a clock of its own in some replicas only")
         if len({(spec.rate_hz, spec.rate_error_ppm) for spec in specs}) > 1:
             for wire in self.scene.wires:
@@ -243,25 +231,26 @@ class Replicas(Timeline):
 
     def runner(self, component: Component) -> Any:
         """Return the block, or its instances."""
-        found = self.together.get(component.name)
-        return self.split.get(component.name, component) if found is None else found
+        together = self.together.get(component.name)
+        return self.split.get(component.name, component) if together is None else together
 
     def windows(
-        self, longest_ticks: int, horizon_ticks: int | None, rewinder: Rewinder | None
+        self,
+        longest_ticks: int,
+        scans: float,
+        horizon_ticks: int | None,
+        rewinder: Rewinder | None,
     ) -> Windows:
         """Return windows that hold many whole replicas, or in loops stretches of all of them."""
-        if horizon_ticks is None:
-            return Windows(self.time, longest_ticks)
-        scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
-        if self.time.run_ticks > horizon_ticks * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
+        most = _MOST_WINDOWS_PER_SCAN * scans + 1000
+        if horizon_ticks is not None and self.runs.run_ticks > horizon_ticks * most:
             said = f"{horizon_ticks / self.scene.ticks_per_s:.2g} s"
             raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
-        of_all = max(1, longest_ticks // self.runs)  # each of them has as many scans
-        return Windows(self.time, of_all, horizon_ticks, self.runs)
+        return super().windows(longest_ticks, scans, horizon_ticks, rewinder)
 
     def grain(self, window: int | None) -> Grain:
         """Return the grain: all run in windows, in loops in those that nothing comes back in."""
-        return Grain(set(self.scene.blocks), False, self._opened, {})
+        return Grain(set(self.scene.blocks), False, opened_loops(self.scene), {})
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Let instances report; a shared block has seen the rows of all and speaks for none."""

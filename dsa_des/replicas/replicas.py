@@ -98,14 +98,14 @@ def run_replicas(
     list of Recorded or Failed
         In the order of `replicas`; each is identical to a run of its own.
     """
-    found, scenes = _checked(scene, replicas)
+    failed, scenes = _checked(scene, replicas)
     ran: list[Recorded | Failed] = []
     runs = len(replicas) if runs is None else runs
     for part in _at_once(scenes):
         together: Sequence[Recorded | Failed] | None = _together(part, wanted, runs)
         ran += together or [_run(one, wanted, runs) for one in part]
     outcomes = iter(ran)
-    return [next(outcomes) if one is None else one for one in found]
+    return [next(outcomes) if one is None else one for one in failed]
 
 
 def _checked(
@@ -115,15 +115,15 @@ def _checked(
     together = drawn_columns(scene, replicas)
     if together is not None:
         return [None] * len(replicas), together
-    found: list[Recorded | Failed | None] = []
+    failed: list[Recorded | Failed | None] = []
     scenes: list[Scene] = []
     for replica in replicas:
         try:
             scenes.append(scene_of(scene, replica))
-            found.append(None)
+            failed.append(None)
         except SceneError as error:
-            found.append(Failed(str(error)))
-    return found, scenes
+            failed.append(Failed(str(error)))
+    return failed, scenes
 
 
 def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
@@ -166,10 +166,10 @@ def _together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Record
     shared = Shared(sink.tables(), len(scenes))
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _by_replica(shared.tables, len(scenes))
-    ended = simulation.ends.by
+    ended = simulation.runs.ended_by
     durations_s = [
         int(tick) / simulation.ticks_per_s if n in ended else outcome.duration_s
-        for n, tick in enumerate(simulation.ends.ticks)
+        for n, tick in enumerate(simulation.runs.ends)
     ]
     return [
         Recorded(
@@ -209,5 +209,5 @@ def _run(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
         return Failed(str(error))
     return Recorded(
         sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
-        simulation.ends.early,
+        simulation.runs.early,
     )  # fmt: skip

@@ -108,8 +108,8 @@ class SplitBlock:
 def _part(wake: Wake, rows: slice, number: int) -> Wake:
     """Return the rows of one replica as its own run would see them."""
     held = {}
-    for port, (message, place) in wake._held.items():
-        mine = place[rows]
+    for port, (message, row_at) in wake._held.items():
+        mine = row_at[rows]
         there = mine[mine >= 0]
         if len(there) == 0:
             continue  # nothing has arrived in this replica yet
@@ -147,14 +147,14 @@ def _alone(message: Message) -> Message:
 
 def _after(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
     """Return what came over each wire, first `one` and then the `other`, by source."""
-    found = {new.source: new for new in one}
+    by_source = {new.source: new for new in one}
     for new in other:
-        old = found.get(new.source)
+        old = by_source.get(new.source)
         if old is not None:
             message = type(new.message).concatenate([old.message, new.message])
             new = Arrivals(new.source, RunTicks.joined([old.instants, new.instants]), message)
-        found[new.source] = new
-    return [found[name] for name in sorted(found)]
+        by_source[new.source] = new
+    return [by_source[name] for name in sorted(by_source)]
 
 
 def _within(asked: IntArray, rows: slice) -> IntArray:

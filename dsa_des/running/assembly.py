@@ -10,7 +10,7 @@ from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, plan, unspent
-from dsa_des.running.grain import telling_order
+from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK
@@ -58,7 +58,7 @@ class Assembly:
         self._set_up()
 
     def _build(self, timeline: Timeline, recorder: Recorder | None) -> dict[str, Component]:
-        runs = timeline.runs if recorder is None else max(timeline.runs, recorder.runs)
+        runs = timeline.count if recorder is None else max(timeline.count, recorder.runs)
         tables = () if recorder is None else recorder.wanted_tables
         components: dict[str, Component] = {}
         problems: list[Problem] = []
@@ -118,13 +118,13 @@ class Assembly:
             component.context.duration_s = self.duration_s
             known = len(problems)
             with self._preparing(name, problems):
-                found = plan(component, tolerance, everything=self._everything)
-                built = {i: i.effect.build(component) for i in found if i.built}
+                mine = plan(component, tolerance, everything=self._everything)
+                built = {i: i.effect.build(component) for i in mine if i.built}
             if len(problems) > known:
                 continue
-            planned += found
+            planned += mine
             if not self._everything:
-                component.context.tolerance = unspent(found, tolerance)
+                component.context.tolerance = unspent(mine, tolerance)
             component.context.effects = {
                 item.effect.name: effect if wrap is None else wrap(item, effect)
                 for item, effect in built.items()

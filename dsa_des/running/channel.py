@@ -18,8 +18,7 @@ from dsa_des.block.component import Input
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.running.effects import WireFaults
-from dsa_des.time.clock import MAX_TICK
-from dsa_des.time.runs import ReplicaTime, RunEnds
+from dsa_des.time.runs import Runs
 
 #: Rows and when they arrive.
 Rows = tuple[RunTicks, Message]
@@ -41,10 +40,8 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
-    time : ReplicaTime, optional
-        Which runs go now; by default there is one, without an end.
-    ends : RunEnds, optional
-        What arrives when its run has ended does not.
+    runs : Runs, optional
+        What arrives when its run has ended does not; by default there is one, without an end.
     """
 
     def __init__(
@@ -52,14 +49,12 @@ class Channel:
         source: str,
         delay_ticks: int = 0,
         faults: WireFaults | None = None,
-        time: ReplicaTime | None = None,
-        ends: RunEnds | None = None,
+        runs: Runs | None = None,
     ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
-        self._time = ReplicaTime(1, MAX_TICK) if time is None else time
-        self._ends = RunEnds(self._time) if ends is None else ends
+        self._runs = Runs() if runs is None else runs
         #: Arrivals of rows, which are the last ones of the message beside them.
         self._waiting: deque[Rows] = deque()
         #: What was collected; the last row of each run is held.
@@ -69,11 +64,11 @@ class Channel:
 
     def hold(self, message: Message, tick: int) -> None:
         """Make `message` the last arrived one in every run, as if it had come at `tick`."""
-        if (runs := self._time.replicas) == 1:
+        if (count := self._runs.count) == 1:
             self._passed = [(RunTicks.of_run(0, np.array([tick], dtype=np.int64)), message)]
             return
-        held = type(message).concatenate([message] * runs).of_runs(np.arange(runs))
-        self._passed = [(RunTicks(held.run, np.full(runs, tick, dtype=np.int64)), held)]
+        held = type(message).concatenate([message] * count).of_runs(np.arange(count))
+        self._passed = [(RunTicks(held.run, np.full(count, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
         """Return what waits and what is held, for `set_state`; note pushes from now on."""
@@ -110,9 +105,9 @@ class Channel:
             arrivals = arrivals.later(self._faults.lateness(made.take(kept)))
             if (order := arrivals.order()) is not None:
                 arrivals, message = arrivals.take(order), message.take(order)
-        if self._time.replicas > 1 and (self.delay_ticks or self._faults is not None):
+        if self._runs.count > 1 and (self.delay_ticks or self._faults is not None):
             # What would arrive after its run does not: nothing would wait for it there.
-            arrivals, message = _rows(arrivals, message, arrivals.tick < self._time.run_ticks)
+            arrivals, message = _rows(arrivals, message, arrivals.tick < self._runs.run_ticks)
         if len(arrivals) == 0:
             return arrivals
         self._waiting.append((arrivals, message))
@@ -126,25 +121,25 @@ class Channel:
         A slow sensor behind a fast one would otherwise let a message wait for each window between
         two of its scans. Where several runs go, a row is superseded in its own only.
         """
-        if self._faults is None and len(self._time.runs) == 1:
+        if self._faults is None and len(self._runs.going) == 1:
             while len(self._waiting) > 1 and self._waiting[1][0].tick[0] <= tick:
                 self._waiting.popleft()
 
     def next_arrivals(self, end: int) -> RunTicks:
         """Return when rows arrive before `end` that were not collected yet."""
-        found = [arrivals.take(self._due(arrivals, end)) for arrivals, _ in self._waiting]
-        found = [part for part in found if len(part)]
-        if not found:
+        arriving = [arrivals.take(self._due(arrivals, end)) for arrivals, _ in self._waiting]
+        arriving = [part for part in arriving if len(part)]
+        if not arriving:
             return RunTicks.none()
-        if self._faults is None and 1 in (len(found), len(self._time.runs)):
-            return RunTicks.joined(found)
-        return union(found)  # late rows overtake and may coincide
+        if self._faults is None and 1 in (len(arriving), len(self._runs.going)):
+            return RunTicks.joined(arriving)
+        return union(arriving)  # late rows overtake and may coincide
 
     def _due(self, arrivals: RunTicks, end: int) -> slice | BoolArray:
         """Return which rows arrive before `end`."""
-        if len(self._time.runs) == 1:
+        if len(self._runs.going) == 1:
             return slice(arrivals.at_most(end))
-        if end >= self._time.run_ticks:
+        if end >= self._runs.run_ticks:
             return slice(None)
         due = arrivals.tick < end
         return slice(None) if due.all() else due
@@ -153,7 +148,7 @@ class Channel:
         """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
         taken: list[Rows] = []
         left: deque[Rows] = deque()
-        one, first = self._time.replicas == 1, self._time.runs.start
+        one, first = self._runs.count == 1, self._runs.going.start
         while self._waiting:
             arrivals, message = self._waiting.popleft()
             if not one and arrivals.run[-1] < first:
@@ -178,13 +173,13 @@ class Channel:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
         self._waiting = left
-        found = joined(taken)
-        if found is not None and len(taken) > 1:
-            found = _in_order(found)
-        if found is None or not self._ends.early:
-            return found
-        found = _rows(*found, self._ends.before(found[0]))
-        return found if len(found[0]) else None
+        collected = joined(taken)
+        if collected is not None and len(taken) > 1:
+            collected = _in_order(collected)
+        if collected is None or not self._runs.early:
+            return collected
+        collected = _rows(*collected, self._runs.before_ends(collected[0]))
+        return collected if len(collected[0]) else None
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds at each instant (in order, all before `end`).
@@ -208,37 +203,37 @@ class Channel:
             return None
         held = _in_order(held)
         self._passed = [held]
-        if self._time.replicas > 1:
+        if self._runs.count > 1:
             self._remember(end)
         return held[1], last_of_run(held[0], asked)
 
     def _pass(self, new: Rows, end: int) -> None:
         """Take note of rows of which every run that asked holds one."""
         if self._of_all(new[0]):  # nothing older is held by any run that goes
-            stop = self._time.runs.stop
+            stop = self._runs.going.stop
             self._passed = [part for part in self._passed if part[0].run[-1] >= stop]
         self._passed.append(new)
         if len(self._passed) > _MOST_PASSED or (
-            self._time.replicas > 1 and end >= self._time.run_ticks
+            self._runs.count > 1 and end >= self._runs.run_ticks
         ):
             self._remember(end)
 
     def _of_all(self, arrivals: RunTicks) -> bool:
         """Whether there is a row of every run that goes on."""
-        runs = self._time.runs
+        runs = self._runs.going
         if len(runs) == 1:
             return True
-        if len(arrivals) < len(runs) and not self._ends.early:
+        if len(arrivals) < len(runs) and not self._runs.early:
             return False
-        found = arrivals.run[arrivals.last_of_each]
-        if self._ends.early:
-            return self._ends.running(found) == self._ends.running(np.array(runs))
-        return len(found) == len(runs)
+        reached = arrivals.run[arrivals.last_of_each]
+        if self._runs.early:
+            return self._runs.lasting(reached) == self._runs.lasting(np.array(runs))
+        return len(reached) == len(runs)
 
     def _remember(self, end: int) -> None:
         """Keep of what has passed the last row of each run that goes on."""
-        runs = self._time.runs
-        first = runs.stop if end >= self._time.run_ticks else runs.start
+        runs = self._runs.going
+        first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
         held = joined(going)
         self._passed = [] if held is None else [_lasts(*_in_order(held))]
@@ -299,8 +294,8 @@ class Inputs:
     wires : mapping
         The wires into each.
     ticks_per_s : int
-    time : ReplicaTime, optional
-        How runs lie in time, where there are many.
+    runs : Runs, optional
+        By default there is one.
     """
 
     def __init__(
@@ -308,13 +303,13 @@ class Inputs:
         declared: Mapping[str, Input],
         wires: Mapping[str, Sequence[WireEnd]],
         ticks_per_s: int,
-        time: ReplicaTime | None = None,
+        runs: Runs | None = None,
     ) -> None:
         every = [(port, wire) for port in declared for wire in wires.get(port, ())]
         self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].held]
         self._queued = [(p, wire) for p, wire in every if not declared[p].held]
         self._ticks_per_s = ticks_per_s
-        self._time = ReplicaTime(1, 0) if time is None else time
+        self._runs = Runs() if runs is None else runs
 
     def seen(
         self,
@@ -364,7 +359,7 @@ class Inputs:
             if new is not None:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         rows = None if demand is None else partial(demand, asked)
-        first, per_s = self._time.runs.start, self._ticks_per_s
+        first, per_s = self._runs.going.start, self._ticks_per_s
         return Wake(asked, scans, per_s, held, arrived, rows, first, clock)
 
 

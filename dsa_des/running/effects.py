@@ -181,11 +181,11 @@ def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
     blocks = [(name, block.options) for name, block in sorted(scene.blocks.items())]
     wires = [(str(wire), wire) for wire in scene.wires]
     clocks = list(_clocks(scene))
-    found: list[Planned] = []
+    planned: list[Planned] = []
     for effects, places in ((OF_BLOCKS, blocks), (OF_WIRES, wires), (OF_CLOCKS, clocks)):
         for effect in effects:
-            found += _judged(effect, places, everything)
-    return found
+            planned += _judged(effect, places, everything)
+    return planned
 
 
 def _judged(effect: Any, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:

@@ -14,7 +14,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
-from dsa_des.time.runs import ReplicaTime, RunEnds
+from dsa_des.time.runs import Runs
 
 
 class WakeUp(simpy.Event):
@@ -42,17 +42,14 @@ class Bell(simpy.Event):
 class RunState(Protocol):
     """The state of a run that all of its blocks share.
 
-    ``window`` is the one that runs now; ``trace`` and ``recorder`` are None where
-    they are not asked for.
+    ``window`` is the one that runs now; ``recorder`` is None where nothing is recorded.
     """
 
     env: simpy.Environment
     ticks_per_s: int
-    trace: list[tuple[int, str]] | None
     recorder: Recorder | None
     window: Window
-    ends: RunEnds
-    time: ReplicaTime
+    runs: Runs
 
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1

@@ -1,4 +1,4 @@
-"""At which grain blocks run, where loops are opened, and how long look-ahead windows are."""
+"""At which grain blocks run, and how long look-ahead windows are."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,133 +9,26 @@ import networkx as nx
 from dsa_des.block.component import Component, ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
+from dsa_des.running.loops import Edge, before_loops, cut_loops, opened_loops, shortest_s
 from dsa_des.running.node import Node
-from dsa_des.scene.graph import in_cycles, window_order
+from dsa_des.scene.graph import in_cycles, queue_key, window_order, with_queues
+from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime
-
-#: From which block to which.
-Edge = tuple[str, str]
-
-
-def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
-    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
-
-    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
-
-    Parameters
-    ----------
-    graph : networkx.DiGraph
-        From `dsa_des.scene.graph.build_graph`.
-    classes : mapping
-        The class of each block.
-    """
-    looped = in_cycles(graph)
-    inside = [
-        (source, target)
-        for source, target in sorted(graph.edges)
-        if source in looped and looped.get(target) == looped[source]
-    ]
-    kept = nx.DiGraph()
-    kept.add_nodes_from(looped)
-    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
-    cut = set()
-    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
-    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
-        kept.add_edge(*edge)
-        if not nx.is_directed_acyclic_graph(kept):
-            kept.remove_edge(*edge)
-            cut.add(edge)
-    return cut
-
-
-def before_loops(graph: nx.DiGraph) -> set[str]:
-    """Return the blocks that no loop leads to; none where there is no loop."""
-    looped = in_cycles(graph)
-    behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
-    return set(graph) - behind if looped else set()
-
-
-def _optional(
-    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
-) -> bool:
-    """Whether the receiving block can do without what comes over an edge."""
-    inputs = classes[edge[1]].inputs
-    return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
-
-
-def opened_loops(scene: Scene) -> set[Edge]:
-    """Return delayed edges without which the scene has no loop, those of the longest delays.
-
-    An edge is taken out only if it closes a loop of edges that are as short or shorter: so the
-    shortest of those taken out is as long as can be.
-    """
-    looped = in_cycles(scene.graph)
-    inside = [
-        (source, target)
-        for source, target in sorted(scene.graph.edges)
-        if source in looped and looped.get(target) == looped[source]
-    ]
-    lasts = {edge: shortest_s(scene, edge) for edge in inside}
-    kept = nx.DiGraph()
-    kept.add_nodes_from(looped)
-    kept.add_edges_from(edge for edge in inside if not scene.graph.edges[edge]["delayed"])
-    opened = set()
-    delayed = [edge for edge in inside if scene.graph.edges[edge]["delayed"]]
-    for edge in sorted(delayed, key=lambda edge: (lasts[edge], edge)):
-        kept.add_edge(*edge)
-        if not nx.is_directed_acyclic_graph(kept):
-            kept.remove_edge(*edge)
-            opened.add(edge)
-    return opened
-
-
-def shortest_s(scene: Scene, edge: Edge) -> Fraction:
-    """Return the shortest delay of the wires from one block to another, s."""
-    wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
-    return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
-
-
-def _period_s(scene: Scene, edge: Edge) -> Fraction:
-    """Return the time between scans that delays on an edge count in; 0 where there are none."""
-    for name in reversed(edge):
-        block = scene.blocks[name]
-        spec = block.cls.clock_of(block.parameters)
-        if spec is not None:
-            return spec.period_s
-    return Fraction(0)
-
-
-def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
-    """Return the place of each block in the order in which blocks tell each other what they offer.
-
-    Requests go the other way. Both pass over wires with and without delay; loops are opened where
-    an input can be done without, and else at a delay.
-    """
-    looped = in_cycles(graph)
-    opened = nx.DiGraph(graph)
-    opened.remove_edges_from(
-        edge
-        for edge in graph.edges
-        if edge[0] in looped
-        and looped[edge[0]] == looped.get(edge[1])
-        and _optional(graph, classes, edge)
-    )
-    return window_order(opened, set(graph), cut_loops(opened, classes))
+from dsa_des.time.runs import Runs
 
 
 def _without_windows(scene: Scene) -> dict[str, str]:
     """Return the blocks of a scene that no window of a loop can hold, and why each."""
-    found = {}
+    reasons = {}
     for name, block in sorted(scene.blocks.items()):
         if block.cls.process is not None:
-            found[name] = "has a process of its own"
+            reasons[name] = "has a process of its own"
         elif not block.cls.windowed:
-            found[name] = "runs scan by scan (windowed is False)"
+            reasons[name] = "runs scan by scan (windowed is False)"
         elif block.options.processor:
-            found[name] = "shares a processor"
-    return found
+            reasons[name] = "shares a processor"
+    return reasons
 
 
 def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
@@ -149,6 +42,44 @@ def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
         for edge in sorted(opened)
         if shortest_s(scene, edge) * per_s < 1
     }
+
+
+def windowed_blocks(scene: Scene, queues: Collection[str]) -> set[str]:
+    """Return the blocks that may run in look-ahead windows, outside of loops.
+
+    A block runs at the widest grain that it and everything upstream allow: it must declare
+    itself windowed, have no process of its own, queue for no shared processor but those in
+    `queues`, be in no feedback loop, and be fed by windowed blocks only.
+    """
+    looped = in_cycles(scene.graph)
+    windowed: set[str] = set()
+    for name in nx.topological_sort(scene.graph.subgraph(set(scene.graph) - looped.keys())):
+        processor = scene.blocks[name].options.processor
+        alone = not processor or processor in queues
+        before = scene.graph.predecessors(name)
+        if alone and _takes_windows(scene.classes[name]) and windowed.issuperset(before):
+            windowed.add(name)
+    return windowed
+
+
+def windowed_queues(scene: Scene) -> set[str]:
+    """Return the shared processors that serve a look-ahead window at once.
+
+    Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
+    the queue, through whichever blocks or other queues.
+    """
+    queues = scene.queues
+    # Who leaves out scans must know of each whether the processor is busy.
+    policies = {name: find_policy(p.when_busy) for name, p in scene.processors.items()}
+    able = {name for name, policy in policies.items() if policy.skips is QueuePolicy.skips}
+    while able:
+        looped = in_cycles(with_queues(scene.graph, {name: queues[name] for name in able}))
+        windowed = windowed_blocks(scene, able)
+        left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
+        if left == able:
+            break
+        able = left
+    return able
 
 
 @dataclass(frozen=True)
@@ -204,9 +135,9 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
         slow = slow or _hurried(scene, opened)
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
-    queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
-    ahead = scene.look_ahead_blocks()
-    return Grain(ahead, False, set(), slow or _holding_back(scene, ahead), queues)
+    queues = {name: scene.queues[name] for name in sorted(windowed_queues(scene))}
+    windowed = windowed_blocks(scene, queues)
+    return Grain(windowed, False, set(), slow or _holding_back(scene, windowed), queues)
 
 
 def kept_back(scene: Scene, windowed: Collection[str]) -> list[str]:
@@ -235,9 +166,9 @@ def _takes_windows(cls: type[Component]) -> bool:
 CELLS_PER_WINDOW = 131072
 
 
-def scans_of(nodes: Mapping[str, Node], time: ReplicaTime) -> float:
+def scans_of(nodes: Mapping[str, Node], runs: Runs) -> float:
     """Return how many scans of all clocks together each run has, about."""
-    return float(sum(time.run_ticks / clock.period for clock in _clocks(nodes.values())))
+    return float(sum(runs.run_ticks / clock.period for clock in _clocks(nodes.values())))
 
 
 def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
@@ -250,13 +181,13 @@ def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
         raise SceneError([scene.problem("duration_s", message)])
 
 
-def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | None) -> int:
+def longest_window(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
     """Return the ticks of a window that holds about the wanted number of scans.
 
     Parameters
     ----------
     nodes : mapping
-    time : ReplicaTime
+    runs : Runs
     window : int, optional
         Scans of all clocks together; by default, and where blocks run scan by scan anyway, as
         many as make a window of `CELLS_PER_WINDOW`.
@@ -264,7 +195,7 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
     per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
-    return max(1, int(scans / per_tick)) if per_tick else time.run_ticks
+    return max(1, int(scans / per_tick)) if per_tick else runs.run_ticks
 
 
 def _clocks(nodes: Iterable[Node]) -> list[RunClock]:

@@ -4,7 +4,8 @@ Within an instant SimPy orders events by priority. Blocks in look-ahead windows 
 the others by depth; ties within a depth go by name, or at random under ``shuffle_ties``.
 """
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -16,7 +17,7 @@ from dsa_des.arrays.run_ticks import (
     RunTicks,
     last_of_run,
     no_runs,
-    place_among,
+    positions_among,
     says_no_runs,
     union,
 )
@@ -31,7 +32,6 @@ from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windows import Window
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime
 
 
 @dataclass
@@ -41,16 +41,14 @@ class Demand:
     block: str
     clock: RunClock
     lead_ticks: int
-    time: ReplicaTime
 
     def between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which this block needs a row."""
-        if not self.lead_ticks:
-            return self.clock.between(start, end)[1]
-        # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.time.run_ticks)
-        _, instants = self.clock.between(start + self.lead_ticks, last)
-        return instants.later(-self.lead_ticks)
+        """Return the instants in [start, end) at which this block needs a row.
+
+        None of these rows would arrive after the end of the run, where the clock has no scan.
+        """
+        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
+        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
 
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
@@ -86,7 +84,6 @@ class Node:
     processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
-    cpu_s: float = 0.0
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
     #: Whether it may run ahead of the window (`Window.ahead`).
@@ -100,6 +97,11 @@ class Node:
         self._missed = False
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
+
+    @property
+    def wires(self) -> list[Channel]:
+        """The wires into all inputs."""
+        return [wire for wires in self.channels.values() for wire in wires]
 
     # -- the life of the process ---------------------------------------------------------------
 
@@ -186,16 +188,13 @@ class Node:
         return window.ahead if self.ahead else window.end
 
     def _demanded(self, start: int, end: int) -> RunTicks:
-        instants = [demand.between(start, end) for demand in self.demands]
-        if len(instants) == 1:
-            return instants[0]
-        return union(instants) if instants else RunTicks.none()
+        return _all_of([demand.between(start, end) for demand in self.demands])
 
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
-        ends = self.simulation.ends
-        if ends.early and ends.passed(tick):
+        runs = self.simulation.runs
+        if runs.early and runs.over(tick):
             return
         if self.processor is not None and self.processor.refuses(self.name):
             return
@@ -207,34 +206,30 @@ class Node:
             scans, instants = self.clock.between(start, end)
         else:
             instants = self._demanded(start, end) if self.on_demand else RunTicks.none()
-            scans = np.full(len(instants), -1, dtype=np.int64)
+            scans = _no_scans(len(instants))
         arrivals = [
             channel.next_arrivals(end)
             for port in self._trigger_ports
             for channel in self.channels.get(port, [])
         ]
-        arrivals = [new for new in arrivals if len(new)]
-        if arrivals:
-            own = instants
-            if len(own) == 0 and len(arrivals) == 1:
-                instants = arrivals[0]
-            else:
-                instants = union([own, *arrivals])
-            numbered = np.full(len(instants), -1, dtype=np.int64)
-            if len(own):
-                numbered[last_of_run(instants, own)] = scans
-            scans = numbered
-        ends = self.simulation.ends
-        if ends.early:
-            kept = ends.before(instants)
-            instants, scans, end = instants.take(kept), scans[kept], ends.cut(end)
+        if any(map(len, arrivals)):
+            own, numbers = instants, scans
+            instants = _all_of([own, *arrivals])
+            scans = _no_scans(len(instants))
+            if len(own) and self.clock is not None:
+                scans = scans.copy()
+                scans[last_of_run(instants, own)] = numbers
+        runs = self.simulation.runs
+        if runs.early:
+            kept = runs.before_ends(instants)
+            instants, scans = instants.take(kept), scans[kept]
         if len(instants):
             self._run(instants, scans, end)
 
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
-        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.time)
+        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.runs)
 
     def _run(self, instants: RunTicks, scans: IntArray, end: int) -> None:
         before = None if self.clock is None else self.clock.before
@@ -242,8 +237,6 @@ class Node:
         if wake is None:
             return
         ticks = wake.ticks
-        if self.simulation.trace is not None:
-            self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
             self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):
@@ -263,8 +256,8 @@ class Node:
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)
-            place, here = place_among(instants, asked)
-            rows[demand.block] = place if here is None else place[here]
+            rows_asked, there = positions_among(instants, asked)
+            rows[demand.block] = rows_asked if there is None else rows_asked[there]
         return rows
 
     def receive(self) -> Wake:
@@ -304,7 +297,7 @@ class Node:
             message.check()
             message = _of_their_runs(port, message, ran)
             if isinstance(message, RunEnd):
-                self.simulation.ends.note(message.instants, self.name)
+                self.simulation.runs.note_ends(message.instants, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
             if leaves is not None and leaves > ran.tick[0]:
@@ -331,6 +324,22 @@ class Node:
                     node.wake_at(arrival)
 
 
+def _all_of(parts: Sequence[RunTicks]) -> RunTicks:
+    """Return the instants of all parts."""
+    filled = [part for part in parts if len(part)]
+    if len(filled) > 1:
+        return union(filled)
+    return filled[0] if filled else RunTicks.none()
+
+
+#: The scan number at instants that are none of a block's own scans, seen as often as asked for.
+_NO_SCAN = np.broadcast_to(np.int64(-1), 1 << 40)
+
+
+def _no_scans(rows: int) -> IntArray:
+    return _NO_SCAN[:rows]
+
+
 def _now(tick: int) -> RunTicks:
     return RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
 
@@ -343,7 +352,9 @@ def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
     """
     sent = message.tick
     if sent is ran.tick:
-        return message if says_no_runs(ran.run) else message.of_runs(ran.run)
+        message = message if says_no_runs(ran.run) else copy(message)
+        message.instants = ran  # with what is known of them
+        return message
     if sent.dtype == np.int64:
         if not says_no_runs(ran.run) and says_no_runs(message.run):
             if ran.one_run:
@@ -355,8 +366,8 @@ def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
                     f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
                     "runs: the message must say of which run each is (`run = wake.run[rows]`)"
                 )
-        place, there = place_among(ran, message.instants)
-        if there is None and bool((place[1:] >= place[:-1]).all()):
+        position, there = positions_among(ran, message.instants)
+        if there is None and bool((position[1:] >= position[:-1]).all()):
             return message
     raise ValueError(
         f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "

@@ -9,7 +9,8 @@ from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.message import Message
 from dsa_des.errors import SceneError
 from dsa_des.running.events import RunState
-from dsa_des.running.grain import Edge, Grain
+from dsa_des.running.grain import Grain
+from dsa_des.running.loops import Edge
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
@@ -18,7 +19,6 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import ReplicaTime
 
 
 def build_nodes(
@@ -35,7 +35,7 @@ def build_nodes(
     ----------
     run : RunState
     timeline : Timeline
-        Has been laid.
+        Knows how long runs are.
     components : mapping
     grain : Grain
     processors : mapping
@@ -102,7 +102,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
     nodes : mapping
         Running blocks by name.
     timeline : Timeline
-        Makes the channels; has been laid.
+        Makes the channels; knows how long runs are.
 
     Raises
     ------
@@ -122,15 +122,15 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
             (channel, target, wire.input)
         )
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name, timeline.time)
+        node.demands = find_demands(nodes, name)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
             raise SceneError([scene.problem(f"blocks.{name}", message)])
 
 
-def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> list[Demand]:
+def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
     """Return the first clocked blocks on every way downstream, and the delay on the way."""
-    found: dict[tuple[str, int], Demand] = {}
+    demands: dict[tuple[str, int], Demand] = {}
     seen = {(name, 0)}
     todo = [(name, 0)]
     while todo:
@@ -140,35 +140,27 @@ def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> lis
         ):
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
-                found[reached] = Demand(node.name, node.clock, reached[1], time)
+                demands[reached] = Demand(node.name, node.clock, reached[1])
             elif reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)
-    return [found[key] for key in sorted(found)]
+    return [demands[key] for key in sorted(demands)]
 
 
 def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
     """Return how long what is sent takes at least over some edges, or None without any."""
-    return min(
-        (
-            channel.delay_ticks
-            for name, node in nodes.items()
-            for channels in node.channels.values()
-            for channel in channels
-            if (channel.source, name) in opened
-        ),
-        default=None,
+    delays = (
+        channel.delay_ticks
+        for name, node in nodes.items()
+        for channel in node.wires
+        if (channel.source, name) in opened
     )
+    return min(delays, default=None)
 
 
 def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
     """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
-    delays = sum(
-        channel.delay_ticks
-        for node in nodes.values()
-        for channels in node.channels.values()
-        for channel in channels
-    )
+    delays = sum(channel.delay_ticks for node in nodes.values() for channel in node.wires)
     jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
     if run_ticks + delays + jitter >= MAX_TICK:
         longest_s = MAX_TICK / scene.ticks_per_s

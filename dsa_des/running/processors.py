@@ -12,7 +12,7 @@ is done. Both give the same.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, ClassVar
@@ -20,8 +20,8 @@ from typing import Any, ClassVar
 import numpy as np
 import simpy
 
-from dsa_des.arrays.types import IntArray
-from dsa_des.block.message import Column, Columns, Message, Text, static
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.message import PER_ROW, STATIC, Message, Text, column
 from dsa_des.running.events import WakeUp
 from dsa_des.scene.block_table import ProcessorParameters
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
@@ -41,51 +41,28 @@ Deliver = Callable[[Message, Any], None]
 
 @dataclass(eq=False)
 class Processing(Message):
-    """What became of one message at a processor (``tick`` is the instant of the outcome).
+    """What became of messages at a processor; ``tick`` is the instant of the outcome."""
 
-    Parameters
-    ----------
-    entered, started : (rows,)
-        Ticks at which it was handed in and at which work on it began.
-    queue_length : (rows,)
-        Messages waiting behind it at the instant of the outcome.
-    outcome : (rows,)
-        Index into ``done``, ``dropped``, ``skipped``.
-    """
+    row_table: ClassVar[str] = "processing"
 
-    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
-        "processing": {
-            "processor": Column("", "", "shared processor", "text"),
-            "entered_s": Column("s", "", "when the message came to the processor"),
-            "started_s": Column("s", "", "when work on it began; null if never"),
-            "age_s": Column("s", "", "from when it was handed in to its delivery"),
-            "queue_length": Column(
-                "messages", "", "messages that waited behind it at its outcome", "int64"
-            ),
-            "outcome": Column("", "", "whether it was done, dropped or skipped", "text"),
-        }
-    }
-
-    entered: IntArray
-    started: IntArray
-    queue_length: IntArray
-    outcome: IntArray
-    processor: str = static()
-    ticks_per_s: int = static()
-
-    def tables(self) -> dict[str, Columns]:
-        """Return the rows of ``processing``; a message that was never worked on has no start."""
-        worked = self.outcome == 0
-        columns: Columns = {
-            "tick": self.tick,
-            "processor": Text(np.zeros(len(self), dtype=np.int64), (self.processor,)),
-            "entered_s": self.entered / self.ticks_per_s,
-            "started_s": np.where(worked, self.started / self.ticks_per_s, np.nan),
-            "age_s": np.where(worked, (self.tick - self.entered) / self.ticks_per_s, np.nan),
-            "queue_length": self.queue_length,
-            "outcome": Text(self.outcome, _OUTCOMES),
-        }
-        return {"processing": columns}
+    processor: str = column(
+        "", "", "shared processor", "text", of=STATIC,
+        value=lambda said: Text(np.zeros(len(said), dtype=np.int64), (said.processor,)),
+    )  # fmt: skip
+    entered: IntArray = column(
+        "s", "", "when the message came to the processor",
+        of=PER_ROW, name="entered_s", instant=True,
+    )  # fmt: skip
+    started_s: FloatArray = column("s", "", "when work on it began; null if never", of=PER_ROW)
+    age_s: FloatArray = column("s", "", "from when it was handed in to its delivery", of=PER_ROW)
+    queue_length: IntArray = column(
+        "messages", "", "messages that waited behind it at its outcome", "int64", of=PER_ROW
+    )
+    #: Index into `_OUTCOMES`.
+    outcome: IntArray = column(
+        "", "", "whether it was done, dropped or skipped", "text",
+        of=PER_ROW, value=lambda said: Text(said.outcome, _OUTCOMES),
+    )  # fmt: skip
 
 
 class Service:
@@ -307,10 +284,9 @@ class Processor:
         of = np.array(blocks, dtype=object)
         for block in sorted(set(of.tolist())):
             tick, entered, started, behind, outcome = (c[of == block] for c in columns)
-            rows = Processing(
-                tick, entered, started, behind, outcome,
-                processor=self.name, ticks_per_s=self._ticks_per_s,
-            )  # fmt: skip
+            started_s = np.where(outcome == DONE, started / self._ticks_per_s, np.nan)
+            age_s = np.where(outcome == DONE, (tick - entered) / self._ticks_per_s, np.nan)
+            rows = Processing(tick, self.name, entered, started_s, age_s, behind, outcome)
             self._record(block, rows)
 
     # -- in a window ---------------------------------------------------------------------------

@@ -38,7 +38,7 @@ def record_run(
     silent: bool = True,
     notes_command: str | None = None,
     pacer: Pacer | None = None,
-    told: bool = True,
+    say_notes: bool = True,
     progress: Callable[[float], None] | None = None,
     draw: bool = True,
     prepare: Callable[[Simulation], None] | None = None,
@@ -57,7 +57,7 @@ def record_run(
         The command that shows what there is to note of the scene; with it one line on standard
         error says how many notes there are. ``run.json`` lists them.
     pacer : Pacer, optional
-    told : bool
+    say_notes : bool
         Whether notes are written to standard error.
     progress : callable, optional
         Called with the simulated time in s after each window, instead of a bar.
@@ -84,7 +84,7 @@ def record_run(
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     if prepare is not None:
         prepare(simulation)
-    if told:
+    if say_notes:
         say_if_long(simulation)
     noted = notes_of_scene(simulation)
     if noted and notes_command is not None:
@@ -129,7 +129,7 @@ def record_run(
     except OSError as error:
         what = f"figures cannot be written: {error.strerror or error}"
         raise OutputError(f"{target.path}: {what}; the run itself is complete") from error
-    for note in notes if told else ():
+    for note in notes if say_notes else ():
         say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary
 
@@ -165,7 +165,7 @@ def info_of(
         "title": simulation.scene.title,
         "seed": simulation.scene.seed,
         "duration_s": outcome.duration_s,
-        **({"ended_by": simulation.ends.by[0]} if simulation.ends.early else {}),
+        **({"ended_by": simulation.runs.ended_by[0]} if simulation.runs.early else {}),
         "ticks_per_s": simulation.ticks_per_s,
         "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
         "versions": {

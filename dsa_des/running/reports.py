@@ -31,14 +31,14 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     its blocks have to say of their own values.
     """
     scene = simulation.scene
-    found = notes_of_loading(scene)
+    notes = notes_of_loading(scene)
     for name, section in scene.sections.items():
-        found += [f"{name}: {text}" for text in section.without_effect()]
+        notes += [f"{name}: {text}" for text in section.without_effect()]
     for name, component in simulation.components.items():
-        found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
-        for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
-            found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
-    return _unacknowledged(scene, [*found, *_slowed(simulation)])
+        notes += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
+        for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
+            notes.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+    return _unacknowledged(scene, [*notes, *_slowed(simulation)])
 
 
 def _slowed(simulation: Simulation) -> list[str]:

@@ -67,14 +67,14 @@ class Outcome:
     def report(self) -> dict[str, Any]:
         """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
         sections: dict[str, Any] = {}
-        for name, component in self.components.items():
+        for component in self.components.values():
             try:
                 for section, content in component.report().items():
                     sections.setdefault(section, {}).update(content)
             except BaseException as error:
                 if must_pass(error):
                     raise
-                raise _failure(name, type(component), self.duration_s, error) from error
+                raise block_failure(component, self.duration_s, error) from error
         return sections
 
 
@@ -93,8 +93,6 @@ class Simulation:
         Seed that randomises the order of blocks within one depth, to show that nothing depends
         on it.
     recorder : Recorder, optional
-    trace : list, optional
-        Receives ``(tick, block)`` for every instant a block runs at, in order of execution.
     simulate_everything : bool
         Build also the effects that the scene does not call for, where they can be neutral.
     wrap_effect : callable, optional
@@ -114,7 +112,6 @@ class Simulation:
         window: int | None = None,
         shuffle_ties: int | None = None,
         recorder: Recorder | None = None,
-        trace: list[tuple[int, str]] | None = None,
         simulate_everything: bool = False,
         wrap_effect: WrapEffect | None = None,
     ) -> None:
@@ -126,7 +123,6 @@ class Simulation:
             timeline = Timeline(scene, everything=simulate_everything)
         self.timeline = timeline
         self.recorder = recorder
-        self.trace = trace
         self.ticks_per_s = scene.ticks_per_s
         self.env = simpy.Environment(initial_time=0)
         self.window = Window(0, 0, 0)
@@ -140,28 +136,26 @@ class Simulation:
         self.components: Mapping[str, Component] = assembly.components
         self.duration_s: Fraction = assembly.duration_s
         self.plan = assembly.plan
-        self.timeline.lay(self.components, self.duration_s)
-        #: How the runs lie in time.
-        self.time = self.timeline.time
-        #: When runs end, as far as that is known.
-        self.ends = self.timeline.ends
+        self.timeline.set_length(self.components, self.duration_s)
+        #: How the runs lie in time, and when they end.
+        self.runs = self.timeline.runs
         self._check_ends()
         processors = build_processors(scene, grain, self.env, self._record)
         self.nodes = build_nodes(
             self, self.timeline, self.components, grain, processors, shuffle_ties
         )
         connect(scene, self.nodes, self.timeline)
-        check_reach(scene, self.nodes, self.time.run_ticks)
+        check_reach(scene, self.nodes, self.runs.run_ticks)
         #: How many scans of all clocks together a run has, about.
-        self.scans = scans_of(self.nodes, self.time)
+        self.scans = scans_of(self.nodes, self.runs)
         refuse_endless_work(scene, self.scans, float(self.duration_s))
         rewinder = None
         if grain.rewinds:
-            rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace, self.ends)
-        longest = longest_window(self.nodes, self.time, window)
+            rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, self.runs)
+        longest = longest_window(self.nodes, self.runs, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(
-            longest, horizon_ticks(self.nodes, grain.cut_edges), rewinder
+            longest, self.scans, horizon_ticks(self.nodes, grain.cut_edges), rewinder
         )
 
     @property
@@ -172,7 +166,7 @@ class Simulation:
     @property
     def end_tick(self) -> int:
         """First tick that is no longer simulated: runs cover [0, T)."""
-        return self.time.run_ticks
+        return self.runs.run_ticks
 
     def run(
         self, progress: Callable[[float], None] | None = None, pacer: Pacer | None = None
@@ -198,37 +192,37 @@ class Simulation:
         self._check_ready()
         started = time.process_time()
         self._open_recorder()
-        runs = range(0)
+        going = range(0)
         if pacer is not None:
             self.windows.limit(int(pacer.longest_window_s * self.ticks_per_s))
             pacer.start()
         while (window := self.windows.next()) is not None:
             if pacer is not None and pacer.stopped:
                 break
-            if self.time.runs != runs:
-                runs = self.time.runs
-                self._start(runs)
-            if self.ends.passed(window.start):
-                if runs.stop == self.time.replicas:
+            if self.runs.going != going:
+                going = self.runs.going
+                self._start(going)
+            if self.runs.over(window.start):
+                if going.stop == self.runs.count:
                     break
-                self.windows.heard(window, None)  # nothing is left to run in it
+                self.windows.commit(window, None)  # nothing is left to run in it
                 continue
             failure = self.run_window(window)
-            final = self.windows.heard(window, failure)
+            final = self.windows.commit(window, failure)
             if final is None:
                 continue
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self.recorder.advance(*self.time.final_before(runs, final))
+                self.recorder.advance(*self.runs.final_before(final, going))
             if pacer is not None:
                 pacer(final / self.ticks_per_s)
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
             self.recorder.close()
-        if self.ends.early and self.time.replicas == 1:
-            self.duration_s = Fraction(int(self.ends.ticks[0]), self.ticks_per_s)
+        if self.runs.early and self.runs.count == 1:
+            self.duration_s = Fraction(int(self.runs.ends[0]), self.ticks_per_s)
             for component in self.components.values():
                 component.context.duration_s = self.duration_s  # what it reports is up to there
         return Outcome(
@@ -280,7 +274,7 @@ class Simulation:
     def _open_recorder(self) -> None:
         if self.recorder is not None:
             self.recorder.open(
-                self.recorded_messages(), self.ticks_per_s, self.ends,
+                self.recorded_messages(), self.ticks_per_s, self.runs,
                 replicas=self.timeline.says_replica,
             )  # fmt: skip
 
@@ -306,9 +300,8 @@ class Simulation:
     ) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
         if self.failure is None:  # a provisional window goes on; the first failure counts
-            said = _failure(
-                node.name, type(node.component), int(ticks[0]) / self.ticks_per_s, error, scan
-            )
+            time_s, number = int(ticks[0]) / self.ticks_per_s, scan if scan >= 0 else None
+            said = block_failure(node.component, time_s, error, number)
             self.failure = Failure(said, error, ticks)
         if not self.window.provisional:
             raise Abort
@@ -317,8 +310,8 @@ class Simulation:
         """Raise what a block raised; its exact instant is found by running scan by scan again."""
         for component in self.components.values():
             component.close()
-        before = self.scans * int(failure.ticks[0]) / self.time.run_ticks
-        if len(failure.ticks) > 1 and self.time.replicas == 1 and before < _MOST_SCANS_AGAIN:
+        before = self.scans * int(failure.ticks[0]) / self.runs.run_ticks
+        if len(failure.ticks) > 1 and self.runs.count == 1 and before < _MOST_SCANS_AGAIN:
             try:
                 Simulation(self.scene, window=1, simulate_everything=self._everything).run()
             except SceneError:  # a block waits for what only `prepare` handed over
@@ -328,7 +321,9 @@ class Simulation:
         raise failure.said from failure.cause
 
 
-def _failure(
-    name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
+def block_failure(
+    component: Component, time_s: float, error: BaseException, scan: int | None = None
 ) -> BlockFailure:
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, error_at(error, cls))
+    """Return what is said of an exception that a block raised at an instant."""
+    cls = type(component)
+    return BlockFailure(component.name, cls.path(), time_s, scan, error_at(error, cls))

@@ -19,7 +19,7 @@ from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import ReplicaTime, RunEnds
+from dsa_des.time.runs import Runs
 
 
 class Timeline:
@@ -35,21 +35,18 @@ class Timeline:
     ----------
     streams : Streams
         The keyed random numbers of blocks.
-    time : ReplicaTime
-        How the runs lie in time; known once `lay` was called.
-    ends : RunEnds
-        When each of them ends; from then on.
-    runs : int
-        How many there are.
+    count : int
+        How many runs there are.
+    runs : Runs
+        How they lie in time; known once `set_length` was called.
     says_replica : bool
         Whether what is recorded says of which run it is.
     """
 
-    runs = 1
+    count = 1
     says_replica = False
 
-    time: ReplicaTime
-    ends: RunEnds
+    runs: Runs
 
     def __init__(self, scene: Scene, *, everything: bool = False) -> None:
         self.scene = scene
@@ -61,14 +58,10 @@ class Timeline:
         """Return what a block is made with."""
         return self.scene.blocks[name].parameters
 
-    def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
+    def set_length(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Learn the blocks, which are set up, and how long a run lasts."""
-        self.time = ReplicaTime(1, self._run_ticks(duration_s))
-        self.ends = RunEnds(self.time)
-
-    def _run_ticks(self, duration_s: Fraction) -> int:
         ticks = duration_s * self.scene.ticks_per_s
-        return -(-ticks.numerator // ticks.denominator)
+        self.runs = Runs(self.count, -(-ticks.numerator // ticks.denominator))
 
     def clock(self, name: str, component: Component) -> RunClock | None:
         """Return a block's scan clock, or None where it has none of its own."""
@@ -80,7 +73,7 @@ class Timeline:
             return Streams(self.seeds[number]).scan_normals(name, "clock jitter")
 
         everything = self._everything
-        return RunClock(specs, self.scene.ticks_per_s, self.time, jitter, always_draws=everything)
+        return RunClock(specs, self.scene.ticks_per_s, self.runs, jitter, always_draws=everything)
 
     def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
         """Return what each run says of a block's clock; none where it has none of its own."""
@@ -92,7 +85,7 @@ class Timeline:
         faults = None
         if may_be_late(wire, self._everything):
             faults = self.wire_faults(wire)
-        return Channel(wire.source, delay_ticks, faults, self.time, self.ends)
+        return Channel(wire.source, delay_ticks, faults, self.runs)
 
     def wire_faults(self, wire: Wire) -> WireFaults:
         """Return what happens to the rows on a wire that loses or delays some."""
@@ -109,21 +102,27 @@ class Timeline:
         return component
 
     def windows(
-        self, longest_ticks: int, horizon_ticks: int | None, rewinder: Rewinder | None
+        self,
+        longest_ticks: int,
+        scans: float,
+        horizon_ticks: int | None,
+        rewinder: Rewinder | None,
     ) -> Windows:
         """Return the windows of all runs.
 
         Parameters
         ----------
         longest_ticks : int
+        scans : float
+            How many scans of all clocks together each run has, about.
         horizon_ticks : int, optional
             If feedback loops are run in windows: before so long, nothing that is sent comes back.
         rewinder : Rewinder, optional
             If windows may be undone.
         """
-        if rewinder is not None:
-            return RewindingWindows(self.time, longest_ticks, rewinder)
-        return Windows(self.time, longest_ticks, horizon_ticks)
+        if rewinder is not None and horizon_ticks is not None:
+            return RewindingWindows(self.runs, longest_ticks, horizon_ticks, rewinder)
+        return Windows(self.runs, longest_ticks, horizon_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""

@@ -24,7 +24,7 @@ from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
-from dsa_des.time.runs import ReplicaTime, RunEnds
+from dsa_des.time.runs import Runs
 
 
 class Window(NamedTuple):
@@ -64,8 +64,8 @@ class RunningBlock(Protocol):
         """The block itself."""
 
     @property
-    def channels(self) -> Mapping[str, Sequence[Channel]]:
-        """The wires into it, by input."""
+    def wires(self) -> Sequence[Channel]:
+        """The wires into it."""
 
 
 class Windows:
@@ -78,30 +78,31 @@ class Windows:
 
     Parameters
     ----------
-    time : ReplicaTime
-        Knows which runs have their time.
+    runs : Runs
+        Learn which of them go: as many whole ones as a window may hold, or with a horizon all.
     longest_ticks : int
+        Of the runs that go together.
     horizon_ticks : int, optional
         The least delay around the loops of the scene; none where it has no loop.
-    together : int, optional
-        How many runs go through windows together; by default as many whole ones as one may hold.
     """
 
     def __init__(
         self,
-        time: ReplicaTime,
+        runs: Runs,
         longest_ticks: int,
         horizon_ticks: int | None = None,
-        together: int | None = None,
     ) -> None:
-        self.time, self.end_tick, self.longest_ticks = time, time.run_ticks, longest_ticks
-        self._horizon = self.end_tick if horizon_ticks is None else max(1, horizon_ticks)
-        self._together = together
+        self.runs, self.end_tick, self.longest_ticks = runs, runs.run_ticks, longest_ticks
+        self._horizon, self._all_go = self.end_tick, horizon_ticks is not None
+        if horizon_ticks is not None:
+            self._horizon = max(1, horizon_ticks)
+            self.longest_ticks = max(1, longest_ticks // runs.count)  # each has as many scans
         self._begin(0)
 
     def _begin(self, first: int) -> None:
-        together = self._together or max(1, self.longest_ticks // self.end_tick)
-        self.time.runs = range(first, min(first + together, self.time.replicas))
+        together = max(1, self.longest_ticks // self.end_tick)
+        last = self.runs.count if self._all_go else min(first + together, self.runs.count)
+        self.runs.going = range(first, last)
         self.start = 0
         self._ahead = 0  # up to when blocks before the loops have run
 
@@ -109,7 +110,7 @@ class Windows:
         """Let no window be longer than this; called before the first."""
         self.longest_ticks = min(self.longest_ticks, max(1, longest_ticks))
         if self.start == 0:
-            self._begin(self.time.runs.start)
+            self._begin(self.runs.going.start)
 
     def end_after(self, length_ticks: int) -> int:
         """Return where a window of this length from `start` on ends."""
@@ -124,8 +125,8 @@ class Windows:
             ahead = self._ahead = self.end_after(self.longest_ticks // length * length)
         return Window(self.start, min(self.end_after(length), self._ahead), ahead)
 
-    def heard(self, window: Window, failure: Failure | None) -> int | None:
-        """Take note that a window has run, and what a block raised in it.
+    def commit(self, window: Window, failure: Failure | None) -> int | None:
+        """Let a window that has run stand, or undo it; `failure` is what a block raised in it.
 
         Returns
         -------
@@ -134,8 +135,8 @@ class Windows:
             not stand, and what `next` gives is to be run instead.
         """
         self.start = window.end
-        if self.start >= self.end_tick and self.time.runs.stop < self.time.replicas:
-            self._begin(self.time.runs.stop)
+        if self.start >= self.end_tick and self.runs.going.stop < self.runs.count:
+            self._begin(self.runs.going.stop)
         return window.end
 
 
@@ -153,9 +154,8 @@ class Rewinder:
     cut_edges : collection of (source, target)
         Over the wires between these blocks messages come back.
     recorder : Recorder or None
-    trace : list or None
-    ends : RunEnds
-        What is known of when runs end.
+    runs : Runs
+        Forget ends that were undone.
     """
 
     def __init__(
@@ -163,18 +163,17 @@ class Rewinder:
         nodes: Collection[RunningBlock],
         cut_edges: Collection[tuple[str, str]],
         recorder: Recorder | None,
-        trace: list[tuple[int, str]] | None,
-        ends: RunEnds,
+        runs: Runs,
     ) -> None:
-        self._recorder, self._trace = recorder, trace
+        self._recorder = recorder
         self._things: list[Any] = [
             thing
             for node in nodes
             for thing in (node.component, *node.component.context.effects.values())
             if hasattr(thing, "__dict__")
         ]
-        self._things.append(ends)
-        into = [(n.name, c) for n in nodes for wires in n.channels.values() for c in wires]
+        self._things.append(runs)
+        into = [(node.name, channel) for node in nodes for channel in node.wires]
         self._channels = [channel for _, channel in into]
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
@@ -183,7 +182,6 @@ class Rewinder:
         self._states = [_copied(vars(thing)) for thing in self._things]
         self._wires = [channel.state() for channel in self._channels]
         self._recorded = None if self._recorder is None else self._recorder.mark()
-        self._traced = 0 if self._trace is None else len(self._trace)
 
     def restore(self) -> None:
         """Bring everything back to how it was at `mark`."""
@@ -194,13 +192,6 @@ class Rewinder:
             channel.set_state(wire)
         if self._recorder is not None and self._recorded is not None:
             self._recorder.rewind(self._recorded)
-        if self._trace is not None:
-            del self._trace[self._traced :]
-
-    @property
-    def sure_ticks(self) -> int:
-        """How long a window may be in which nothing that is sent in it can come back."""
-        return min((channel.delay_ticks for channel in self._feedback), default=0)
 
     def came_back(self) -> int | None:
         """Return when the first message arrives that came back since `mark` or `restore`."""
@@ -209,20 +200,22 @@ class Rewinder:
 
 
 class RewindingWindows(Windows):
-    """Windows in which nothing came back unseen.
+    """Windows beyond the horizon of a single run, in which nothing came back unseen.
 
     Parameters
     ----------
-    time, longest_ticks
+    runs, longest_ticks, horizon_ticks
         As for `Windows`.
     rewinder : Rewinder
     """
 
-    def __init__(self, time: ReplicaTime, longest_ticks: int, rewinder: Rewinder) -> None:
-        super().__init__(time, longest_ticks)
+    def __init__(
+        self, runs: Runs, longest_ticks: int, horizon_ticks: int, rewinder: Rewinder
+    ) -> None:
+        super().__init__(runs, longest_ticks, horizon_ticks)
         self._rewinder = rewinder
         self._length = 0
-        self._least = rewinder.sure_ticks
+        self._least = self._horizon
         self._came = 0  # when something came back last
         self._right: Window | None = None  # what is right of a window that was undone
         self._careful = False  # whether they run no farther than the rest, after a failure
@@ -240,7 +233,7 @@ class RewindingWindows(Windows):
             end, ahead = min(end, self._ahead), self.start
         return Window(self.start, end, ahead, True)
 
-    def heard(self, window: Window, failure: Failure | None) -> int | None:
+    def commit(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
         back = self._rewinder.came_back()
         early = window.end if back is None else back
@@ -260,7 +253,7 @@ class RewindingWindows(Windows):
             self._rewinder.restore()
             self._right = Window(self.start, early, window.ahead, True)
             return None
-        self._right, self._least = None, self._rewinder.sure_ticks
+        self._right, self._least = None, self._horizon
         self._ahead = max(self._ahead, window.ahead)
         self._careful = False
         if back is None:
@@ -269,11 +262,10 @@ class RewindingWindows(Windows):
             length = max(1, back - self._came) if self._came else self._small()
             self._length = min(length, self.longest_ticks)
             self._came = back
-        return super().heard(window, failure)
+        return super().commit(window, failure)
 
     def _small(self) -> int:
-        small = self.longest_ticks // _RESTART
-        return max(1, min(small, self._rewinder.sure_ticks or small))
+        return max(1, min(self.longest_ticks // _RESTART, self._horizon))
 
 
 def _copied(state: Mapping[str, Any]) -> dict[str, Any]:

@@ -143,26 +143,6 @@ def _depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:
     return {name: place if name in needed else place + later for name, place in depth.items()}
 
 
-def windowed_blocks(
-    graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: Collection[str] = ()
-) -> set[str]:
-    """Return the blocks that may run in look-ahead windows.
-
-    A block runs at the widest grain that it and everything upstream allow: it must declare
-    itself windowed, have no process of its own, queue for no shared processor (`queued`), be in
-    no feedback loop, and be fed by windowed blocks only.
-    """
-    looped = in_cycles(graph)
-    acyclic = graph.subgraph(name for name in graph if name not in looped)
-    windowed: set[str] = set()
-    for name in nx.topological_sort(acyclic):
-        cls = classes[name]
-        alone = cls.process is None and name not in queued
-        if cls.windowed and alone and windowed.issuperset(graph.predecessors(name)):
-            windowed.add(name)
-    return windowed
-
-
 def window_order(
     graph: nx.DiGraph,
     windowed: set[str],
@@ -198,25 +178,3 @@ def with_queues(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.
         wired.add_edge(queue_of.get(source, source), target)
     wired.add_edges_from((block, queue) for block, queue in queue_of.items() if block in graph)
     return wired
-
-
-def windowed_queues(
-    graph: nx.DiGraph,
-    classes: Mapping[str, type[Component]],
-    queues: Mapping[str, Collection[str]],
-    able: Collection[str],
-) -> set[str]:
-    """Return those of the queues in `able` that can be worked through a window at a time.
-
-    Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
-    the queue, through whichever blocks or other queues.
-    """
-    able = set(able)
-    while True:
-        looped = in_cycles(with_queues(graph, {name: queues[name] for name in able}))
-        others = {block for name in set(queues) - able for block in queues[name]}
-        windowed = windowed_blocks(graph, classes, others)
-        left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
-        if left == able:
-            return able
-        able = left

@@ -26,14 +26,8 @@ from dsa_des.scene.checks import (
     read_seed,
     read_text,
 )
-from dsa_des.scene.graph import (
-    build_graph,
-    check_graph,
-    windowed_blocks,
-    windowed_queues,
-)
+from dsa_des.scene.graph import build_graph, check_graph
 from dsa_des.scene.overrides import apply_sets, apply_swap
-from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
@@ -119,12 +113,6 @@ class Scene(Changeable):
         """Return what is wrong with a dotted key of this scene."""
         return Problem(str(self.path), key, message)
 
-    def look_ahead_blocks(self) -> set[str]:
-        """Return the blocks that may run in look-ahead windows."""
-        apart = set(self.queues) - self.windowed_queues()
-        queued = [block for name in apart for block in self.queues[name]]
-        return windowed_blocks(self.graph, self.classes, queued)
-
     @property
     def queues(self) -> dict[str, list[str]]:
         """The blocks that line up at each shared processor, by its name."""
@@ -133,13 +121,6 @@ class Scene(Changeable):
             if block.options.processor:
                 found[block.options.processor].append(name)
         return found
-
-    def windowed_queues(self) -> set[str]:
-        """Return the shared processors that serve a look-ahead window at once."""
-        # Who leaves out scans must know of each whether the processor is busy.
-        policies = {name: find_policy(p.when_busy) for name, p in self.processors.items()}
-        able = [name for name, policy in policies.items() if policy.skips is QueuePolicy.skips]
-        return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

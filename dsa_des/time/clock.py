@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -148,7 +147,6 @@ class ScanClock:
         self._jitter_draw = jitter_draw if spec.jitter_s > 0 or always_draws else None
         self._jitter_ticks = spec.jitter_s * ticks_per_s
         self._jitter_limit = 0.45 * float(period)
-        self._last: tuple[int, int, Any] = (0, -1, None)
 
     def _grid(self, scans: IntArray) -> IntArray:
         ticks: IntArray = self.offset + scans * self._whole
@@ -199,12 +197,6 @@ class ScanClock:
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
-        # Several blocks ask for the same scans of a window, one after the other.
-        if self._last[:2] != (start, end):
-            self._last = start, end, self._between(start, end)
-        return self._last[2]
-
-    def _between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         if end > MAX_TICK:
             raise ValueError(f"end is {end}: ticks must stay below {MAX_TICK} (64 bits)")
         if end <= start:

@@ -7,7 +7,7 @@ import numpy as np
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
 from dsa_des.time.clock import ClockSpec, ScanClock
-from dsa_des.time.runs import ReplicaTime
+from dsa_des.time.runs import Runs
 
 #: Scan numbers, and when these scans are.
 Scans = tuple[IntArray, RunTicks]
@@ -26,7 +26,7 @@ class RunClock:
     specs : sequence of ClockSpec
         One for each run.
     ticks_per_s : int
-    time : ReplicaTime
+    runs : Runs
     jitter : callable
         Given a run's number, returns the draws of its clock's jitter.
     always_draws : bool
@@ -37,13 +37,13 @@ class RunClock:
         self,
         specs: Sequence[ClockSpec],
         ticks_per_s: int,
-        time: ReplicaTime,
+        runs: Runs,
         jitter: Callable[[int], Callable[[IntArray], np.ndarray]],
         *,
         always_draws: bool = False,
     ) -> None:
         self.spec = specs[0]
-        self._time = time
+        self._runs = runs
         rates = {(spec.rate_hz, spec.rate_error_ppm, spec.jitter_s) for spec in specs}
         # Clocks that differ in their offsets only are one array expression.
         self._alike = len(rates) == 1 and self.spec.jitter_s == 0 and not always_draws
@@ -53,7 +53,7 @@ class RunClock:
         ]
         self.period = min(clock.period for clock in self._clocks)
         self._offsets = np.array([spec.offset_s * ticks_per_s for spec in specs], dtype=np.int64)
-        self._runs = range(0)  # those whose scans are kept in `_last` and `_read`
+        self._going = range(0)  # those whose scans are kept in `_last` and `_read`
         self._last: tuple[int, int, Scans] = (0, -1, (_NONE, RunTicks.none()))
         self._read = _NOTHING
 
@@ -64,11 +64,11 @@ class RunClock:
 
     def between(self, start: int, end: int) -> Scans:
         """Return the scans of the runs that go now, with start <= tick < end within each."""
-        if self._runs != self._time.runs:
-            self._runs, self._last, self._read = self._time.runs, (0, -1, self._last[2]), _NOTHING
+        if self._going != self._runs.going:
+            self._going, self._last, self._read = self._runs.going, (0, -1, self._last[2]), _NOTHING
         # Several blocks ask for the same scans of a window, one after the other.
         if self._last[:2] != (start, end):
-            self._last = start, end, self._between(start, min(end, self._time.run_ticks))
+            self._last = start, end, self._between(start, min(end, self._runs.run_ticks))
         return self._last[2]
 
     def before(self, scans: IntArray, run: IntArray) -> IntArray:
@@ -76,13 +76,13 @@ class RunClock:
         if self._alike:
             shift = self._offsets[run] - self._clocks[0].offset
             return np.where(scans > 0, self._clocks[0].before(scans) + shift, -1)
-        found = np.empty_like(scans)
+        ticks = np.empty_like(scans)
         for one in np.unique(run).tolist():
-            found[run == one] = self._clocks[one].before(scans[run == one])
-        return found
+            ticks[run == one] = self._clocks[one].before(scans[run == one])
+        return ticks
 
     def _between(self, start: int, end: int) -> Scans:
-        if self._time.replicas == 1:
+        if self._runs.count == 1:
             scans, ticks = self._clocks[0].between(start, end)
             return scans, RunTicks.of_run(0, ticks)
         if self._alike:
@@ -95,21 +95,21 @@ class RunClock:
         return numbers[rows][order], RunTicks(runs[rows][order], ticks[rows][order])
 
     def _read_ahead(self, start: int, end: int) -> None:
-        """Keep the scans of a while, in order of time: drawn ones are found clock by clock."""
-        until = max(end, min(start + round(_READ_SCANS * self.period), self._time.run_ticks))
-        found = [self._clocks[run].between(start, until) for run in self._runs]
-        ticks = np.concatenate([ticks for _, ticks in found])
-        runs = np.repeat(np.array(self._runs), [len(ticks) for _, ticks in found])
-        numbers = np.concatenate([scans for scans, _ in found])
+        """Keep the scans of a while, in order of time: drawn ones are read clock by clock."""
+        until = max(end, min(start + round(_READ_SCANS * self.period), self._runs.run_ticks))
+        scans_of_each = [self._clocks[run].between(start, until) for run in self._going]
+        ticks = np.concatenate([ticks for _, ticks in scans_of_each])
+        runs = np.repeat(np.array(self._going), [len(ticks) for _, ticks in scans_of_each])
+        numbers = np.concatenate([scans for scans, _ in scans_of_each])
         order = np.argsort(ticks, kind="stable")
         self._read = start, until, ticks[order], runs[order], numbers[order]
 
     def _alike_between(self, start: int, end: int) -> Scans:
-        clock, runs = self._clocks[0], np.array(self._runs, dtype=np.int64)
+        clock, runs = self._clocks[0], np.array(self._going, dtype=np.int64)
         offsets = self._offsets[runs]
         earliest, latest = int(offsets.min()), int(offsets.max())
         scans, ticks = clock.between(start + clock.offset - latest, end + clock.offset - earliest)
         within = ticks + (offsets - clock.offset)[:, np.newaxis]
         wanted = (within >= start) & (within < end)
-        which, place = np.nonzero(wanted)
-        return scans[place], RunTicks(runs[which], within[which, place])
+        which, scan = np.nonzero(wanted)
+        return scans[scan], RunTicks(runs[which], within[which, scan])

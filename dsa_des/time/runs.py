@@ -1,4 +1,4 @@
-"""Which runs of a scene go through time together, and when each ends.
+"""The runs of a scene that share a timeline: which of them go now, and when each ends.
 
 Rows say of which run they are (`Wake.run`, `Message.run`), and their ticks count from its start:
 every array expression over rows is one over runs and rows. Some runs go at a time, side by side,
@@ -6,88 +6,63 @@ and when these have ended the next. A window is a stretch of time of all that go
 stretch's rows of the first of them, then those of the second, and so on.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.time.clock import MAX_TICK
 
 
-@dataclass
-class ReplicaTime:
-    """How many runs there are, how long they are, and which of them go now.
+class Runs:
+    """How many runs there are, how long they last, and which of them go now.
 
     Parameters
     ----------
-    replicas : int
+    count : int
     run_ticks : int
-        Length of each run: it covers [0, run_ticks).
+        Length of each run, unless it ends early: it covers [0, run_ticks).
 
     Attributes
     ----------
-    runs : range
+    going : range
         The runs that go now; all before them have ended.
-    """
-
-    replicas: int
-    run_ticks: int
-
-    def __post_init__(self) -> None:
-        self.runs = range(self.replicas)
-
-    def final_before(self, runs: range, tick: int) -> tuple[int, int]:
-        """Return the run, and its tick, before which no row comes, when runs are at a tick."""
-        if tick >= self.run_ticks:
-            return runs.stop, 0
-        return runs.start, tick if len(runs) == 1 else 0
-
-
-class RunEnds:
-    """Up to when each run of a timeline lasts, as far as that is known.
-
-    Parameters
-    ----------
-    time : ReplicaTime
-
-    Attributes
-    ----------
-    ticks : (runs,) of int64
-        First tick that is no longer part of each run, counted from its start.
+    ends : (count,) of int64
+        First tick that is no longer part of each run, counted from its start, as far as known.
     early : bool
         Whether any run ends before its time.
-    by : dict of str
+    ended_by : dict of str
         Which block ended a run.
     """
 
-    def __init__(self, time: ReplicaTime) -> None:
-        self._time = time
-        self.ticks: IntArray = np.full(time.replicas, time.run_ticks, dtype=np.int64)
+    def __init__(self, count: int = 1, run_ticks: int = MAX_TICK) -> None:
+        self.count, self.run_ticks = count, run_ticks
+        self.going = range(count)
+        self.ends: IntArray = np.full(count, run_ticks, dtype=np.int64)
         self.early = False
-        self.by: dict[int, str] = {}
+        self.ended_by: dict[int, str] = {}
 
-    def note(self, ends: RunTicks, block: str) -> None:
+    def final_before(self, tick: int, going: range) -> tuple[int, int]:
+        """Return the run, and its tick, before which no row comes, when runs are at a tick."""
+        if tick >= self.run_ticks:
+            return going.stop, 0
+        return going.start, tick if len(going) == 1 else 0
+
+    def note_ends(self, instants: RunTicks, block: str) -> None:
         """Take note that a block ends runs at some instants; the first counts."""
-        for run, tick in zip(ends.run.tolist(), ends.tick.tolist(), strict=True):
-            if tick < self.ticks[run]:
-                self.ticks[run] = tick
-                self.by[run] = block
+        for run, tick in zip(instants.run.tolist(), instants.tick.tolist(), strict=True):
+            if tick < self.ends[run]:
+                self.ends[run] = tick
+                self.ended_by[run] = block
                 self.early = True
 
-    def before(self, instants: RunTicks) -> BoolArray:
+    def before_ends(self, instants: RunTicks) -> BoolArray:
         """Return which instants lie before the ends of their runs."""
-        return np.less(instants.tick, self.ticks[instants.run])
+        return np.less(instants.tick, self.ends[instants.run])
 
-    def running(self, runs: IntArray) -> int:
+    def lasting(self, runs: IntArray) -> int:
         """Return how many of some runs are not known to end early."""
-        return int(np.count_nonzero(self.ticks[runs] == self._time.run_ticks))
+        return int(np.count_nonzero(self.ends[runs] == self.run_ticks))
 
-    def passed(self, tick: int) -> bool:
-        """Return whether all runs whose time it is are over before a tick of theirs."""
-        runs = self._time.runs
-        return self.early and bool((self.ticks[runs.start : runs.stop] <= tick).all())
-
-    def cut(self, end: int) -> int:
-        """Return the end of a window, or that of the run that goes alone if it comes first."""
-        runs = self._time.runs
-        return min(end, int(self.ticks[runs.start])) if self.early and len(runs) == 1 else end
+    def over(self, tick: int) -> bool:
+        """Return whether all runs that go are over before a tick of theirs."""
+        return self.early and bool((self.ends[self.going.start : self.going.stop] <= tick).all())

@@ -51,6 +51,7 @@ own -41.3 174.2 1500 217 60 1 0
 own -41.3 174.2 1500 217 60 1 1
 late -41.28 174.23 1600 120 80 -4 0
 late -41.28 174.23 1600 120 80 -4 0.7
+late -41.28 174.23 1600 120 80 -4 1.2
 """
 
 
@@ -60,7 +61,7 @@ def test_a_sample_at_another_instant_than_the_ownship_s_is_left_out(tmp_path: Pa
     (tmp_path / "a.daa").write_text(DAA, encoding="utf-8")
     found = read_encounter(tmp_path / "a.daa", read_conf(tmp_path / "a.conf"))
     assert found.present.tolist() == [[True], [False]]
-    assert found.left_out == 1
+    assert found.left_out == 2
     assert [found.relative[row][0, 0] for row in (0, 1)] == pytest.approx(
         [-0.03 * 60 * 1852 * math.cos(math.radians(41.29)), -0.02 * 60 * 1852], rel=1e-3
     )

@@ -87,7 +87,7 @@ CASES = {
     "alarm_snr": lambda a, b, c: false_alarm_snr(a, false_alarm_probability=0.01, pulses=3),
     "alarm_snr_1": lambda a, b, c: false_alarm_snr(a, false_alarm_probability=0.01),
     "sweep": lambda a, b, c: illumination_offset_s(
-        9 * a - 4, start_rad=-1.9, width_rad=3.8, scan_period_s=1.0, azimuth_rate_rad_s=b - c
+        9 * a - 4, start_rad=-1.9, width_rad=3.8, scan_period_s=1.0
     ),
     "frame": lambda a, b, c: detection_probability(a, b, 0.1 + c),
     "picture": lambda a, b, c: false_alarm_direction(

@@ -58,8 +58,11 @@ def test_an_effect_on_no_hook_is_refused_with_the_nearest(lab, monkeypatch, acts
 def test_an_effect_on_a_hook_of_a_base_class_is_called(lab, monkeypatch):
     monkeypatch.setattr(blocks, "Swapped", radar_with(Halves("SNR")), raising=False)
     scene = load_scene(lab.configs / "first_light.toml", swaps=("radar=engine_blocks:Swapped",))
-    radar = Simulation(scene).components["radar"]
+    simulation = Simulation(scene)
+    radar = simulation.components["radar"]
     assert [factor(None) for factor in radar.snr_factors][-1] == 0.5
+    planned = {item.effect.name for item in simulation.plan if item.built and item.block == "radar"}
+    assert {*radar.context.effects} == planned > {"halves"}
 
 
 def test_two_effects_of_one_name_are_refused(lab, monkeypatch):

@@ -62,7 +62,8 @@ def test_a_copy_replaces_nothing(call: Call, tmp_path: Path) -> None:
 
 def test_a_name_runs_as_its_file_does(call: Call, tmp_path: Path) -> None:
     for number, scene in enumerate(("first_light", str(CONFIGS / "first_light.toml"))):
-        done = call("run", scene, "--duration", "3", "--quiet", "--out", str(number))
+        words = ("--duration", "3", "--quiet", "--no-figures", "--out", str(number))
+        done = call("run", scene, *words)
         assert done.exit_code == 0, done.output
     named, filed = (tmp_path / "0", tmp_path / "1")
     for path in named.glob("*.parquet"):

@@ -36,6 +36,11 @@ def test_graph_as_text_lists_blocks_by_depth() -> None:
     assert order == sorted(order)
 
 
+def test_graph_says_of_a_loop_that_it_runs_in_windows() -> None:
+    every = call("graph", CONFIGS / "avoidance" / "crossing.toml").stdout
+    assert every.count("look") == 10 and "scan by" not in every  # of 10 blocks
+
+
 def test_graph_as_dot_is_the_whole_graph() -> None:
     output = call("graph", CONFIGS / "first_light.toml", "--dot").stdout
     assert output.startswith('digraph "First light" {') and output.rstrip().endswith("}")

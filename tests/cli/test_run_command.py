@@ -93,9 +93,10 @@ def test_resolved_scene_runs_again_to_the_same_bytes(
 
 def test_quiet_prints_nothing_and_a_plain_run_prints_a_table(tmp_path: Path, configs: Path) -> None:
     scene = configs / "first_light.toml"
-    quiet = call("run", scene, "--duration", 5, "--quiet", "--out", tmp_path / "a")
+    words = ("run", scene, "--duration", 5, "--no-figures", "--out", tmp_path / "a")
+    quiet = call(*words, "--quiet")
     assert (quiet.exit_code, quiet.output) == (0, "")
-    plain = call("run", scene, "--duration", 5, "--out", tmp_path / "a")  # replaces a run
+    plain = call(*words)  # replaces a run
     for word in ("radar", "eo", "ir", "head_on", "crossing"):
         assert word in plain.output
 
@@ -103,7 +104,7 @@ def test_quiet_prints_nothing_and_a_plain_run_prints_a_table(tmp_path: Path, con
 def test_seed_and_set_change_what_they_should(tmp_path: Path, configs: Path) -> None:
     def counts(name: str, *options: object) -> dict:
         result = call(
-            "run", configs / "first_light.toml", "--duration", 30, "--json",
+            "run", configs / "first_light.toml", "--duration", 30, "--json", "--no-figures",
             "--out", tmp_path / name, *options,
         )  # fmt: skip
         return json.loads(result.stdout)["sensors"]
@@ -122,7 +123,7 @@ def test_default_folders_are_numbered(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for _ in range(2):
-        call("run", configs / "first_light.toml", "--duration", 1, "--quiet")
+        call("run", configs / "first_light.toml", "--duration", 1, "--quiet", "--no-figures")
     assert sorted(p.name for p in (tmp_path / "runs").iterdir()) == [
         "first_light-001",
         "first_light-002",
@@ -208,7 +209,7 @@ def test_stranger_component_of_the_docs_runs(
     monkeypatch.syspath_prepend(str(tmp_path))
     result = call(
         "run", configs / "first_light.toml", "--swap", "radar=mymodule:MyRadar",
-        "--set", "blocks.radar.reach_km=8", "--json", "--out", tmp_path / "out",
+        "--set", "blocks.radar.reach_km=8", "--json", "--no-figures", "--out", tmp_path / "out",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     radar = json.loads(result.stdout)["sensors"]["radar"]

@@ -50,14 +50,12 @@ SHORTER = (
         re.compile(r"^dsa-des study (?:operators|flown_intercepts)"),
         "--replicas 1 --set set.duration_s=12",
     ),
+    (re.compile(r"^dsa-des study .*--replicas"), "--replicas 2 --workers 1"),
     (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1"),
     (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),
-    (re.compile(r"^dsa-des run .*--(?:set|swap)"), "--duration 10 --no-figures"),
-    (re.compile(r"^dsa-des run closed"), "--duration 10"),
-    (
-        re.compile(r"^dsa-des run avoidance/\S+ (?:--seed 2 )?--out runs/"),
-        "--duration 10 --no-figures",
-    ),
+    (re.compile(r"^dsa-des cost first_light --out"), "--block radar"),
+    # As it stands is run what the README begins with.
+    (re.compile(r"^dsa-des run (?!first_light$)"), "--duration 10 --no-figures"),
 )
 
 

@@ -38,37 +38,43 @@ def _assert_same(results, tables, table):
 
 
 @pytest.mark.parametrize(
-    "sets",
+    ("sets", "end_s"),
     [
-        (),
+        ((), 12),
         # Memory of the last look, rules over many looks, draws of every kind, late blocks.
         (
-            "blocks.eo.dynamic_weight=0.5",
-            "blocks.radar.declare_m=2",
-            "blocks.radar.declare_n=3",
-            "blocks.ir.jitter_s=0.01",
-            "blocks.eo.rate_error_ppm=20",
-            "blocks.fusion.coincidence_s=0.06",
-            "weather.rain_rate_mm_h=5",
-            "navigation.position_noise_m=[5, 5, 5]",
-            "blocks.traffic.intruders[1].start_time_s=20",
+            (
+                "blocks.eo.dynamic_weight=0.5",
+                "blocks.radar.declare_m=2",
+                "blocks.radar.declare_n=3",
+                "blocks.ir.jitter_s=0.01",
+                "blocks.eo.rate_error_ppm=20",
+                "blocks.fusion.coincidence_s=0.06",
+                "weather.rain_rate_mm_h=5",
+                "navigation.position_noise_m=[5, 5, 5]",
+                "blocks.traffic.intruders[1].start_time_s=10",
+            ),
+            16,
         ),
         (
-            "blocks.radar.fluctuation='sampled'",
-            "blocks.radar.false_alarms=true",
-            "blocks.radar.false_alarm_probability=1e-7",
-            "blocks.eo.false_alarms_per_frame=0.1",
+            (
+                "blocks.radar.fluctuation='sampled'",
+                "blocks.radar.false_alarms=true",
+                "blocks.radar.false_alarm_probability=1e-7",
+                "blocks.eo.false_alarms_per_frame=0.1",
+            ),
+            12,
         ),
     ],
     ids=["plain", "memory", "sampled"],
 )
-def test_detections_are_the_same_to_the_bit(configs, flying, sets):
+def test_detections_are_the_same_to_the_bit(configs, flying, sets, end_s):
     scene = configs / "first_light.toml"
     host = flying.Host(scene, sets=sets)
     simulator = flying.Simulator(scene, sets=sets, beyond_fusion=True)
     host.add_planes(simulator)
-    results = flying.fly(simulator, host, 26.0)
-    tables = flying.run_whole(scene, sets=(*sets, "duration_s=26"))
+    results = flying.fly(simulator, host, end_s)
+    tables = flying.run_whole(scene, sets=(*sets, f"duration_s={end_s}"))
     for table in ("detections", "fused", "tracks", "scans"):
         _assert_same(results, tables, table)
 

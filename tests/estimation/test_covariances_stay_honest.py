@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from components.estimation.batched import distance_squared
 from components.estimation.frame import SensorPose
-from components.estimation.kalman import distance_squared, innovation, updated
+from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.motion import ConstantVelocity, predict
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
@@ -78,7 +79,7 @@ def test_normalised_errors_of_far_targets_have_the_mean_of_chi_square():
         seen = expected(kind, truth, place) + rng.normal(size=(3, count)) * np.sqrt(variance)
         state, covariance, found = step("ekf", model, state, covariance, dt, kind, place, variance)
         apart = residual(seen, found.expected)
-        nis.append(distance_squared(found, apart))
+        nis.append(distance_squared(found.root, apart))
         state, covariance = updated(state, covariance, found, apart)
     error = (truth - state).T
     nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance.transpose(2, 0, 1)), error)

@@ -61,6 +61,29 @@ def test_bad_calls(tmp_path):
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
 
 
+def test_a_pack_is_named_after_its_case_and_never_written_over(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = write_case(tmp_path / "here")
+    few = case, "--workers", 1, "--encounters", 4
+    output, code = evidence(*few, "--resume")
+    assert (output, code) == ("error: --resume: there is no packs/case-NNN to continue", 2)
+    case.write_text(CASE.replace('unit = "of the encounters"', ""), encoding="utf-8")
+    assert evidence(*few)[1] == 2 and not (tmp_path / "packs").exists()
+    case.write_text(CASE, encoding="utf-8")
+    mine = tmp_path / "packs" / "case-001"
+    mine.mkdir(parents=True)
+    (mine / "mine.txt").write_text("kept")
+    output, _ = evidence(*few)
+    assert output.endswith("wrote packs/case-002/evidence.html")
+    assert [path.name for path in mine.iterdir()] == ["mine.txt"]
+    made = (tmp_path / "packs/case-002/evidence.json").read_bytes()
+    # The latest is gone on with: there is nothing left to run.
+    output, _ = evidence(*few, "--resume")
+    assert output.endswith("wrote packs/case-002/evidence.html")
+    assert (tmp_path / "packs/case-002/evidence.json").read_bytes() == made
+    assert {path.name for path in (tmp_path / "packs").iterdir()} == {"case-001", "case-002"}
+
+
 def test_where_no_folder_can_be_made(tmp_path):
     """Linux takes no folder in /proc, and calls it missing."""
     if not Path("/proc/self").exists():

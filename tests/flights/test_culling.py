@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.flights.culling import Culling
+from components.flights.culling import near_intervals
 from components.flights.legs import Straight, Turn, Waypoint, Waypoints
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
@@ -20,6 +20,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 OWN = ScriptedTrajectory("own", lat_deg=52.0, lon_deg=4.0, alt_m=1000, speed_mps=50)
+ALONE = ScriptedFleet([OWN])
 
 
 def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
@@ -63,11 +64,11 @@ def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
 def test_whoever_comes_in_reach_is_active(seed: int) -> None:
     targets = flights(60, seed)
     fleet = ScriptedFleet(targets)
-    culling = Culling(OWN, fleet, 15_000.0, 320.0)
+    intervals = near_intervals(ALONE, fleet, 15_000.0, 320.0)
     left_out = 0
     for start in np.arange(0, 300, 7.3):
         times = np.linspace(start, start + 13.0, 60)
-        columns = culling.active(times[0], times[-1])
+        columns = intervals.during(times[0], times[-1])
         own, all_states = OWN.at(times), fleet.at(times)
         _, _, range_m = line_of_sight(
             own.lat_deg[:, None], own.lon_deg[:, None], own.alt_m[:, None],
@@ -84,7 +85,7 @@ def test_whoever_comes_in_reach_is_active(seed: int) -> None:
 
 def test_intervals_are_those_of_entry_and_exit() -> None:
     targets, reach = flights(80, 11), 15_000.0
-    found = Culling(OWN, ScriptedFleet(targets), reach, 400.0).intervals
+    found = near_intervals(ALONE, ScriptedFleet(targets), reach, 400.0)
     times = np.arange(0, 400, 0.05)
     own, states = OWN.at(times), ScriptedFleet(targets).at(times)
     _, _, range_m = line_of_sight(
@@ -113,20 +114,21 @@ def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
         )
 
     targets = [flight("early", 0, 20), flight("late", 70, None), flight("always", 0, None)]
-    culling = Culling(flight("own", 0, 60), ScriptedFleet(targets), 1000.0, 100.0)
-    assert culling.intervals.target.tolist() == [0, 2]
-    assert culling.intervals.end_s == pytest.approx([20, 60], abs=0.6)
-    none = Culling(OWN, ScriptedFleet([]), 1000.0, 100.0)
-    assert len(none.active(0, 100)) == 0 == none.intervals.most_at_once()
+    own = ScriptedFleet([flight("own", 0, 60)])
+    found = near_intervals(own, ScriptedFleet(targets), 1000.0, 100.0)
+    assert found.target.tolist() == [0, 2]
+    assert found.end_s == pytest.approx([20, 60], abs=0.6)
+    none = near_intervals(ALONE, ScriptedFleet([]), 1000.0, 100.0)
+    assert len(none.during(0, 100)) == 0 == none.most_at_once()
 
 
 def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:
     beside = ScriptedTrajectory.from_offset(
         "beside", east_m=15_000, north_m=0, up_m=0, reference=(52.0, 4.0, 1000.0), speed_mps=50
     )
-    culling = Culling(OWN, ScriptedFleet([beside]), 15_000.0, 86_400.0)
-    assert len(culling.intervals.target) < 200
-    assert culling.active(40_000, 40_001).tolist() == [0]
+    found = near_intervals(ALONE, ScriptedFleet([beside]), 15_000.0, 86_400.0)
+    assert len(found.target) < 200
+    assert found.during(40_000, 40_001).tolist() == [0]
 
 
 def test_speed_bounds_hold_for_sampled_flights() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from components.flights.legs import Straight, Turn
+from components.flights.many_flights import SteeredFlight
 from components.flights.point_mass import eased_turn
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 
 G_M_S2 = 32.2 * 0.3048

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from components.flights.legs import Straight, Turn
-from components.flights.many_flights import MixedFleet
+from components.flights.many_flights import MixedFleet, SteeredFlight
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 
 TIMES = np.arange(0.0, 41.0)

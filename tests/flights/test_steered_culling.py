@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from components.flights.culling import SHORTEST_EPOCH_S, SteeredCulling, range_between
+from components.flights.culling import SHORTEST_EPOCH_S, SteeredCulling
+from components.flights.many_flights import SteeredFleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
-from components.flights.steered_flight import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
@@ -26,13 +26,9 @@ def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
     )  # fmt: skip
 
 
-def near(culling, own, fleet, times):
+def near(culling, own, times):
     """Return which targets may be in reach of one ownship at times, (times, targets)."""
-    run = np.zeros(len(times), dtype=np.int64)
-    return culling.near(
-        run, times, own.fastest_by(times),
-        lambda _, target, time_s: range_between(own.at, fleet.each, target, time_s),
-    )  # fmt: skip
+    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)
 
 
 @pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])
@@ -44,18 +40,16 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
         for i in range(60)
     ]  # fmt: skip
     fleet = ScriptedFleet(targets)
-    own = SteeredFlight(flight("own", 52.0, 4.0, 20.0, 70.0))
-    culling = SteeredCulling(
-        np.array([own.max_speed_mps]), fleet.max_speeds_mps[np.newaxis], reach_m
-    )
+    own = SteeredFleet(ScriptedFleet([flight("own", 52.0, 4.0, 20.0, 70.0)]))
+    culling = SteeredCulling(own, fleet, reach_m)
     assert culling.epoch_s[0] >= SHORTEST_EPOCH_S
     in_reach = left_out = 0
     now = 0.0
     for _ in range(12):
         later = now + draw.uniform(1.0, 60.0)
         times = np.sort(draw.uniform(now, later, 40))
-        whole = near(culling, own, fleet, times)
-        here, there = own.at(times), fleet.at(times)
+        whole = near(culling, own, times)
+        here, there = own[0].at(times), fleet.at(times)
         _, _, range_m = line_of_sight(
             here.lat_deg[:, None], here.lon_deg[:, None], here.alt_m[:, None],
             there.lat_deg, there.lon_deg, there.alt_m,
@@ -64,12 +58,12 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
         in_reach += (range_m <= reach_m).sum()
         left_out += (~whole).sum()
         for row in (0, 17):  # an instant alone says the same
-            alone = near(culling, own, fleet, times[row : row + 1])
+            alone = near(culling, own, times[row : row + 1])
             assert alone.tolist() == whole[row : row + 1].tolist()
         turn = Manoeuvre(math.radians(draw.uniform(-170, 170)), math.radians(3.0))
-        own = own.steered(later, turn)
+        own = own.steered(np.array([0]), np.array([later]), [turn])
         culling.forget(np.array([0]))
-        assert own.max_speed_mps < 70.0 * 1.01
+        assert own[0].max_speed_mps < 70.0 * 1.01
         now = later
     assert in_reach > 0
     assert left_out > 0
@@ -114,13 +108,14 @@ def test_whoever_comes_in_reach_of_an_ownship_that_was_told_to_fly_faster_is_nea
                    draw.uniform(0, 360), draw.uniform(0, 60))
             for i in range(200)
         ]  # fmt: skip
-        fleet, own = ScriptedFleet(targets), SteeredFlight(flight("own", 52.0, 4.0, 20.0, 40.0))
-        speeds = np.array([own.max_speed_mps]), fleet.max_speeds_mps[np.newaxis]
-        culling = SteeredCulling(*speeds, 3000.0)
-        own = own.steered(5.0, Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0))
+        fleet = ScriptedFleet(targets)
+        own = SteeredFleet(ScriptedFleet([flight("own", 52.0, 4.0, 20.0, 40.0)]))
+        culling = SteeredCulling(own, fleet, 3000.0)
+        faster = Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0)
+        own = own.steered(np.array([0]), np.array([5.0]), [faster])
         times = np.arange(6.0, 200.0, 0.5)
-        whole = near(culling, own, fleet, times)
-        here, there = own.at(times), fleet.at(times)
+        whole = near(culling, own, times)
+        here, there = own[0].at(times), fleet.at(times)
         _, _, range_m = line_of_sight(
             here.lat_deg[:, None], here.lon_deg[:, None], here.alt_m[:, None],
             there.lat_deg, there.lon_deg, there.alt_m,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from components.flights.many_flights import SteeredFlight
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flight import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from components.metrics.flown_flights import flown_as_steered

@@ -10,7 +10,17 @@ if sys.platform == "win32":
 from fuzz_cases import KINDS, Case, make_case
 from fuzz_judge import judge
 
+from dsa_des.scene.scene import load_scene
+from tests.warm_server import build_models
+
 EACH = 8
+
+
+@pytest.fixture(scope="module", autouse=True)
+def loaded(configs):
+    """Do once what each case would do after it was forked."""
+    load_scene(configs / "first_light.toml")
+    build_models()
 
 
 @pytest.mark.parametrize("number", range(EACH))

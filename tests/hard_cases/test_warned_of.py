@@ -83,10 +83,10 @@ def test_a_carrier_in_gigahertz_is_named_and_not_the_range(scene):
 
 def test_notes_go_to_standard_error_and_run_json(scene, tmp_path):
     scene.write_text(RADAR.replace("false_alarm_probability = 1e-6\n", ""))
-    done = run("run", scene, "--json", "--out", "a")
+    done = run("run", scene, "--json", "--no-figures", "--out", "a")
     assert json.loads(done.stdout)
     assert done.stderr == f"1 note: dsa-des check {scene}\n"
-    assert run("run", scene, "--quiet", "--out", "b").output == ""
+    assert run("run", scene, "--quiet", "--no-figures", "--out", "b").output == ""
     for folder in "ab":
         (text,) = json.loads((tmp_path / folder / "run.json").read_text())["notes"]
         assert text.startswith("blocks.radar: false_alarm_probability is 0.05")

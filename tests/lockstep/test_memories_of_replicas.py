@@ -2,12 +2,15 @@
 
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.memory import LevelMemory, MemoryRule
+from components.messages.detections import Detections
+from components.sensor.declaration import DeclaredPlaces
 from components.tracking.stub import TrackerStub
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.files.toml_files import to_toml
@@ -40,6 +43,37 @@ def test_places_of_a_replica_that_has_no_scan_for_a_while(lock):
     found = tables["detections"].to_pylist()
     mine = [row["declared"] for row in found if row["block"] == "radar" and row["replica"] == 0]
     assert {*mine} == {True, False}
+
+
+def seen_at(run, scan, number):
+    """A report of rows of (run, scan), each with one place of some number, at a second a scan."""
+    value, none = 0.5 * number, np.full(len(run), np.nan)
+    return Detections(
+        tick=scan, scan=scan, run=run, evaluated=np.ones(len(run), int), skipped={},
+        offsets=np.arange(len(run) + 1), target=np.full(len(run), -1), azimuth_rad=value,
+        elevation_rad=0.0 * value, range_m=none, confidence=value, true_azimuth_rad=value,
+        true_elevation_rad=value, true_range_m=value, extras={},
+        roster=SimpleNamespace(names=()),
+    )  # fmt: skip
+
+
+def test_places_are_remembered_run_by_run():
+    """A place seen twice in five scans is declared; scans of runs have numbers far apart."""
+    rule = SimpleNamespace(declare_m=2, declare_n=5, declare_speed_m_s=50.0, declare_rate_deg_s=5.0)
+    judge = DeclaredPlaces(SimpleNamespace(p=rule, context=SimpleNamespace(ticks_per_s=1)))
+    draws, seen, declared = np.random.default_rng(4), {}, []
+    for window in range(40):
+        which = [r for r in range(3) if draws.random() < 0.6] or [1]
+        run = np.repeat(which, 2)
+        scan = 2 * window + 100 * (2 - run) + np.tile([0, 1], len(which))
+        number = draws.integers(0, 6, len(run))
+        found = judge(seen_at(run, scan, number), None, None).extras["declared"]
+        for r, s, k, said in zip(*map(np.ndarray.tolist, (run, scan, number, found)), strict=True):
+            before = [seen.get((r, s - back)) for back in (1, 2, 3, 4)]
+            assert said == (k in before), (window, r)
+            seen[r, s] = k
+            declared.append(said)
+    assert 20 < sum(declared) < len(declared) - 20
 
 
 def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
@@ -90,7 +124,7 @@ def test_each_of_split_blocks_reports_of_its_own_length(tmp_path):
     )
     simulation.run()
     assert "tracker" in simulation.timeline.split
-    ends_s = (simulation.ends.ticks / simulation.ticks_per_s).tolist()
+    ends_s = (simulation.runs.ends / simulation.ticks_per_s).tolist()
     assert len({*ends_s}) == 3
     lasted = {key[0]: said["lasted_s"]["here"] for key, said in told.items() if "lasted_s" in said}
     assert lasted == dict(enumerate(ends_s))

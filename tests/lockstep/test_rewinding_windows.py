@@ -7,7 +7,7 @@ import pytest
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.running.grain import cut_loops
+from dsa_des.running.loops import cut_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
@@ -62,19 +62,19 @@ def test_windows_are_few_when_what_comes_back_is_regular():
 
 def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
     """A block that only fails on a path that is not flown does not fail."""
-    from components.flights.steered_flight import SteeredFlight
+    from components.flights.many_flights import SteeredFleet
 
     scene = load_scene(SCENE, sets=[MANY], duration_s="90")
     _, expected = run(scene)
     first_turn_s = expected["manoeuvres"]["time_s"][0].as_py() + 0.5
-    straight = SteeredFlight.at
+    straight = SteeredFleet.each
 
-    def refuse_to_go_straight(self, time_s):
-        if not self.parts and (time_s > first_turn_s + 1.0).any():
+    def refuse_to_go_straight(self, aircraft, time_s, known=None):
+        if not self.manoeuvre_count.any() and (time_s > first_turn_s + 1.0).any():
             raise RuntimeError("nobody flies here")
-        return straight(self, time_s)
+        return straight(self, aircraft, time_s, known)
 
-    monkeypatch.setattr(SteeredFlight, "at", refuse_to_go_straight)
+    monkeypatch.setattr(SteeredFleet, "each", refuse_to_go_straight)
     _, tables = run(scene)
     assert all(tables[name].equals(rows) for name, rows in expected.items())
 

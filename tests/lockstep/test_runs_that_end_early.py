@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from components.encounters.ending import ClosestApproachPassed
@@ -65,10 +66,10 @@ def test_replicas_end_by_themselves(lock, tmp_path, text, kind, window):
     scene = loaded(tmp_path, text, kind)
     scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}, {SPEED: 0.0})
     simulation = lock.same_as_alone(scenes, window=window)
-    assert (simulation.time.runs.start == 0) == (text is CROSSING or window is None)
+    assert (simulation.runs.going.start == 0) == (text is CROSSING or window is None)
     assert ("over" in simulation.timeline.split) == (kind != OURS)
-    assert len(set(simulation.ends.ticks.tolist())) == 3
-    assert simulation.ends.by.keys() >= {0, 1}
+    assert len(set(simulation.runs.ends.tolist())) == 3
+    assert simulation.runs.ended_by.keys() >= {0, 1}
 
 
 def test_a_replica_s_record_says_how_long_it_was(tmp_path):
@@ -101,7 +102,7 @@ def test_what_has_ended_runs_no_more(tmp_path):
     node.runner = Watching
     windows = []
     simulation.run(windows.append)
-    ends_s = simulation.ends.ticks / simulation.ticks_per_s
+    ends_s = simulation.runs.ends / simulation.ticks_per_s
     for number in (0, 1):
         # What is behind the end in the window in which it came is not run either.
         assert max(t for r, t in seen if r == number) < ends_s[number]
@@ -114,7 +115,7 @@ def test_a_single_run_ends_at_the_same_tick_in_any_window(lock, tmp_path, text, 
     scene = loaded(tmp_path, text)
     one, first = lock.tables_of(Simulation, scene)
     other, second = lock.tables_of(Simulation, scene, **options)
-    assert one.ends.ticks.tolist() == other.ends.ticks.tolist() < [one.time.run_ticks]
+    assert one.runs.ends.tolist() == other.runs.ends.tolist() < [one.runs.run_ticks]
     assert first == second
 
 
@@ -129,8 +130,24 @@ def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
     )
     NEAR[text] = NEAR[HEAD_ON]
     scene = loaded(tmp_path, text)
-    simulation = lock.same_as_alone(lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}))
-    assert simulation.ends.early
+    scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0})
+    simulation = lock.same_as_alone(scenes)
+    together = lock_step(scenes)
+    fusion = together.nodes["fusion"]
+    came, runner = [], fusion.runner
+
+    class Watching:
+        @staticmethod
+        def run(wake):
+            came.extend(
+                together.runs.before_ends(new.instants) for new in wake.arrivals("detections")
+            )
+            return runner.run(wake)
+
+    fusion.runner = Watching
+    together.run()
+    assert np.concatenate(came).all()
+    assert simulation.runs.early
     one, first = lock.tables_of(Simulation, scene)
     assert first["state_tracks"].num_rows > 0
     _, second = lock.tables_of(Simulation, scene, window=1)
@@ -150,7 +167,7 @@ def test_an_end_in_a_loop_is_the_same_in_any_window(tmp_path):
     scene = loaded(tmp_path, text)
     plain, short = Simulation(scene), Simulation(scene, window=1)
     assert plain.run().duration_s == short.run().duration_s < 40
-    assert plain.ends.by == {0: "over"}
+    assert plain.runs.ended_by == {0: "over"}
 
 
 def test_a_host_is_told_that_it_ends_its_runs_itself(tmp_path):

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.running.grain import opened_loops
+from dsa_des.running.loops import opened_loops
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
 
@@ -27,7 +27,7 @@ def test_an_avoidance_that_turns_each_ownship_by_itself(lock):
     scene = load_scene(CROSSING, duration_s="40", sets=NEARER)
     simulation = lock.same_as_alone(lock.replicas_of(scene, *FLIGHTS), window=9)
     _, tables = lock.tables_of(lock_step, lock.replicas_of(scene, *FLIGHTS))
-    assert len(simulation.time.runs) > 1
+    assert len(simulation.runs.going) > 1
     assert len(set(tables["manoeuvres"]["replica"].to_pylist())) > 1
 
 

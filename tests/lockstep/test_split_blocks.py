@@ -149,4 +149,4 @@ def test_what_comes_between_scans_waits_for_the_instance(lock, monkeypatch):
     scene = load_scene("configs/avoidance/crossing.toml", duration_s="14", sets=sets)
     offsets = [{"blocks.alerting.offset_s": Fraction(n, 2)} for n in (0, 11)]
     simulation = lock.same_as_alone(lock.replicas_of(scene, *offsets))
-    assert len(simulation.time.runs) > 1 and "alerting" in simulation.timeline.split
+    assert len(simulation.runs.going) > 1 and "alerting" in simulation.timeline.split

@@ -7,19 +7,19 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
 from dsa_des.running.windows import Windows
-from dsa_des.time.runs import ReplicaTime, RunEnds
+from dsa_des.time.runs import Runs
 
 RUN_TICKS = 60
 
 
-def as_held(time, ends, sent, asked, longest, together=None):
+def as_held(runs, sent, asked, longest, horizon=None):
     """Whether every replica holds at each tick that it asks about what came there last."""
-    channel = Channel("source", 0, None, time, ends)
-    windows = Windows(time, longest, together)
+    channel = Channel("source", 0, None, runs)
+    windows = Windows(runs, longest, horizon)
     told = 0
 
     def inside(ticks, start, end):
-        found = [(k, t) for k in time.runs for t in ticks[k] if start <= t < end]
+        found = [(k, t) for k in runs.going for t in ticks[k] if start <= t < end]
         return RunTicks(*np.array(found, dtype=np.int64).reshape(-1, 2).T)
 
     while (window := windows.next()) is not None:
@@ -36,26 +36,25 @@ def as_held(time, ends, sent, asked, longest, together=None):
                 got = int(found[0].run[row]), int(found[0].tick[row])
             assert got == (max(came) if came else None), (run, tick)
             told += got is not None
-        windows.heard(window, None)
+        windows.commit(window, None)
     return told
 
 
 @pytest.mark.parametrize("ended", [(), (2,), (0, 2)])
 def test_what_came_long_ago_is_held_beside_a_replica_that_is_told_all_the_time(ended):
     """The first asks at the instants at which it is told, for longer than rows pile up."""
-    time = ReplicaTime(4, RUN_TICKS)
-    ends = RunEnds(time)
+    runs = Runs(4, RUN_TICKS)
     for replica in ended:
-        ends.note(RunTicks.of_run(replica, np.array([40])), "over")
+        runs.note_ends(RunTicks.of_run(replica, np.array([40])), "over")
     last = [40 if replica in ended else RUN_TICKS for replica in range(4)]
     sent = [range(last[0]), [3], [0, 5], [2, 30]]
     asked = [range(last[0]), [50, 58], [5], [30, 55]]
-    assert as_held(time, ends, sent, asked, 1, 4) == last[0] + 5
+    assert as_held(runs, sent, asked, 1, 4) == last[0] + 5
 
 
 @pytest.mark.parametrize("step", [1, 7, 64, 300])
 def test_what_came_at_the_very_start_is_held_to_the_end_of_its_run(step):
     """One replica runs after the other, or some at a time."""
-    time = ReplicaTime(3, RUN_TICKS)
+    runs = Runs(3, RUN_TICKS)
     sent, asked = [[0], [4], [0, 20]], [range(0, RUN_TICKS, 3)] * 3
-    assert as_held(time, RunEnds(time), sent, asked, step) == 20 + 18 + 20
+    assert as_held(runs, sent, asked, step) == 20 + 18 + 20

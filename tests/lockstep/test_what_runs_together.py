@@ -75,12 +75,18 @@ def test_flights_over_terrain(lock):
     assert isinstance(other, Failed) and "must be below the ownship" in other.error
 
 
-def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path, closed):
+    """In a loop all runs go side by side; without one they come one after the other."""
     path = tmp_path / "distributed.toml"
     cueing = Path("configs/tracking/cueing.toml").resolve()
-    path.write_text(DISTRIBUTED.format(cueing=cueing), encoding="utf-8")
+    text = DISTRIBUTED.format(cueing=cueing)
+    if not closed:
+        text = "\n".join(line for line in text.splitlines() if "holds" not in line)
+    path.write_text(text, encoding="utf-8")
     rates = ["blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1"]
-    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON[1:], *rates])
+    dwell = [] if closed else ["blocks.radar.cued_dwell_factor=1"]
+    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON[1:], *rates, *dwell])
     late = [
         replace(wire, jitter_s=Fraction(2, 5)) if wire.source == "second" else wire
         for wire in scene.wires
@@ -91,7 +97,9 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
         for tenths in (1, 6, 2)
     ]
     scenes = lock.replicas_of(replace(scene, wires=late), *phases)
-    assert not lock.same_as_alone(scenes, window=11).timeline.split
+    simulation = lock.same_as_alone(scenes, window=11)
+    assert not simulation.timeline.split
+    assert (simulation.time.runs == range(3)) == closed
     _, tables = lock.tables_of(lock_step, scenes)
     fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
     assert len({*fused["replica"].to_pylist()}) == 3
@@ -123,7 +131,7 @@ def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
     phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
     scenes = lock.replicas_of(scene, *phases)
     simulation = lock.same_as_alone(scenes, window=None if closed else 2)
-    assert (simulation.time.runs == range(3)) == closed
+    assert (simulation.runs.going == range(3)) == closed
     assert not simulation.timeline.split
 
 
@@ -131,7 +139,7 @@ def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next(loc
     """Each run goes through several windows, and they run one after the other."""
     scene = load_scene("configs/systems/tecvol_tracked.toml", duration_s="6")
     simulation = lock.same_as_alone(lock.replicas_of(scene, {}, {}, {}), window=9)
-    assert simulation.time.runs == range(2, 3)
+    assert simulation.runs.going == range(2, 3)
 
 
 @pytest.mark.parametrize("late", ["rerun", "one_step"])
@@ -146,5 +154,5 @@ def test_looks_that_come_late_in_a_loop_are_remembered_by_run(lock, late):
     ]
     simulation = lock.same_as_alone(lock.replicas_of(replace(scene, wires=wires), {}, {}, {}))
     assert not simulation.timeline.split
-    assert len(simulation.time.runs) == 3
+    assert len(simulation.runs.going) == 3
     assert simulation.components["tracker"]._past

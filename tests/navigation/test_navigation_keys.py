@@ -142,10 +142,13 @@ def test_noise_lasts_as_long_as_the_scene_says():
             assert left == pytest.approx(math.exp(-0.25 * later / lasts_s), abs=0.15)
 
 
-@pytest.mark.parametrize("mount", [{}, {"mount_azimuth_deg": 70.0, "mount_roll_deg": 25.0}])
-def test_variances_have_the_pose_that_navigation_knows(mount):
+@pytest.mark.parametrize(
+    ("mount", "attitude_deg"),
+    [({}, [1.5, 0.6, 0.9]), ({"mount_azimuth_deg": 70.0, "mount_roll_deg": 25.0}, [0.0, 1.5, 0.0])],
+)
+def test_variances_have_the_pose_that_navigation_knows(mount, attitude_deg):
     """By brute force: where a place in space lies in body axes for many poses as believed."""
-    noise = {"position_noise_m": [9.0, 4.0, 6.0], "attitude_noise_deg": [1.5, 0.6, 0.9]}
+    noise = {"position_noise_m": [9.0, 4.0, 6.0], "attitude_noise_deg": attitude_deg}
     stated = {"errors": "stated", "azimuth_error_deg": 0.7, "range_error_m": 3.0,
               "quantised": False, **mount}  # fmt: skip
     plain, known = (

@@ -1,5 +1,6 @@
 """The camera that sees pictures: pixels of targets, rendered areas, and flow."""
 
+import functools
 import math
 import subprocess
 import sys
@@ -163,10 +164,14 @@ def test_pixels_are_those_of_an_independent_projection(seen):
     "exposure_s", "frame_interval_s", "texture_contrast", "texture_pixels", of=("optical.image",)
 )  # fmt: skip
 def test_smear_and_fine_clutter_hide_a_target_and_flow_grows_with_time(configs):
-    def median(name, texture=0.0, **keys):
-        sets = [f"blocks.eo.{key}={value}" for key, value in keys.items()]
+    @functools.cache
+    def recorded(texture, keys):
+        sets = [f"blocks.eo.{key}={value}" for key, value in keys]
         sets.append(f"blocks.eo.texture_contrast={texture}")
-        table = detections(configs, *sets, "duration_s=6", TURNING, NEAR)[1]
+        return detections(configs, *sets, "duration_s=6", TURNING, NEAR)[1]
+
+    def median(name, texture=0.0, **keys):
+        table = recorded(texture, tuple(keys.items()))
         values = np.array(table[name].to_pylist(), dtype=float)
         turning = np.array(table["time_s"].to_pylist()) > 3.1
         return np.nanmedian(np.abs(values[turning]))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from components.radar.beam import first_illumination
-from components.traffic.source import TrafficSource
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -62,8 +61,8 @@ def body_azimuths(simulation: Simulation, target: int, times: np.ndarray) -> tup
     """Azimuth and range by the exact flights, at any times."""
     traffic = simulation.components["traffic"]
     transform = simulation.components["transform"]
-    states = traffic.flights(traffic.own, np.array([target]), times[:, np.newaxis])
-    seen = transform._revisited(*states)
+    flights = (traffic.own, traffic.targets[target])
+    seen = transform._revisited(*(flight.at(times[:, np.newaxis]) for flight in flights))
     return seen["body_azimuth_rad"][:, 0], seen["range_m"][:, 0]
 
 
@@ -137,6 +136,6 @@ def test_a_passing_target_that_outruns_the_beam_for_a_while_is_still_found() -> 
 
 
 def test_targets_that_cannot_be_revisited_are_refused(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(TrafficSource, "_steer", lambda *_: (None, None))
+    monkeypatch.setattr("components.traffic.source.KnownFlights", lambda *_: None)
     with pytest.raises(BlockFailure, match="beam_sweep needs to know the targets at instants"):
         simulate(tmp_path)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.flights.steered_flight import SteeredFlight
+from components.flights.many_flights import SteeredFlight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.steering import Manoeuvre
@@ -73,8 +73,8 @@ def simulate(tmp_path: Path, scene: str = SCENE, **options: Any) -> tuple[Any, d
 def seen_from(simulation: Any, own: Any, target: int, time_s: float) -> tuple[float, float]:
     """Return the azimuth and range of a target at a time, if the ownship flies like this."""
     traffic, transform = simulation.components["traffic"], simulation.components["transform"]
-    states = traffic.flights(own, np.array([target]), np.array([[time_s]]))
-    seen = transform._revisited(*states)
+    flights = (own, traffic.targets[target])
+    seen = transform._revisited(*(flight.at(np.array([[time_s]])) for flight in flights))
     return seen["body_azimuth_rad"][0, 0], seen["range_m"][0, 0]
 
 
@@ -90,8 +90,7 @@ JITTERED = SCENE.replace("delay_s = 0.7", "delay_s = 0.2, jitter_s = 2").replace
 def test_any_window_gives_the_same_rows(tmp_path: Path, scene: str) -> None:
     _, whole = simulate(tmp_path, scene)
     assert whole["manoeuvres"].num_rows >= 3
-    windows = [{"window": 1}, {"window": 2}, {"window": 7}]
-    for options in (*windows, {"window": 31}, {"shuffle_ties": 2}):
+    for options in ({"window": 1}, {"window": 7}, {"window": 31, "shuffle_ties": 2}):
         _, other = simulate(tmp_path, scene, **options)
         for name, table in whole.items():
             assert table.equals(other[name]), (name, options)
@@ -147,42 +146,44 @@ def test_without_manoeuvres_the_targets_would_be_elsewhere(tmp_path: Path) -> No
 def test_rows_keep_the_flights_they_know() -> None:
     """Rows of many messages, joined, cut and picked, answer as each would alone."""
 
-    def flight(north_deg: float) -> Any:
-        def states(columns: Any, time_s: Any) -> Any:
+    class Manoeuvres:
+        """Ownships that are 100 times their run and as many degrees north as is known of them."""
+
+        def __init__(self, count: int) -> None:
+            self.manoeuvre_count = count
+
+        def states(self, run: Any, known: Any, columns: Any, time_s: Any, ahead_s: Any) -> Any:
+            assert (known <= self.manoeuvre_count).all()
             zero = np.zeros(time_s.shape)
-            own = TrajectoryState(zero + north_deg, zero, zero, zero, zero, zero, zero == 0)
+            north = zero + 100 * run + known
+            own = TrajectoryState(north, zero, zero, zero, zero, zero, zero == 0)
+            time_s = time_s + ahead_s
             other = TrajectoryState(time_s, zero + columns, zero, zero, zero, zero, zero == 0)
             return own, other
 
-        return states
-
-    flights = [flight(north_deg) for north_deg in range(4)]
+    runs, knows = np.array([0, 0, 0, 0, 7, 7, 7]), np.array([0, 1, 1, 1, 1, 3, 2])
     parts = [
-        KnownFlights([flights[0], flights[1]], np.array([0, 1, 1])),
-        KnownFlights([flights[1]], np.array([0])),
-        KnownFlights([flights[3], flights[2], flights[1]], np.array([2, 0, 1])),
+        KnownFlights(Manoeuvres(count), runs[rows], knows[rows])
+        for count, rows in ((1, slice(0, 3)), (4, slice(3, 4)), (3, slice(4, 7)))
     ]
-    knows = np.array([0, 1, 1, 1, 1, 3, 2])
     joined = KnownFlights.join_rows(parts)
-    assert len(joined.flights) == 4
+    assert joined.flights is parts[1].flights
+    north = 100 * runs + knows
     columns, rows = np.array([5, 8]), np.array([6, 0, 3, 5, 5])
     time_s = np.arange(14.0).reshape(7, 2)
     for one, which in ((joined, np.arange(7)), (joined.take_rows(rows), rows)):
         own, other = one(columns, time_s[which])
-        assert (own.lat_deg == knows[which, np.newaxis]).all()
+        assert (own.lat_deg == north[which, np.newaxis]).all()
         assert (other.lat_deg == time_s[which]).all()
         assert (other.lon_deg == columns).all()
-    assert len(joined.take_rows(slice(1, 5)).flights) == 1
 
     def northward(own: Any, other: Any) -> Any:
-        return {"north_deg": other.lat_deg - own.lat_deg}
+        return {"north_deg": other.lat_deg - own.lat_deg, "of": {"target": other.lon_deg}}
 
-    def southward(own: Any, other: Any) -> Any:
-        return {"north_deg": own.lat_deg - other.lat_deg}
-
-    halves = [joined.take_rows(slice(0, 4)).seen_by(northward),
-              joined.take_rows(slice(4, 7)).seen_by(southward)]  # fmt: skip
-    found = KnownFlights.join_rows(halves)(columns, time_s)["north_deg"]
-    expected = time_s - knows[:, np.newaxis]
-    expected[4:] *= -1.0
-    assert (found == expected).all()
+    halves = [joined.take_rows(rows).seen_by(northward) for rows in (slice(0, 4), slice(4, 7))]
+    seen = KnownFlights.join_rows(halves)
+    assert (seen(columns, time_s)["north_deg"] == time_s - north[:, np.newaxis]).all()
+    row, ahead_s = np.array([5, 0, 6]), np.array([0.5, 0.25, 0.0])
+    each = seen.each(row, np.array([8, 5, 8]), time_s[row, 0], ahead_s)
+    assert (each["north_deg"] == time_s[row, 0] + ahead_s - north[row]).all()
+    assert each["of_target"].tolist() == [8, 5, 8]

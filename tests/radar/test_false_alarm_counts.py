@@ -7,23 +7,18 @@ import numpy as np
 import pytest
 from scipy.special import bdtr, gammaincc
 
+from components.messages.reach import Reach
 from components.radar.detection.output import (
     false_alarm_count,
     false_alarm_snr,
 )
-from components.radar.resolution import resolution_cells
+from components.radar.resolution import ResolutionCells
 
 # The thesis's radar: ±110° by ±20° at 1°, 76.2 m cells out to 6.5 km.
-OASYS = resolution_cells(
-    azimuth_start_rad=math.radians(-110),
-    azimuth_width_rad=math.radians(220),
-    lowest_elevation_rad=math.radians(-20),
-    highest_elevation_rad=math.radians(20),
-    nearest_m=0.0,
-    farthest_m=6500.0,
-    azimuth_cell_rad=math.radians(1),
-    elevation_cell_rad=math.radians(1),
-    range_cell_m=76.2,
+OASYS = ResolutionCells.filling(
+    Reach((math.radians(-110), math.radians(110)), (math.radians(-20), math.radians(20)), 6500.0),
+    0.0,
+    (math.radians(1), math.radians(1), 76.2),
 )
 
 
@@ -118,26 +113,7 @@ def test_bad_input_is_named(call, words):
         call()
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"azimuth_width_rad": 7.0}, "azimuth_width_rad is 7"),
-        ({"range_cell_m": 0.0}, "range_cell_m is 0"),
-        ({"nearest_m": 200.0}, "farthest_m is 100"),
-        ({"highest_elevation_rad": -1.0}, "highest_elevation_rad is -1"),
-        ({"range_cell_m": 1e-14}, "1e15"),
-    ],
-)
-def test_bad_field_of_view_is_named(change, words):
-    good = {
-        "azimuth_width_rad": 1.0,
-        "lowest_elevation_rad": 0.0,
-        "highest_elevation_rad": 0.1,
-        "nearest_m": 0.0,
-        "farthest_m": 100.0,
-        "azimuth_cell_rad": 0.1,
-        "elevation_cell_rad": 0.1,
-        "range_cell_m": 10.0,
-    }
-    with pytest.raises(ValueError, match=words):
-        resolution_cells(**{**good, **change})
+def test_more_cells_than_can_be_counted_are_refused():
+    reach = Reach((0.0, 1.0), (0.0, 0.1), 100.0)
+    with pytest.raises(ValueError, match="1e15"):
+        ResolutionCells.filling(reach, 0.0, (0.1, 0.1, 1e-14))

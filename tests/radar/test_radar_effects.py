@@ -125,7 +125,7 @@ VARIANTS = [
 
 @pytest.mark.parametrize("changes", VARIANTS)
 def test_neither_windows_nor_neutral_effects_change_a_bit(scene, rcs_file, changes):
-    path = scene(**changes, duration_s=6)
+    path = scene(**changes, duration_s=3)
     _, whole = simulate(path)
     assert radar_rows(whole)
     for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):
@@ -203,7 +203,7 @@ def test_false_alarms_show_downstream_and_start_no_track(scene):
 
 @pytest.mark.parametrize("gate", [0, 0.3])
 def test_false_alarms_pass_fusion_in_any_window(scene, gate):
-    path = scene(CELLS, f"[blocks.fusion]\ncoincidence_s = {gate}\n")
+    path = scene(CELLS, f"[blocks.fusion]\ncoincidence_s = {gate}\n", duration_s=6)
     _, whole = simulate(path)
     assert any(row["target"] is None for row in whole["fused"].to_pylist())
     for window in (1, 7):
@@ -295,7 +295,8 @@ def test_all_effects_together_in_any_window(scene):
         CELLS + 'beam_sweep = true\nfluctuation = "sampled"\nminimum_range_m = 500\n'
         "mount_azimuth_deg = 20\nmount_roll_deg = 5\n"
     )
-    path = scene(radar, "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 0.2\ngas = true\n")
+    world = "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 0.2\ngas = true\n"
+    path = scene(radar, world, duration_s=6)
     _, whole = simulate(path)
     rows = radar_rows(whole)
     assert {row["target"] for row in rows} >= {"a", None}

@@ -41,7 +41,7 @@ def judged(seed: int, folder: Path) -> tuple[str, set[str]]:
     sink = ColumnSink()
     together = lock_step(scenes, recorder=Recorder([sink]), window=dice.pick(None, None, 5, 40))
     together.run()
-    assert len(together.time.runs) > 1
+    assert len(together.runs.going) > 1
     tables = plain(sink.tables())
     features = dice.features | {f"split {name}" for name in together.timeline.split}
     if len(tables["manoeuvres"]["tick"]):

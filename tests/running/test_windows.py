@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.cli import main
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import Window, Windows
+from dsa_des.running.windows import Rewinder, Window, Windows
 from dsa_des.scene.scene import load_scene
-from dsa_des.time.runs import ReplicaTime
+from dsa_des.time.runs import Runs
 
 LOOP = "configs/benchmark/manoeuvres.toml"
 FEEDBACK = '{ from = "end", to = "cue.cue", delay = "1 scan", holds = "nothing" }'
@@ -23,7 +24,7 @@ FEEDBACK = '{ from = "end", to = "cue.cue", delay = "1 scan", holds = "nothing" 
 def all_of(windows):
     found = []
     while (window := windows.next()) is not None:
-        assert windows.heard(window, None) == window.end
+        assert windows.commit(window, None) == window.end
         found.append(tuple(window[:2]))
     return found
 
@@ -32,42 +33,42 @@ def all_of(windows):
     ("longest", "expected"), [(4, [(0, 4), (4, 8), (8, 10)]), (10, [(0, 10)]), (99, [(0, 10)])]
 )
 def test_equal_windows_cover_a_run_once(longest, expected):
-    assert all_of(Windows(ReplicaTime(1, 10), longest)) == expected
-    windows = Windows(ReplicaTime(1, 10), longest)
+    assert all_of(Windows(Runs(1, 10), longest)) == expected
+    windows = Windows(Runs(1, 10), longest)
     windows.limit(0)  # no window is shorter than a tick
     assert all_of(windows) == [(k, k + 1) for k in range(10)]
 
 
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
 def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
-    time, ran, count = ReplicaTime(4, 10), [], 0
-    windows = Windows(time, longest)
+    runs, ran, count = Runs(4, 10), [], 0
+    windows = Windows(runs, longest)
     while (window := windows.next()) is not None:
-        ran += [(run, tick) for tick in range(*window[:2]) for run in time.runs]
-        assert len(time.runs) == 1 or window[:2] == (0, 10)
-        assert windows.heard(window, None) == window.end
+        ran += [(run, tick) for tick in range(*window[:2]) for run in runs.going]
+        assert len(runs.going) == 1 or window[:2] == (0, 10)
+        assert windows.commit(window, None) == window.end
         count += 1
     assert sorted(ran) == [(run, tick) for run in range(4) for tick in range(10)]
     assert count == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
 
 
 def test_windows_of_runs_together_come_back_to_each_of_them():
-    time = ReplicaTime(4, 10)
-    windows = Windows(time, 4, together=3)
+    runs = Runs(4, 10)
+    windows = Windows(runs, 16, 9)
     found = []
     while (window := windows.next()) is not None:
-        found.append((time.runs, *window[:2]))
-        windows.heard(window, None)
+        found.append((runs.going, *window[:2]))
+        windows.commit(window, None)
     cuts = [(0, 4), (4, 8), (8, 10)]
-    assert found == [(runs, *cut) for runs in (range(3), range(3, 4)) for cut in cuts]
+    assert found == [(range(4), *cut) for cut in cuts]
 
 
 def test_rows_are_final_up_to_where_all_runs_have_come():
-    time = ReplicaTime(9, 10)
-    assert time.final_before(range(2, 5), 7) == (2, 0)
-    assert time.final_before(range(2, 5), 10) == (5, 0)
-    assert time.final_before(range(2, 3), 7) == (2, 7)
-    assert ReplicaTime(1, 10).final_before(range(1), 7) == (0, 7)
+    runs = Runs(9, 10)
+    assert runs.final_before(7, range(2, 5)) == (2, 0)
+    assert runs.final_before(10, range(2, 5)) == (5, 0)
+    assert runs.final_before(7, range(2, 3)) == (2, 7)
+    assert Runs(1, 10).final_before(7, range(1)) == (0, 7)
 
 
 def a_loop(lab, end, back):
@@ -107,9 +108,9 @@ def test_a_loop_that_cannot_be_rewound_runs_in_windows_that_nothing_comes_back_i
 
 
 def test_blocks_before_a_loop_run_ahead_of_it():
-    windows, found = Windows(ReplicaTime(1, 100), 40, 15), []
+    windows, found = Windows(Runs(1, 100), 40, 15), []
     while (window := windows.next()) is not None:
-        assert windows.heard(window, None) == window.end
+        assert windows.commit(window, None) == window.end
         found.append((window.start, window.end, window.ahead))
     assert found == [(0, 15, 30), (15, 30, 15), (30, 45, 60), (45, 60, 45), (60, 75, 90),
                      (75, 90, 75), (90, 100, 100)]  # fmt: skip
@@ -118,8 +119,8 @@ def test_blocks_before_a_loop_run_ahead_of_it():
 class Wilful(Timeline):
     """One run in windows of lengths that a die throws."""
 
-    def windows(self, longest_ticks, horizon_ticks, rewinder):
-        inner = super().windows(longest_ticks, horizon_ticks, rewinder)
+    def windows(self, *lengths_and_rewinder):
+        inner = super().windows(*lengths_and_rewinder)
         self.made = WilfulWindows(inner)
         return self.made
 
@@ -135,10 +136,10 @@ class WilfulWindows:
         self.inner.limit(self.dice.randrange(10**9, 20 * 10**9))
         return self.inner.next()
 
-    def heard(self, window, failure):
+    def commit(self, window, failure):
         assert failure is None and isinstance(window, Window)
         self.seen.append(window)
-        return self.inner.heard(window, failure)
+        return self.inner.commit(window, failure)
 
 
 @pytest.mark.parametrize("sets", [[], ["blocks.avoidance.pause_s=5"]])
@@ -164,16 +165,16 @@ def test_a_pacer_waits_for_what_is_final_only():
     class Undecided(Windows):
         tries = 0
 
-        def heard(self, window, failure):
+        def commit(self, window, failure):
             self.tries += 1
             ran.append(window.end)
-            return super().heard(window, failure) if self.tries % 2 == 0 else None
+            return super().commit(window, failure) if self.tries % 2 == 0 else None
 
     now = [50.0]
     pacer = Pacer(2.0, lambda: now[0], lambda s: (waits.append(s), now.__setitem__(0, now[0] + s)))
     scene = load_scene("configs/first_light.toml", duration_s="0.4")
     simulation = Simulation(scene)
-    simulation.windows = Undecided(simulation.time, simulation.end_tick)
+    simulation.windows = Undecided(simulation.runs, simulation.end_tick)
     now[0] = 70.0  # until the run begins, no time goes by
     simulation.run_window = lambda window: None
     simulation.run(pacer=pacer)
@@ -196,3 +197,13 @@ def test_a_pacer_that_was_stopped_ends_the_run():
 
     simulation.run(stop, pacer)
     assert pacer.time_s == 2.0
+
+
+def test_an_end_found_in_a_window_that_is_undone_was_never_found():
+    runs = Runs(1, 100)
+    rewinder = Rewinder([], set(), None, runs)
+    rewinder.mark()
+    runs.note_ends(RunTicks.of_run(0, np.array([40])), "over")
+    assert runs.early and runs.ended_by == {0: "over"}
+    rewinder.restore()
+    assert not runs.early and runs.ended_by == {} and runs.ends.tolist() == [100]

@@ -69,13 +69,22 @@ def test_far_below_the_noise_a_report_is_anywhere_in_the_cell():
 def test_what_the_ground_makes_of_a_look_lies_in_the_cell_as_well():
     """A threshold for noise alone, and ground that crosses it: nothing is where the target is."""
     target = {**crooked.DIVING, **STILL, "rcs_dbsm": -100.0}
-    radar = sensor("radar.swerling", **{**RADAR, "clutter_threshold": "noise"})
+    radar = sensor("radar.swerling", **{**RADAR, "clutter_threshold": "noise", "power_w": 1e4})
     terrain = {"height_m": 1850.0, "clutter_gamma_db": -75.0}
     scene = chain({"radar": radar}, ownship=OWN, targets=[target], duration_s=10, terrain=terrain)
     found = rows(run(scene))
-    assert len(found) > 3 * PFA * 2000
-    for row in found:
-        assert row["azimuth_rad"] != row["true_azimuth_rad"]
+    share = len(found) / 2000
+    assert 3 * PFA < share < 0.9
+    width = math.radians(BEAM_DEG[0])
+    number = round(found[0]["true_azimuth_rad"] / width)
+    place = np.array([row["azimuth_rad"] for row in found]) / width - number + 0.5
+    deviation = np.sqrt([row["azimuth_variance_rad2"] for row in found]) / width
+    assert kstest(spread_in_cell(place, deviation), "uniform").pvalue > 1e-3
+    # As strong as what crosses: an exponential power of noise and ground, whose mean its share is.
+    threshold = -math.log(PFA)
+    mean = threshold / -math.log(share)
+    beyond = 1.0 + 10.0 ** (0.1 * np.array([row["snr_db"] for row in found])) - threshold
+    assert kstest(beyond / mean, "expon").pvalue > 1e-3
 
 
 @pytest.mark.parametrize("power_w", [3.0, 30.0])

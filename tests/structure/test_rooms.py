@@ -27,6 +27,7 @@ COMMON_WORDS = {
     "scan", "scans", "offsets",  # what a clock counts, and how entries belong to rows
     "columns",  # what tables have, and messages about targets
     "skipped",  # what becomes of a message at a busy processor
+    "ticks_per_s",  # of the clock
     "confidence",  # of an interval
     "pixels",  # a unit
     "truth",  # what a ladder compares with

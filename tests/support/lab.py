@@ -30,6 +30,17 @@ def write_scene(folder, blocks, wires, *, duration_s=1, seed=3, name="scene.toml
     return path
 
 
+class _Noting:
+    """Notes when a block runs, also in windows that are undone later."""
+
+    def __init__(self, name, runner, trace):
+        self.name, self.runner, self.trace = name, runner, trace
+
+    def run(self, wake):
+        self.trace += [(tick, self.name) for tick in wake.ticks.tolist()]
+        return self.runner.run(wake)
+
+
 def run_scene(path, *, window=None, shuffle_ties=None, record=True, sinks=(), **load):
     """Run a scene; return its trace, Arrow tables, outcome and simulation."""
     memory = MemorySink()
@@ -39,8 +50,9 @@ def run_scene(path, *, window=None, shuffle_ties=None, record=True, sinks=(), **
         window=window,
         shuffle_ties=shuffle_ties,
         recorder=Recorder([memory, *sinks]) if record else None,
-        trace=trace,
     )
+    for node in simulation.nodes.values():
+        node.runner = _Noting(node.name, node.runner, trace)
     outcome = simulation.run()
     tables = memory.tables() if record else {}
     return SimpleNamespace(trace=trace, tables=tables, outcome=outcome, simulation=simulation)

@@ -1,11 +1,7 @@
-"""What stands where on the page, in a real browser: names, zoom, and pages beside each other.
-
-Left out by name where Playwright's Python package or a Chromium is missing.
-"""
+"""What stands where on the page, in a real browser: names, zoom, and pages beside each other."""
 
 import itertools
 import math
-import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -16,23 +12,13 @@ from click.testing import CliRunner
 import dsa_des
 from components.examples import folder
 from components.view.command import view
+from tests.results.test_study_report import call
+from tests.results.test_study_report import folder as studied
 from tests.view.test_page import SCENE
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None:
-    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
-
+study = studied
 NEAR = SCENE.format(title="t", name="near")
 INTRUDER = NEAR[NEAR.index("[[blocks.traffic.intruders]]") :]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield launched
-        launched.close()
 
 
 def opened_page(browser, path, width=1280, height=800, hash=""):
@@ -219,6 +205,22 @@ def test_what_is_pressed_is_large_enough_for_a_finger(browser, tmp_path, width):
         box = one.bounding_box()
         assert min(box["width"], box["height"]) >= 24, one.evaluate("e => e.outerHTML")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.close()
+
+
+def test_the_report_of_a_study_is_no_wider_than_its_window(browser, study):
+    """With all that is folded opened; tables wider than a telephone scroll by themselves."""
+    assert call("report", study).exit_code == 0
+    page, wrong = opened_page(browser, study / "report.html")
+    page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    wider = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth)"
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate(f"{wider}.length") > 0
+    images = page.evaluate("[...document.images].map(one => one.getBoundingClientRect().right)")
+    assert images and max(images) <= 390
+    assert wrong == []
     page.close()
 
 

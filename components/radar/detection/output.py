@@ -45,7 +45,7 @@ def measured_snr(
 ) -> Any:
     """Return the SNR that a detection seems to have, given that it crosses the threshold.
 
-    Detector output over its mean for noise, minus 1, linear, per pulse, never below 0. `tail` in
+    Detector output over its mean for noise, minus 1, linear, per pulse, from -1 on. `tail` in
     [0, 1] is the share of detections of such echoes that come out stronger, so that uniform numbers
     give the distribution; `snr` the echo's mean SNR per pulse, 0 for noise alone; `threshold` that
     of the sum of pulses, in units of a pulse's mean noise.
@@ -68,7 +68,7 @@ def measured_snr(
     share = np.maximum(share, 2.0**-54)
     with np.errstate(under="ignore"):  # far tails are 0
         output = _beyond(share, mean, level, count, name)
-    return unflatten(np.maximum(np.maximum(output, level) / count - 1.0, 0.0), shape)
+    return unflatten(np.maximum(output, level) / count - 1.0, shape)
 
 
 def _beyond(
@@ -224,7 +224,7 @@ def false_alarm_snr(
     if threshold is None:
         pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
         threshold = float(detection_threshold(checked_pulses(pulses), pfa))
-    return measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses)
+    return np.maximum(measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses), 0.0)
 
 
 def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:

@@ -9,14 +9,23 @@ import argparse
 import csv
 import gzip
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, panels
 from docs.make.published.rows import PublishedRow, table
-from docs.make.published.turn_flights import KT_MPS, LeastRange, closing_speeds, least_ranges
-from docs.make.published.turn_geometry import as_searched_m
+from docs.make.published.turn_flights import (
+    KT_MPS,
+    LeastRange,
+    closing_speeds,
+    counted_m,
+    least_ranges,
+    turns_deg,
+)
+from docs.make.published.turn_geometry import least_range_m
+from dsa_des.arrays.types import FloatArray
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
@@ -41,37 +50,51 @@ SHOWN_KT = (35, 105, 195)
 SHOWN_DEG = (0.25, 15.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 
 
-def risk_ratio(
-    found: list[LeastRange],
-    intruder_kt: float,
-    field_deg: float,
-    range_m: float,
-    steps_more: float | None = 0.0,
-) -> float:
-    """Return the share of collision courses that a camera's turns do not lead out of.
+@dataclass(frozen=True)
+class GridCourses:
+    """The collision courses of the publication's grid of azimuths, and what each of them needs."""
 
-    As the publication counts: courses from every azimuth of its grid alike, needed ranges as its
-    search finds them, or so many of its steps longer; with None, ranges as they are.
+    azimuth_deg: FloatArray
+    flown_m: FloatArray
+    #: As the publication would step, search and count it; and how far a step of its search is.
+    counted_m: FloatArray
+    step_m: FloatArray
+
+    def risk_ratio(
+        self, field_deg: float, range_m: float, *, steps_more: float = 0.0, as_flown: bool = False
+    ) -> float:
+        """Return the share of courses that a camera's turns do not lead out of.
+
+        As the publication counts: courses from every azimuth alike; needed ranges as its search
+        finds them, or so many of its steps longer, or as they are flown.
+        """
+        needed_m = self.flown_m if as_flown else self.counted_m + steps_more * self.step_m
+        seen = self.azimuth_deg <= 0.5 * field_deg
+        return 1.0 - float((seen & (needed_m < range_m)).mean())
+
+
+def grid_courses(found: list[LeastRange], intruder_kt: float) -> GridCourses:
+    """Return what all courses of the grid need, by flights from some of its azimuths.
+
+    Between these azimuths what flights need more than geometry goes along straight lines; courses
+    of which none was flown are not led out of.
     """
-    azimuths = np.arange(GRID_DEG, 180.0, GRID_DEG)
-    courses = [closing_speeds(azimuth, intruder_kt * KT_MPS) for azimuth in azimuths]
-    every, cleared = sum(map(len, courses)), 0
+    rows = []
     for course in (0, 1):
         mine = [one for one in found if one.course == course]
-        if not mine:
-            continue
-        flown_m = np.interp(
-            azimuths, [one.azimuth_deg for one in mine], [one.range_m for one in mine]
-        )
-        for azimuth, speeds, least_m in zip(azimuths, courses, flown_m, strict=True):
-            if len(speeds) <= course or azimuth > 0.5 * field_deg:
+        at_deg = np.array([one.azimuth_deg for one in mine])
+        off_m = np.array([one.range_m - one.geometry_m for one in mine])
+        for azimuth in np.arange(GRID_DEG, 180.0, GRID_DEG).tolist():
+            closing = closing_speeds(azimuth, intruder_kt * KT_MPS)
+            if len(closing) <= course:
                 continue
-            needed_m = float(least_m)
-            if steps_more is not None:
-                needed_m = as_searched_m(needed_m, speeds[course])
-                needed_m += steps_more * STEP_S * speeds[course]
-            cleared += needed_m < range_m
-    return 1.0 - cleared / every
+            speed, flown_m, needed_m = closing[course], math.inf, math.inf
+            if mine:
+                more_m = float(np.interp(azimuth, at_deg, off_m))
+                flown_m = least_range_m(azimuth, speed, turns_deg(azimuth)) + more_m
+                needed_m = counted_m(azimuth, speed, more_m)
+            rows.append((azimuth, flown_m, needed_m, STEP_S * speed))
+    return GridCourses(*np.array(rows).T)
 
 
 def published_ranges() -> dict[tuple[float, float, int], float]:
@@ -100,32 +123,41 @@ one is found at which the nearer of the two aircraft passes at 152.4 m. Any othe
 **Whose are the differences?** The same turn in closed form over a flat Earth
 (`docs/make/published/turn_geometry.py`: heading from the logarithm of cos p t, the latest range as
 the largest root over all times) gives our flown ranges to {geometry_m:.2f} m and {geometry_s:.4f} s
-of closing, at all {number} azimuths and courses. So what is left is how theirs is searched and
-counted. Read in the open code: they begin 190 s before the collision, go by 0.1 s, and a turn that
-they count from t begins with the state two steps before (arrays count from one); they take modified
-tau, that is D²/(190 s · v) less than the range. Read off the numbers, as the function that searches
-is not in what we could read: every published range, to 5 digits, is that of an instant to which ten
-halvings of the 190 s lead, to the next tenth of a second. These instants are 0.186 s apart: a least
-range is one of a staircase, up to a step nearer than the disc allows. So the page shows ours as
-their search would count them (`as_searched_m`), and *equal* is within one of its steps of {step:g}
-s at closing speed. Without it, as flown, ours differ by {longer_low:+.2f} to {longer_high:+.2f} s.
+of closing, at all {number} azimuths and courses. So what is left is how theirs is stepped,
+searched and counted. Read in the open code: they begin 190 s before the collision, go by 0.1 s, and
+a turn that they count from t begins with the state two steps before (arrays count from one); the
+bank of a step is that of its end; they take modified tau, that is D²/(190 s · v) less than the
+range. Read off the numbers, as the function that searches is not in what we could read: every
+published range, to 5 digits, is that of an instant to which ten halvings of the 190 s lead, to the
+next tenth of a second, 0.186 s apart; a turn ends before the step that would go beyond it, and from
+there both fly straight, the intruder one step ahead. Counted so (`stepped_least_range_m`,
+`as_searched_m`), geometry alone gives {stepped} of the {every:,} published ranges to the digit, and
+the others to {most_s:.2f} s. So the page shows ours as they would count them: what our
+flights need more than geometry, {geometry_m:.2f} m at most, is added to the stepped turn before the
+search. *Equal* is within one step of it, {step:g} s at closing speed. As flown, ours differ by
+{longer_low:+.2f} to {longer_high:+.2f} s.
 
-What was chosen: turns by 90° to the better side; from behind 140° also by 75°, as theirs are better
-there than turns by 90° are. They are not at hand in the project; what stands here of them is read
-where the page is made.
+What was chosen: turns by 90° to the better side; from behind 140° also by 60° and 75°, as theirs
+are better there than turns by 90° are. They are not at hand in the project; what stands here of
+them is read where the page is made.
 
 {table}
 
 {counted} The largest difference is {largest:.2f} s of closing; {same} are the same number.
 
 From it the risk ratio of a camera of 60° by 1000 m, as they count: the share of courses, all
-azimuths of their grid of 0.25° alike, that it does not lead out of; our ranges between azimuths
-of 5° by straight lines. In brackets: were all ranges one of their steps shorter, or longer.
+azimuths of their grid of 0.25° alike, that it does not lead out of; what our flights need more than
+geometry goes between azimuths of 5° along straight lines. In brackets: were all ranges one of their
+steps shorter, or longer.
 
 {ratios}
 
-At 175 and 185 kt the needed range is 1000 m to within a step of theirs wherever a camera of 60°
-looks, so their staircase decides: of ranges as flown the ratios there are {exactly}.
+None of these ratios was used to find how they count. At 175 and 185 kt the needed range is 1000 m
+to within a step of theirs wherever a camera of 60° looks, so their staircase decides: of ranges as
+flown the ratios there are {exactly}. One azimuth of the grid is 0.0014, and of one at each of these
+speeds, 3.25° and 22.25°, it turns on less than 0.2 m whether it is cleared, by which our flights
+need less than geometry does: they roll in through 16 pieces of steady turn. Of geometry alone,
+counted in the same way, the ratios of the table are {alone}.
 
 ![Least range by azimuth; risk ratio over field of view and range](images/{figure})
 
@@ -162,6 +194,30 @@ def differences_s(found: dict[int, list[LeastRange]], *, as_flown: bool = False)
     ]
 
 
+def by_geometry(intruder_kt: float) -> list[LeastRange]:
+    """Return least ranges of one azimuth's courses that need what geometry says, unflown."""
+    azimuth = AZIMUTHS_DEG[0]
+    closing = closing_speeds(azimuth, intruder_kt * KT_MPS)
+    return [
+        LeastRange(azimuth, course, speed, least_range_m(azimuth, speed, turns_deg(azimuth)))
+        for course, speed in enumerate(closing)
+    ]
+
+
+def counted_alike() -> tuple[int, int, float]:
+    """Return how many published ranges geometry alone gives, of how many, and to how many seconds.
+
+    Of one side, as both are alike. An instant of their search is a tenth of a second, so whatever
+    differs by less than a hundredth is the same one.
+    """
+    off = [
+        (counted_m(azimuth, closing[course], 0.0) - theirs_m) / closing[course]
+        for (kt, azimuth, course), theirs_m in published_ranges().items()
+        if 0.0 < azimuth < 180.0 and len(closing := closing_speeds(azimuth, kt * KT_MPS)) > course
+    ]
+    return sum(abs(one) < 0.01 for one in off), len(off), max(map(abs, off))
+
+
 def section(images: Path) -> str:
     """Fly all speeds and return the section."""
     in_view = [azimuth for azimuth in AZIMUTHS_DEG if azimuth <= 30.0]
@@ -172,24 +228,29 @@ def section(images: Path) -> str:
     off, longer = differences_s(found), differences_s(found, as_flown=True)
     equal = sum(abs(one) < STEP_S + _ROUNDED_S for one in off)
     _draw(images / FIGURE, found)
-    exact = [f"{risk_ratio(found[kt], kt, 60.0, 1000.0, None):.4f}" for kt in (175, 185)]
+    courses = {kt: grid_courses(ranges, kt) for kt, ranges in found.items()}
+    exact = [f"{courses[kt].risk_ratio(60.0, 1000.0, as_flown=True):.4f}" for kt in (175, 185)]
+    stepped, every, most_s = counted_alike()
+    alone = [grid_courses(by_geometry(kt), kt).risk_ratio(60.0, 1000.0) for kt in RATIOS]
     return _TEXT.format(
+        stepped=f"{stepped:,}", every=every, most_s=most_s,
+        alone=", ".join(f"{ratio:.4f}" for ratio in alone),
         step=STEP_S, table=table(range_rows(found)), number=len(flown), geometry_m=max(off_m),
         geometry_s=max(off_s), longer_low=min(longer), longer_high=max(longer),
         counted=f"Of all {len(off)} azimuths and courses that are published, {equal} are equal.",
         same=sum(abs(one) < 1e-3 for one in off), largest=max(map(abs, off)),
-        ratios=table(ratio_rows(found)), exactly=" and ".join(exact), figure=FIGURE,
+        ratios=table(ratio_rows(courses)), exactly=" and ".join(exact), figure=FIGURE,
     )  # fmt: skip
 
 
-def ratio_rows(found: dict[int, list[LeastRange]]) -> list[PublishedRow]:
+def ratio_rows(courses: dict[int, GridCourses]) -> list[PublishedRow]:
     """Return the rows of the risk ratios."""
     return [
         PublishedRow(
-            f"risk ratio at {kt} kt", published, risk_ratio(found[kt], kt, 60.0, 1000.0),
+            f"risk ratio at {kt} kt", published, courses[kt].risk_ratio(60.0, 1000.0),
             within=5e-4, digits=4,
-            interval=(risk_ratio(found[kt], kt, 60.0, 1000.0, -1.0),
-                      risk_ratio(found[kt], kt, 60.0, 1000.0, 1.0)),
+            interval=(courses[kt].risk_ratio(60.0, 1000.0, steps_more=-1.0),
+                      courses[kt].risk_ratio(60.0, 1000.0, steps_more=1.0)),
         )
         for kt, published in RATIOS.items()
     ]  # fmt: skip
@@ -209,7 +270,8 @@ def _draw(path: Path, found: dict[int, list[LeastRange]]) -> None:
         ranges.set(xlabel="azimuth (°)", ylabel="least range (m)", title="flown; grey: published")
         ranges.legend()
         fields, reaches = np.arange(20.0, 361.0, 10.0), np.arange(200.0, 1501.0, 50.0)
-        ratio = [[risk_ratio(found[105], 105, f, r) for f in fields] for r in reaches]
+        needed = grid_courses(found[105], 105)
+        ratio = [[needed.risk_ratio(f, r) for f in fields] for r in reaches]
         lines = ratios.contour(fields, reaches, ratio, levels=[0.1, 0.3, 0.5, 0.7, 0.9])
         ratios.clabel(lines)
         ratios.set(xlabel="field of view (°)", ylabel="range (m)", title="risk ratio, 105 kt")
@@ -228,7 +290,8 @@ def main(arguments: list[str] | None = None) -> None:
     for one in found:
         say(f"{one.azimuth_deg:g}, {one.course}, {one.closing_mps:.4f}, {one.range_m:.1f}, "
             f"{one.geometry_m:.1f}, {one.published_m:.1f}")  # fmt: skip
-    ratio = risk_ratio(found, given.speed_kt, given.field_deg, given.range_m)
+    courses = grid_courses(found, given.speed_kt)
+    ratio = courses.risk_ratio(given.field_deg, given.range_m)
     say(f"risk ratio of {given.field_deg:g} deg by {given.range_m:g} m: {ratio:.4f}")
 
 

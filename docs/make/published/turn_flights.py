@@ -12,13 +12,19 @@ import numpy as np
 
 import dsa_des
 from components.geometry import line_of_sight
-from docs.make.published.turn_geometry import BEFORE_S, DISC_M, OWN_MPS, as_searched_m
+from docs.make.published.turn_geometry import (
+    BEFORE_S,
+    DISC_M,
+    OWN_MPS,
+    as_searched_m,
+    stepped_least_range_m,
+)
 from docs.make.published.turn_geometry import least_range_m as by_geometry_m
 
 SCENE = "published/least_range"
 KT_MPS = 1852.0 / 3600.0
 #: Turns that are tried: by 90 deg, or somewhat less where the intruder comes from behind.
-_BEHIND_DEG, TURNS_DEG, TURNS_BEHIND_DEG = 140.0, (90.0,), (75.0, 90.0)
+_BEHIND_DEG, TURNS_DEG, TURNS_BEHIND_DEG = 140.0, (90.0,), (60.0, 75.0, 90.0)
 # From the disc to beyond where any of these turns is late; how far from a guess is looked first.
 _NEAREST_M, _FARTHEST_M, _ABOUT_M = 155.0, 2500.0, 8.0
 _TRIES, _NEAR_ENOUGH_M = 20, 0.2
@@ -36,8 +42,9 @@ class LeastRange:
 
     @property
     def published_m(self) -> float:
-        """The same range as the publication's search would find and count it."""
-        return as_searched_m(self.range_m, self.closing_mps)
+        """The same range as the publication would step, search and count it."""
+        flown_more_m = self.range_m - self.geometry_m
+        return counted_m(self.azimuth_deg, self.closing_mps, flown_more_m)
 
     @property
     def flown_to_disc_m(self) -> float:
@@ -53,6 +60,12 @@ class LeastRange:
 def turns_deg(azimuth_deg: float) -> tuple[float, ...]:
     """Return the turns that are tried for an intruder who comes from an azimuth."""
     return TURNS_BEHIND_DEG if abs(azimuth_deg) > _BEHIND_DEG else TURNS_DEG
+
+
+def counted_m(azimuth_deg: float, closing_mps: float, flown_more_m: float) -> float:
+    """Return a least range as NRC counts it, of flights that need so much more than geometry."""
+    stepped_m = stepped_least_range_m(azimuth_deg, closing_mps, turns_deg(azimuth_deg))
+    return as_searched_m(stepped_m + flown_more_m, closing_mps)
 
 
 def closing_speeds(azimuth_deg: float, intruder_mps: float) -> list[float]:

@@ -164,7 +164,7 @@ def test_clutter_hides_a_low_target_from_a_threshold_radar(scene):
 @pytest.mark.parametrize("terrain", ["", GROUND])
 def test_neither_windows_nor_neutral_effects_change_a_bit(scene, terrain, swap):
     path = scene(terrain)
-    path.write_text(path.read_text().replace("duration_s = 20", "duration_s = 8"))
+    path.write_text(path.read_text().replace("duration_s = 20", "duration_s = 4"))
     _, whole = simulate(path, swap)
     assert radar_rows(whole, "level")
     for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):

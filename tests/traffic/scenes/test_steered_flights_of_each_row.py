@@ -59,7 +59,7 @@ def together():
     sink = MemorySink()
     simulation = lock_step(scenes, recorder=Recorder([sink]))
     simulation.run()
-    assert len(simulation.time.runs) > 1
+    assert len(simulation.runs.going) > 1
     return {name: table.to_pylist() for name, table in sink.tables().items()}
 
 

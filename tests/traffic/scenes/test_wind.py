@@ -12,8 +12,9 @@ from wired import chain, first_look, rows, run, sensor
 
 from components.flights.attitude import Wind, ground_speed_mps, heading_and_airspeed
 from components.flights.legs import Climb, Straight, Turn
-from components.flights.many_flights import Starts
+from components.flights.many_flights import Starts, SteeredFleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
+from components.traffic.flown_flights import FlownFlights
 from components.traffic.wind_effect import Crabbing
 from dsa_des.errors import SceneError
 
@@ -250,15 +251,12 @@ def test_many_flights_together_by_differences_of_their_positions():
     )  # fmt: skip
     for targets in (straight, ScriptedFleet([*(straight[k] for k in range(3)), turning])):
         time_s = np.array([4.0, 17.0, 25.0, 61.0])
-        times = np.broadcast_to(time_s[:, None], (4, len(targets)))
-        states = [flight.at(time_s) for flight in targets]
-        together = type(states[0])(
-            *(
-                np.stack(columns, axis=1)
-                for columns in zip(*(s.arrays() for s in states), strict=True)
-            )
-        )
-        found = Crabbing(wind, targets).of_targets(np.arange(len(targets)), together, times)
+        shape = len(time_s), len(targets)
+        own = SteeredFleet(ScriptedFleet([turning]))
+        which = np.tile(np.arange(shape[1]), shape[0])
+        times = np.repeat(time_s, shape[1])
+        found = FlownFlights(own, targets, [Crabbing(wind)]).targets_at(which, times)
+        found = found.reshaped(shape)
         for place, flight in enumerate(targets):
             a, b = flight.at(time_s - 0.05), flight.at(time_s + 0.05)
             east, north, up = pymap3d.geodetic2enu(

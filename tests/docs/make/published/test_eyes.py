@@ -76,15 +76,16 @@ def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path
 def test_other_assumptions_reach_the_flights(few, monkeypatch):
     # Who never looks out prevents nothing; one who takes half a minute to turn, less than one who
     # turns in half a second; and another block may decide.
-    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:6])
+    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:3])
     changes = {
         "blind": ("blocks.pilot.left_looking=0",),
         "quick": ("wires[4].delay_s=0.5",),
         "ground": ("avoidance=operator.stochastic", "wires[4].delay_s=0.1"),
     }
-    monkeypatch.setattr(eyes, "_OTHERWISE", changes)
-    lines = eyes.other_pilots(pairs, 1).splitlines()[2:]
-    ratio = {line.split(" | ")[0][2:]: float(line.split(" | ")[1].split()[0]) for line in lines}
+    monkeypatch.setattr(eyes, "_ASSUMED", changes)
+    found = eyes.flown_otherwise(pairs, 1)
+    ratio = {said: ratios[0].ratio for said, ratios in found.items()}
+    assert all(ratios[2].ratio <= ratios[0].ratio for ratios in found.values())
     assert ratio["blind"] == 1.0
     assert ratio["quick"] < 0.7 and ratio["quick"] <= ratio["ground"] <= 1.0
 
@@ -105,21 +106,21 @@ def test_the_time_that_the_published_numbers_leave(few):
     assert shares[4][2] > shares[0][2] > shares[2][2]
 
 
-def test_the_rows_of_the_risk_stand_in_their_order(monkeypatch, few):
-    flown = iter([
-        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [1.0, 0.0, 0.0]},
-        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [0.0, 0.0, 1.0]},
-    ])  # fmt: skip
+def test_the_rows_of_the_risk_stand_in_their_order():
     weight = np.array([3.0, 1.0, 2.0])
-
-    def flags_of(*_):
-        flags = {name: np.array(values) for name, values in next(flown).items()}
-        lost = {name.replace("nmac", "well_clear_lost"): v for name, v in flags.items()}
-        return {**flags, **lost, "encounter_weight": weight}
-
-    monkeypatch.setattr(eyes, "flags_of", flags_of)
-    rows = eyes.risk_rows(few[0].take(np.arange(3)))
+    flags = [
+        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [1.0, 0.0, 0.0],
+         "well_clear_lost_nominal": [1.0, 1.0, 1.0], "well_clear_lost_mitigated": [1.0, 0.0, 1.0]},
+        {"nmac_nominal": [1.0, 1.0, 0.0], "nmac_mitigated": [0.0, 0.0, 1.0],
+         "well_clear_lost_nominal": [1.0, 1.0, 1.0], "well_clear_lost_mitigated": [1.0, 1.0, 0.0]},
+    ]  # fmt: skip
+    either = [{name: np.array(one) for name, one in each.items()} for each in flags]
+    ratios = eyes.ratios_of([{**each, "encounter_weight": weight} for each in either])
+    rows = eyes.risk_rows(ratios)
     assert [row.published for row in rows] == [*eyes.ONE, *eyes.BOTH]
-    # By hand: 3 of 4 by the one, 2 of 4 by the other; neither leaves what both do.
-    assert [row.ours for row in rows] == pytest.approx([5.0 / 8.0, 5.0 / 8.0, 0.0, 0.0])
+    # By hand: of NMAC 3 of 4 by the one and 2 of 4 by the other; neither leaves what both do.
+    expected = [5.0 / 8.0, 9.0 / 12.0, 0.0, 3.0 / 6.0]
+    assert [row.ours for row in rows] == pytest.approx(expected)
     assert all(row.interval[0] <= row.ours <= row.interval[1] for row in rows)
+    shown = eyes.other_pilots({"somehow": ratios}).splitlines()[-1].split(" | ")
+    assert shown[0] == "| somehow" and shown[2].startswith("**0.75 (") and len(shown) == 5

@@ -10,7 +10,7 @@ from scipy.integrate import simpson, solve_ivp
 from scipy.optimize import brentq
 
 from docs.make.published import least_range
-from docs.make.published.least_range import RATIOS, main, ratio_rows, risk_ratio
+from docs.make.published.least_range import RATIOS, grid_courses, main, ratio_rows
 from docs.make.published.turn_flights import (
     KT_MPS,
     LeastRange,
@@ -20,8 +20,10 @@ from docs.make.published.turn_flights import (
 )
 from docs.make.published.turn_geometry import (
     DISC_M,
+    TIME_STEP_S,
     as_searched_m,
     least_range_m,
+    stepped_least_range_m,
     turned_rad,
 )
 
@@ -69,8 +71,8 @@ def test_the_least_range_is_that_of_the_turn_by_hand(kt, azimuth_deg):
 def test_turns_from_behind_are_also_by_less():
     speed = closing_speeds(172.0, 105 * KT_MPS)[0]
     (one,) = least_ranges(105, [172.0])
-    assert one.range_m == pytest.approx(least_range_m(172.0, speed, [75.0]), abs=0.3)
-    assert one.range_m < least_range_m(172.0, speed, [90.0]) - 2.0
+    assert one.range_m == pytest.approx(least_range_m(172.0, speed, [60.0]), abs=0.3)
+    assert one.range_m < least_range_m(172.0, speed, [75.0]) - 1.0
     assert turns_deg(140.0) == turns_deg(-140.0) == (90.0,)
 
 
@@ -102,31 +104,97 @@ def test_both_sides_are_alike():
     assert left == pytest.approx(right, abs=1.5)
 
 
+def stepped_by_hand(azimuth_deg, closing_mps, turn_deg, side):
+    """The range from which on a turn by their equations, step by step, clears the disc."""
+    v, dt = 60.0 * KT_MPS, TIME_STEP_S
+    line = np.array([math.sin(math.radians(azimuth_deg)), math.cos(math.radians(azimuth_deg))])
+    intruder = np.array([0.0, v]) - closing_mps * line
+
+    def nearest(range_m):
+        own, velocity, bank, turned, steps = np.zeros(2), np.array([0.0, v]), 0.0, 0.0, 0
+        distances = [range_m]
+        while True:
+            bank = min(bank + 1.0, 45.0)
+            angle = 9.80665 * math.tan(math.radians(bank)) / v * dt
+            if turned + angle > math.radians(turn_deg):
+                break
+            aside = side * np.array([velocity[1], -velocity[0]])
+            own = own + dt * velocity + 0.5 * angle * dt * aside
+            velocity = (1.0 - 0.5 * angle**2) * velocity + angle * aside
+            turned, steps = turned + angle, steps + 1
+            distances.append(float(np.hypot(*(range_m * line + steps * dt * intruder - own))))
+        heading = side * math.radians(turn_deg)
+        apart = range_m * line + (steps + 1) * dt * intruder - own
+        relative = intruder - v * np.array([math.sin(heading), math.cos(heading)])
+        later_s = max(-float(apart @ relative) / float(relative @ relative), 0.0)
+        if later_s > 0.0:
+            distances.append(float(np.hypot(*(apart + later_s * relative))))
+        return min(distances) - DISC_M
+
+    ranges = np.arange(160.0, 2000.0, 8.0)
+    last = max(r for r in ranges if nearest(r) < 0.0)
+    return brentq(nearest, last, last + 8.0, xtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kt", "azimuth_deg", "turn_deg", "side"),
+    [(195, 4.0, 90.0, 1.0), (105, 100.0, 90.0, -1.0), (35, 20.0, 90.0, -1.0),
+     (105, 172.0, 60.0, 1.0), (80, 60.0, 45.0, -1.0)],
+)  # fmt: skip
+def test_a_turn_by_steps_is_that_of_their_equations(kt, azimuth_deg, turn_deg, side):
+    speed = closing_speeds(azimuth_deg, kt * KT_MPS)[0]
+    found = stepped_least_range_m(azimuth_deg, speed, [turn_deg], [side])
+    assert found == pytest.approx(stepped_by_hand(azimuth_deg, speed, turn_deg, side), abs=0.01)
+
+
+def as_geometry_says(kt, azimuths_deg, more_m=0.0):
+    """Flights that need so much more than geometry does."""
+    return [
+        LeastRange(a, c, speed, least_range_m(a, speed, turns_deg(a)) + more_m)
+        for a in azimuths_deg
+        for c, speed in enumerate(closing_speeds(a, kt * KT_MPS))
+    ]
+
+
 def test_the_ratio_counts_every_course_of_the_grid():
     # Of a slower intruder, who comes from within 35.69 deg: 142 azimuths of 0.25 deg, two courses.
-    near = [LeastRange(a, c, 30.0, 400.0) for c in (0, 1) for a in (0.25, 35.0)]
-    assert risk_ratio(near, 35, 60.0, 1000.0) == pytest.approx(1.0 - 240 / 284)
-    assert risk_ratio(near, 35, 60.0, 300.0) == 1.0
-    # Of a faster one from anywhere; half of the azimuths in view need more than there is.
-    rising = [LeastRange(0.25, 0, 60.0, 900.0), LeastRange(30.0, 0, 60.0, 1100.0)]
-    ratio = risk_ratio(rising, 105, 60.0, 1000.0, None)
-    assert ratio == pytest.approx(1.0 - 60 / 719, abs=2 / 719)
+    near = grid_courses(as_geometry_says(35, [0.25]), 35)
+    assert near.risk_ratio(60.0, 1000.0) == pytest.approx(1.0 - 240 / 284)
+    assert near.risk_ratio(60.0, 150.0) == 1.0
+    # Courses that nobody flew are not led out of.
+    first = grid_courses([one for one in as_geometry_says(35, [0.25]) if not one.course], 35)
+    assert first.risk_ratio(60.0, 1000.0) == pytest.approx(1.0 - 120 / 284)
+
+
+def test_what_flights_need_more_goes_along_straight_lines():
+    more = {0.25: 100.0, 30.0: 160.0}
+    found = [one for a, m in more.items() for one in as_geometry_says(105, [a], m)]
+    courses, without = grid_courses(found, 105), grid_courses(as_geometry_says(105, [0.25]), 105)
+    expected = np.interp(courses.azimuth_deg, list(more), list(more.values()))
+    assert courses.flown_m - without.flown_m == pytest.approx(expected, abs=1e-9)
+    assert np.abs(courses.counted_m - without.counted_m - expected).max() < courses.step_m.max()
+    assert courses.step_m[0] == pytest.approx(0.2 * closing_speeds(0.25, 105 * KT_MPS)[0])
 
 
 def test_needed_ranges_may_be_a_step_longer_or_as_flown():
     # 195 kt head-on need 1095 m; a step of 0.2 s is 26 m there.
-    found = [LeastRange(a, 0, 131.0, 1005.0) for a in (0.25, 30.0)]
-    at = [risk_ratio(found, 195, 60.0, 1000.0, steps) for steps in (-1.0, 0.0, 1.0, None)]
-    assert at[0] == pytest.approx(1.0 - 120 / 719) and at[2] == at[3] == 1.0
-    # 1005 m are 7.67 s at 131 m/s; the search counts 979.6 m, and 1.4 m are the disc's.
-    assert at[1] < 1.0
+    courses = grid_courses(as_geometry_says(195, [0.25], -70.0), 195)
+    flown = courses.risk_ratio(60.0, 1000.0, as_flown=True)
+    assert flown == pytest.approx(1.0 - (courses.flown_m[:120] < 1000.0).mean() * 120 / 719)
+    at = [courses.risk_ratio(60.0, 1000.0, steps_more=steps) for steps in (-2.0, 0.0, 2.0)]
+    assert at[0] == pytest.approx(1.0 - 120 / 719) and at[2] == 1.0
+    assert at[0] < at[1] < 1.0
 
 
-def test_rows_of_ratios_say_what_a_step_comes_to():
-    found = {kt: [LeastRange(a, 0, 131.0, 1005.0) for a in (0.25, 30.0)] for kt in RATIOS}
-    rows = ratio_rows(found)
-    assert [row.published for row in rows] == list(RATIOS.values())
-    assert rows[-1].interval == (pytest.approx(1.0 - 120 / 719), 1.0)
+def test_geometry_as_it_is_counted_gives_the_published_ratios(monkeypatch):
+    # Their staircase decides which of the 120 azimuths in view are cleared: 107 and 8.
+    rest = {kt: RATIOS[kt] for kt in (35, 175, 185)}
+    monkeypatch.setattr(least_range, "RATIOS", rest)
+    rows = ratio_rows({kt: grid_courses(as_geometry_says(kt, [0.25]), kt) for kt in rest})
+    assert [row.published for row in rows] == list(rest.values())
+    assert [row.ours for row in rows] == pytest.approx([1 - 240 / 284, 1 - 107 / 719, 1 - 8 / 719])
+    assert [row.verdict for row in rows] == ["equal"] * 3
+    assert rows[2].interval[0] < 0.9 and rows[2].interval[1] == 1.0
 
 
 def test_any_speed_is_asked_for_by_a_command(capsys):

@@ -1,10 +1,12 @@
 """The section of volumes: which encounters violate one, against times looked at one by one."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from components.encounters.model import LAYERS_FT, Bins
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import PairSampler
@@ -15,7 +17,10 @@ from docs.make.published.volumes import (
     MODELS,
     UNCREWED,
     VOLUMES,
+    altitude_edges_ft,
     gas_share,
+    height_share,
+    layers,
     sampled,
     uncrewed_at,
     variants,
@@ -102,3 +107,33 @@ def test_the_table_says_what_the_share_depends_on():
         # Two of them are larger in every way than the first.
         assert len(shares) == 3 and all(0.0 <= share <= 1.0 for share in shares)
         assert shares[0] >= shares[2]
+
+
+def with_layers(counts):
+    """A model with other counts of aircraft by layer."""
+    model = read_model(CREWED)
+    place = model.labels.index("L")
+    node = replace(model.initial.nodes[place], counts=np.array([counts], dtype=float))
+    bins = (*model.bins[:place], Bins(np.array(LAYERS_FT), 4), *model.bins[place + 1 :])
+    network = replace(model.initial, nodes={**model.initial.nodes, place: node})
+    return replace(model, initial=network, bins=bins)
+
+
+def test_heights_by_the_counts_of_a_model():
+    # By hand: with as many aircraft per foot all around, a tenth; of an ownship at 4500 ft and all
+    # others between 3000 and 5000, 200 ft of 1500.
+    gas = with_layers(np.diff(LAYERS_FT))
+    assert height_share(gas, (6000.0, 17000.0)) == pytest.approx(0.1)
+    crowd = with_layers([0.0, 0.0, 7.0, 0.0])
+    assert height_share(crowd, (4500.0, 4500.0)) == pytest.approx(200.0 / 1500.0)
+    shown = layers(gas).splitlines()
+    assert len(shown) == 6 and shown[-1].startswith("| 5000 to 18000 ft | 10.")
+    assert altitude_edges_ft(read_model(CREWED))[0] > 0.0
+
+
+def test_heights_by_counts_are_those_of_encounters():
+    found = sampled(UNCREWED, CREWED, 1500, {"0.5 nmi": CYLINDERS["0.5 nmi"]})
+    inside = found.apart_ft < 1000.0
+    share = np.average(found.apart_ft[inside] < 100.0, weights=found.weight[inside])
+    expected = height_share(read_model(CREWED), (1200.0, 3000.0))
+    assert share == pytest.approx(expected, abs=0.03)

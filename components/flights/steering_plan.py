@@ -1,41 +1,23 @@
-"""A flight that is steered while it is flown."""
+"""What is flown after a manoeuvre: turns, climbs and speeds side by side, as legs."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple, Protocol
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
-from components.flights.fleet import in_rows
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
-from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray
-
-
-class Trajectory(Protocol):
-    """The flight of one aircraft."""
-
-    name: str
-
-    @property
-    def max_speed_mps(self) -> float:
-        """Largest speed along its path."""
-
-    def interval_present(self) -> tuple[float, float]:
-        """Return the first and the last time at which it is there."""
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return its state at some times."""
-
 
 # Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
 # place is right to 0.0625 m on the way, and exact at the end.
@@ -56,69 +38,6 @@ def times_around_s(time_s: FloatArray) -> FloatArray:
     """Return before, at and after each of some times (n,), (n, 3); no flight is known before 0."""
     ends = [np.maximum(time_s - _BASE_S, np.minimum(time_s, 0.0)), time_s, time_s + _BASE_S]
     return np.stack(ends, axis=-1)
-
-
-class SteeredFlight:
-    """A flight up to its first manoeuvre, then its manoeuvres: turns, climbs, speeds together.
-
-    A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
-    climb. The flight's own script ends with the first one.
-
-    It never changes: `steered` returns another one, so that a run can go back to the flight it had.
-    """
-
-    def __init__(
-        self, flight: Trajectory, parts: tuple[tuple[float, SteeredPart], ...] = ()
-    ) -> None:
-        self.name, self.flight, self.parts = flight.name, flight, parts
-
-    @cached_property
-    def _fleet(self) -> ScriptedFleet:
-        """All parts, which are asked together."""
-        return ScriptedFleet([part for _, part in self.parts])
-
-    @property
-    def max_speed_mps(self) -> float:
-        """Largest speed along the path as it is now."""
-        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
-
-    def interval_present(self) -> tuple[float, float]:
-        """Return from when to when it is there: from 0 on, as what is flown has no end."""
-        return 0.0, math.inf
-
-    def fastest_by(self, time_s: FloatArray) -> FloatArray:
-        """Return the largest speed of any manoeuvre that has begun by each of some times, or 0."""
-        speeds = [0.0, *self._fleet.max_speeds_mps.tolist()]
-        part = np.searchsorted([start for start, _ in self.parts], time_s, side="right")
-        return np.asarray(np.maximum.accumulate(speeds)[part])
-
-    def steered(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
-        """Return the flight with a manoeuvre from a time on, beside what it still does.
-
-        A turn or a change of altitude begins and ends at once, without a change of speed along the
-        path's projection and without acceleration upward; speeds change steadily.
-        """
-        around = self.at(times_around_s(np.array([time_s])))
-        before = self.parts[-1][1] if self.parts else None
-        (part,) = flown_from(self.name, around, np.array([time_s]), [manoeuvre], [before])
-        found = SteeredFlight(self.flight, (*self.parts, (time_s, part)))
-        found.__dict__["_fleet"] = ScriptedFleet.joined(self._fleet, part.as_fleet)
-        return found
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return the state at some times, of any shape."""
-        times = np.asarray(time_s, dtype=np.float64)
-        if not self.parts:
-            return self.flight.at(times)
-        flat = times.reshape(-1)
-        part = np.searchsorted([start for start, _ in self.parts], flat, side="right")
-        own, after = np.flatnonzero(part == 0), np.flatnonzero(part)
-        if not len(after):
-            return self.flight.at(times)
-        steered = self._fleet.each(part[after] - 1, flat[after])
-        if len(own):
-            steered = in_rows([own, after], [self.flight.at(flat[own]), steered])
-        return steered.reshaped(times.shape)
 
 
 class Turning(NamedTuple):

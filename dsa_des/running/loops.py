@@ -1,0 +1,119 @@
+"""Where feedback loops are opened: to run in windows, to look ahead, and to tell neighbours."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+import networkx as nx
+
+from dsa_des.block.component import Component
+from dsa_des.scene.graph import in_cycles, window_order
+from dsa_des.scene.scene import Scene
+
+#: From which block to which.
+Edge = tuple[str, str]
+
+
+def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
+    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+
+    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
+
+    Parameters
+    ----------
+    graph : networkx.DiGraph
+        From `dsa_des.scene.graph.build_graph`.
+    classes : mapping
+        The class of each block.
+    """
+    looped = in_cycles(graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
+    cut = set()
+    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
+    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            cut.add(edge)
+    return cut
+
+
+def before_loops(graph: nx.DiGraph) -> set[str]:
+    """Return the blocks that no loop leads to; none where there is no loop."""
+    looped = in_cycles(graph)
+    behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
+    return set(graph) - behind if looped else set()
+
+
+def _optional(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
+) -> bool:
+    """Whether the receiving block can do without what comes over an edge."""
+    inputs = classes[edge[1]].inputs
+    return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
+
+
+def opened_loops(scene: Scene) -> set[Edge]:
+    """Return delayed edges without which the scene has no loop, those of the longest delays.
+
+    An edge is taken out only if it closes a loop of edges that are as short or shorter: so the
+    shortest of those taken out is as long as can be.
+    """
+    looped = in_cycles(scene.graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(scene.graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    lasts = {edge: shortest_s(scene, edge) for edge in inside}
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not scene.graph.edges[edge]["delayed"])
+    opened = set()
+    delayed = [edge for edge in inside if scene.graph.edges[edge]["delayed"]]
+    for edge in sorted(delayed, key=lambda edge: (lasts[edge], edge)):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            opened.add(edge)
+    return opened
+
+
+def shortest_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the shortest delay of the wires from one block to another, s."""
+    wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
+    return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
+
+
+def _period_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the time between scans that delays on an edge count in; 0 where there are none."""
+    for name in reversed(edge):
+        block = scene.blocks[name]
+        spec = block.cls.clock_of(block.parameters)
+        if spec is not None:
+            return spec.period_s
+    return Fraction(0)
+
+
+def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
+    """Return the place of each block in the order in which blocks tell each other what they offer.
+
+    Requests go the other way. Both pass over wires with and without delay; loops are opened where
+    an input can be done without, and else at a delay.
+    """
+    looped = in_cycles(graph)
+    opened = nx.DiGraph(graph)
+    opened.remove_edges_from(
+        edge
+        for edge in graph.edges
+        if edge[0] in looped
+        and looped[edge[0]] == looped.get(edge[1])
+        and _optional(graph, classes, edge)
+    )
+    return window_order(opened, set(graph), cut_loops(opened, classes))
