@@ -99,7 +99,7 @@ class FlownFlights:
         time_s: FloatArray,
         ahead_s: FloatArray | float,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of ownships and of targets; see `messages.known_flights.Flights`."""
+        """Return states of ownships and of targets; see `messages.known_flights.AllFlights`."""
         if self.rates_hz is not None:
             rate = self.rates_hz[run]
             time_s = np.floor(time_s * rate) / rate
