@@ -200,7 +200,7 @@ class TurnAway(Component):
         near = tracks.range_m <= 1000.0 * self.p.range_km
         if self.p.without_range:
             near |= np.isnan(tracks.range_m)
-        row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
+        row = tracks.row_of_entries
         manoeuvres: dict[int, Manoeuvre] = {}
         for place in np.unique(row[near]).tolist():
             tick = int(wake.ticks[place])

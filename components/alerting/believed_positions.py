@@ -53,7 +53,7 @@ class BelievedPositions:
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in what was measured in body axes, by the attitude of when it was measured."""
         sights: Tracks | FusedDetections = arrived.message
-        row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
+        row = sights.row_of_entries
         new = np.isfinite(sights.range_m) & (sights.target >= 0)
         if isinstance(sights, Tracks):
             new &= sights.updated  # others came with an earlier row

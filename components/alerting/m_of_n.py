@@ -55,7 +55,7 @@ class MOfNAlerts(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        row = np.repeat(np.arange(len(alerts)), np.diff(alerts.offsets))
+        row = alerts.row_of_entries
         time_s, run = wake.time_s, wake.run
         due = alerts.level[:, np.newaxis] >= np.arange(1, MOST_LEVELS + 1)
         level = self._memory.levels(run[row], alerts.contacts(), time_s[row], due, due)

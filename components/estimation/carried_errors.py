@@ -21,9 +21,9 @@ from components.estimation.measurement import Kind, expected, linearised
 from components.estimation.motion import Motion
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-#: Which way an error goes: of a place along north or east, and of a velocity; of its height; of the
-#: bearing and of the range at which it is seen.
-NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, BEARING, RANGE = range(7)
+#: Which way an error goes: of a place along north or east, and of a velocity; of its height and of
+#: its vertical rate; of the bearing and of the range at which it is seen.
+NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE = range(8)
 # Position and velocity.
 _MOVING = 6
 # Steeper than this (as a share of the range) a bearing is none.
@@ -153,10 +153,11 @@ class ToldErrors:
         told = state[:_MOVING].copy()
         told[3] += self._sum(state, SPEED_NORTH)
         told[4] += self._sum(state, SPEED_EAST)
+        told[5] -= self._sum(state, CLIMB)
         height = self._sum(state, HEIGHT)
         told[0] += self._sum(state, NORTH) + self.age_s * (told[3] - state[3])
         told[1] += self._sum(state, EAST) + self.age_s * (told[4] - state[4])
-        told[2] -= np.where(self.at_range, 0.0, height)
+        told[2] += self.age_s * (told[5] - state[5]) - np.where(self.at_range, 0.0, height)
         by_place = np.zeros((3, 3, state.shape[1]))
         for i in range(3):
             by_place[i, i] = 1.0
@@ -198,6 +199,8 @@ class ToldErrors:
             elif way in (SPEED_NORTH, SPEED_EAST):
                 found[3 + way - SPEED_NORTH, i] = deviation
                 found[way - SPEED_NORTH, i] = deviation * self.age_s
+            elif way == CLIMB:
+                found[5, i], found[2, i] = -deviation, -deviation * self.age_s
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 found[0, i], found[1, i] = deviation * outward * cos, deviation * outward * sin

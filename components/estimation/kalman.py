@@ -37,13 +37,19 @@ class Innovation:
     # (m, n) or (m, m, n): Variances of the measurement's own errors; for an unscented filter
     # with what the regression leaves over, which makes it a matrix
     spread: FloatArray
+    # (m, k, n) or None: Of those errors, the covariance with the state's first k; `cross` has it
+    shared: FloatArray | None = None
 
     def take(self, which: IntArray | slice) -> "Innovation":
         """Return those of some tracks."""
-        parts = (self.expected, self.root, self.cross, self.jacobian, self.spread)
-        if isinstance(which, slice):
-            return Innovation(*(values[..., which] for values in parts))
-        return Innovation(*(selected(values, which) for values in parts))
+
+        def one(values: FloatArray) -> FloatArray:
+            return values[..., which] if isinstance(which, slice) else selected(values, which)
+
+        return Innovation(
+            one(self.expected), one(self.root), one(self.cross), one(self.jacobian),
+            one(self.spread), None if self.shared is None else one(self.shared),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +62,18 @@ class Moments:
     jacobian: FloatArray  # As in `Innovation`
     # (m, m, n) or None: What the slope leaves of `total`; None where it is exact
     left_over: FloatArray | None = None
+    # (m, k, n) or None: As in `Innovation`; then `left_over` has H times it as well, transposed
+    shared: FloatArray | None = None
 
     def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
         """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
-        spread = self.left_over
+        spread, shared = self.left_over, self.shared
         if which is not None and not is_everything(which, expected.shape[1]):
             expected, total = selected(expected, which), selected(total, which)
             cross, jacobian = selected(cross, which), selected(jacobian, which)
             spread = None if spread is None else selected(spread, which)
+            shared = None if shared is None else selected(shared, which)
         else:
             total = total.copy()
             spread = None if spread is None else spread.copy()
@@ -73,8 +82,9 @@ class Moments:
             if spread is not None:
                 spread[i, i] += variance[i]
         return Innovation(
-            expected, cholesky(total), cross, jacobian, variance if spread is None else spread
-        )
+            expected, cholesky(total), cross, jacobian, variance if spread is None else spread,
+            shared,
+        )  # fmt: skip
 
 
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
@@ -139,6 +149,10 @@ def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> F
     else:
         own = product(found.spread, gain)
     error = product(found.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
+    if found.shared is not None:
+        # With errors that the state shares, S = H P Hᵀ + R + H M + (H M)ᵀ and K S = P Hᵀ + M:
+        # D Hᵀ = K (R + H M) - M, and `spread` is R + (H M)ᵀ.
+        error[:, : found.shared.shape[1]] += found.shared
     term = np.empty_like(block)
     for k in range(len(gain)):
         np.multiply(error[k, :, np.newaxis], gain[k, np.newaxis], out=term)

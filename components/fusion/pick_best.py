@@ -31,7 +31,7 @@ def pass_false_alarms(
     fused: FusedDetections, arrivals: Mapping[str, Arrivals], ranging: Sequence[str]
 ) -> FusedDetections:
     """Return fused detections with the false alarms of each instant after them."""
-    rows: list[IntArray] = [np.repeat(np.arange(len(fused)), np.diff(fused.offsets))]
+    rows: list[IntArray] = [fused.row_of_entries]
     columns: dict[str, list[Any]] = {
         name: [getattr(fused, name)]
         for name in (
@@ -51,7 +51,7 @@ def pass_false_alarms(
         if len(false) == 0:
             continue
         row = last_of_run(fused.instants, new.instants)
-        rows.append(np.repeat(row, np.diff(new.message.offsets))[false])
+        rows.append(row[new.message.row_of_entries[false]])
         for column in ("azimuth_rad", "elevation_rad", "range_m"):
             columns[column].append(getattr(new.message, column)[false])
             columns[f"true_{column}"].append(np.full(len(false), np.nan))
@@ -135,7 +135,7 @@ class PickBest(Fusion):
         keys = [_keys(new, wake, width) for new in arrivals.values()]
         # A sensor reports in an order that tells nothing of the targets.
         in_order = [np.sort(key, kind="stable") for key in keys] if len(wake) > 1 else []
-        union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)
+        union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)[0]
         row = union // width
         target = union - row * width
         if self.gate_ticks:
@@ -167,5 +167,4 @@ def _keys(new: Arrivals, wake: Wake, width: int) -> IntArray:
     if len(wake) == 1:
         return new.message.target
     row = last_of_run(wake.instants, new.instants)  # they are among them
-    offsets = new.message.offsets
-    return np.repeat(row, np.diff(offsets)) * width + new.message.target
+    return row.take(new.message.row_of_entries) * width + new.message.target

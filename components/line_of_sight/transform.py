@@ -23,6 +23,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
 from dsa_des.block.message import Message
+from dsa_des.block.recorded_columns import seen_once
 from dsa_des.block.wake import Wake
 
 _MRAD_PER_DEG = 1e3 * np.pi / 180.0
@@ -230,7 +231,7 @@ class Transform(Component):
             roster=states.roster,
             columns=states.columns,
             culled=states.culled,
-            believed=self._believed(states),
+            believed={name: seen_once(v) for name, v in self._believed(states).items()},
             own_attitude={name: getattr(states, f"own_{name}") for name in _TURNED},
             revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
@@ -241,12 +242,20 @@ class Transform(Component):
         rows, width = present.shape
         step = max(1, CELLS_AT_ONCE // max(1, width))
         if rows <= step:
-            return self._seen(own, other, present)
-        parts = []
-        for first in range(0, rows, step):
-            block = slice(first, first + step)
-            parts.append(self._seen(_block(own, block), _block(other, block), present[block]))
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            seen = self._seen(own, other, present)
+        else:
+            parts = []
+            for first in range(0, rows, step):
+                block = slice(first, first + step)
+                parts.append(self._seen(_block(own, block), _block(other, block), present[block]))
+            seen = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return {
+            **seen,
+            "target_pitch_rad": other.pitch_rad,
+            "target_roll_rad": other.roll_rad,
+            "alt_m": other.alt_m,
+            "present": present,
+        }
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         seen = self._line_of_sight.from_ownship(own, other)
@@ -257,10 +266,6 @@ class Transform(Component):
         fields = {
             **seen._asdict(),
             "relative_heading_rad": heading,
-            "target_pitch_rad": other.pitch_rad,
-            "target_roll_rad": other.roll_rad,
-            "alt_m": other.alt_m,
-            "present": present,
         }
         if self._hiding:
             fields["hidden"] = np.logical_or.reduce(

@@ -75,7 +75,7 @@ class AlertLevels(Message):
     def highest(self) -> IntArray:
         """Return the highest level of each row, 0 where there is no target, (rows,)."""
         found = np.zeros(len(self), dtype=np.int64)
-        np.maximum.at(found, np.repeat(np.arange(len(self)), np.diff(self.offsets)), self.level)
+        np.maximum.at(found, self.row_of_entries, self.level)
         return found
 
     def contacts(self) -> IntArray:

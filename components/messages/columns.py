@@ -117,14 +117,15 @@ OWN_VELOCITY = {
 #: The keys of `Detections.told_by_target`: the target's own velocity (m/s) and mean square errors
 #: of what is new in it (m²/s²); the ownship's, where bearings are coarse; standard deviations
 #: (`ToldError`) of the target's place along north and east each (m), its height and the height's
-#: rounding, its velocity along north and east each (m/s), a bearing (rad), the delay of a
-#: transponder and ranges (m); for how long a place was carried on, and the age of the velocity
-#: (s); and the mean square error of all else that is new in the place, along every axis (m²).
+#: rounding, its vertical rate, its velocity along north and east each (m/s), a bearing (rad), the
+#: delay of a transponder and ranges (m); for how long a place was carried on, and the age of the
+#: velocity (s); and the mean square error of all else that is new in the place, along every axis
+#: (m²).
 TOLD = (
     "north", "east", "down", "north_variance", "east_variance", "down_variance",
     "own_north", "own_east", "own_down", "place_deviation", "height_deviation",
-    "rounding_deviation", "speed_deviation", "bearing_deviation", "delay_deviation",
-    "range_deviation", "age_s", "velocity_age_s", "white_variance",
+    "rounding_deviation", "climb_deviation", "speed_deviation", "bearing_deviation",
+    "delay_deviation", "range_deviation", "age_s", "velocity_age_s", "white_variance",
 )  # fmt: skip
 
 

@@ -38,6 +38,7 @@ from dsa_des.block.message import (
     per_row,
     static,
 )
+from dsa_des.block.recorded_columns import picked
 from dsa_des.time.clock import ClockSpec
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.
@@ -315,20 +316,19 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""
         if self.own_of_entries is not None:
             return self.own_of_entries
-        counts = np.diff(self.offsets)
-        pose = {name: getattr(self, name) for name in POSE}
-        return {n: np.repeat(v, counts) for n, v in pose.items() if v is not None}
+        row, pose = self.row_of_entries, {name: getattr(self, name) for name in POSE}
+        return {name: picked(v, row) for name, v in pose.items() if v is not None}
 
     def velocity_columns(self) -> dict[str, FloatArray] | None:
         """Return how the ownship moved at each entry, by column; None where none is known."""
         if self.own_velocity is None:
             return self.own_velocity_of_entries
-        counts = np.diff(self.offsets)
-        return {name: np.repeat(values, counts) for name, values in self.own_velocity.items()}
+        row = self.row_of_entries
+        return {name: values.take(row) for name, values in self.own_velocity.items()}
 
     def measured_ticks(self) -> IntArray:
         """Return the instant at which each entry was measured."""
-        ticks = np.repeat(self.tick, np.diff(self.offsets))
+        ticks = self.tick.take(self.row_of_entries)
         return ticks if self.ticks_after is None else ticks + self.ticks_after
 
 

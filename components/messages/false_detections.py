@@ -23,7 +23,7 @@ def in_measured_order(detections: Detections) -> Detections:
     Nearest first, then by azimuth, elevation and confidence: the order of a roster would tell who
     is who, and that false alarms come after targets, which is which.
     """
-    row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
+    row = detections.row_of_entries
     measured = (
         detections.confidence, detections.elevation_rad, detections.azimuth_rad, detections.range_m
     )  # fmt: skip

@@ -5,8 +5,6 @@ Angles are in radians; azimuth is clockwise and elevation upward.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from components.aircraft.aircraft import Roster
 from components.messages.columns import (
     ERRING_POSE,
@@ -84,7 +82,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.measured_tick is None:
-            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
+            self.measured_tick = self.tick.take(self.row_of_entries)
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""

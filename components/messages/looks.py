@@ -127,9 +127,10 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
 def look_columns(detections: Any) -> Columns:
     """Return the rows of the looks of a report: every target at every scan."""
     count = len(detections.roster)
+    row = np.repeat(np.arange(len(detections)), count)
     columns: Columns = {
-        **instants_of(detections, count),
-        "scan": np.repeat(detections.scan, count),
+        **instants_of(detections, row),
+        "scan": detections.scan.take(row),
         "target": Text(np.tile(np.arange(count), len(detections)), detections.roster.names),
     }
     columns.update({name: values.reshape(-1) for name, values in detections.looks.items()})

@@ -27,7 +27,7 @@ SKIP_REASONS = {
 #: is off may take them to be in reach.
 REACH_MARGIN = 1.05
 _field_of_view = lru_cache(maxsize=256)(FieldOfView)
-_EVALUATE, _ABSENT, _OFF, _FIELD_OF_VIEW = map(np.uint8, (EVALUATE, ABSENT, OFF, FIELD_OF_VIEW))
+_ABSENT, _OFF, _FIELD_OF_VIEW, _RANGE = map(np.uint8, (ABSENT, OFF, FIELD_OF_VIEW, RANGE))
 #: Targets that were not even moved, because no sensor could have looked at them.
 CULLED = "culled"
 
@@ -94,11 +94,12 @@ class Reach:
         """
         if not self.enabled:
             return np.where(present, _OFF, _ABSENT)
+        # Sums of products: where one or the other is chosen element by element, processors guess.
         seen = self._field.holds(body_azimuth_rad, body_elevation_rad)
-        reason = np.where(seen, _EVALUATE, _FIELD_OF_VIEW)
+        reason = ~seen * _FIELD_OF_VIEW
         if self.range_max_m < math.inf:
             seen &= range_m > self.range_max_m
-            reason[seen] = RANGE
+            reason += seen * _RANGE
         if hidden is not None:
             reason[hidden & (reason == EVALUATE)] = HIDDEN
         if np.count_nonzero(present) < present.size:

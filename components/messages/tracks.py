@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-
 from components.aircraft.aircraft import Roster
 from components.messages.columns import ERRING_POSE, MeasuredLine, target_names
 from components.messages.contributors import contributor_names
@@ -58,7 +56,7 @@ class Tracks(MeasuredLine, Message):
 
     def __post_init__(self) -> None:
         if self.measured_tick is None:
-            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
+            self.measured_tick = self.tick.take(self.row_of_entries)
         if self.updated is None:
             self.updated = self.age_s <= 0.0
 

@@ -158,7 +158,7 @@ def _ramp_quantiles(
         start, end = np.searchsorted(replica, [number, number + 1])
         lows, highs = np.sort(low[start:end]), np.sort(high[start:end])
         # Time spent at or below age x is Σ min(x, high) - min(x, low): piecewise linear in x.
-        ages = sorted_union([lows, highs])
+        ages, _ = sorted_union([lows, highs])
         below = _clipped_sums(highs, ages) - _clipped_sums(lows, ages)
         found[number] = np.interp(share * span[number], below, ages)
     return found

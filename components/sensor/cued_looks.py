@@ -102,7 +102,7 @@ class ConesAhead:
         false = np.flatnonzero(detections.target < 0)
         if self._cones is None or not len(false):
             return detections
-        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))[false]
+        row = detections.row_of_entries[false]
         inside = self.in_cones(row, detections.azimuth_rad[false], detections.elevation_rad[false])
         cued = detections.extras["cued"].copy()
         cued[false[inside]] = True

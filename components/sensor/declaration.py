@@ -299,7 +299,7 @@ class DeclaredPlaces:
 
     def _note_first(self, detections: Detections, declared: IntArray) -> None:
         self._names = detections.roster.names
-        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
+        row = detections.row_of_entries
         target, place = np.unique(detections.target[declared], return_index=True)
         for index, entry in zip(target.tolist(), declared[place].tolist(), strict=True):
             tick = int(detections.tick[row[entry]])

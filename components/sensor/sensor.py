@@ -47,6 +47,7 @@ from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
+from dsa_des.block.recorded_columns import constant, picked
 from dsa_des.block.wake import Wake
 
 # Up to so many targets, counting row by row is mostly the overhead of rows.
@@ -70,11 +71,11 @@ def counted(
             for code in (EVALUATE, *SKIP_REASONS.values())
             if hides or code != HIDDEN
         }
-        of.setdefault(HIDDEN, np.zeros(len(reason), dtype=np.int64))
+        of.setdefault(HIDDEN, _of_each(0, len(reason)))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = on_roster - reason.shape[1]
     if culled is None:
-        culled = np.zeros(len(reason), dtype=np.int64) + left_out
+        culled = _of_each(left_out, len(reason))
     else:
         skipped["absent"] = skipped["absent"] + (left_out - culled)
     skipped[CULLED] = culled
@@ -83,12 +84,18 @@ def counted(
 
 def _per_row(mask: BoolArray) -> IntArray:
     """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
+    if not mask.any():
+        return _of_each(0, len(mask))
     if mask.shape[1] > _FEW_COLUMNS:
         return mask.sum(axis=1)
-    total = mask[:, 0].astype(np.int64) if mask.shape[1] else np.zeros(len(mask), dtype=np.int64)
+    total = mask[:, 0].astype(np.int64)
     for column in mask.T[1:]:
         total += column
     return total
+
+
+def _of_each(count: int, rows: int) -> IntArray:
+    return constant(count, rows, np.int64)
 
 
 _BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
@@ -99,7 +106,9 @@ def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     believed = targets.believed
     if believed is None:
         return {}
-    return {field: believed[name].take(rows) for name, field in zip(_BELIEVED, POSE, strict=True)}
+    return {
+        field: picked(believed[name], rows) for name, field in zip(_BELIEVED, POSE, strict=True)
+    }
 
 
 #: Effects that every sensor has, after its own.

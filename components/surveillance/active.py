@@ -364,6 +364,7 @@ class Active(CooperativeSensor):
             "place_deviation": nothing,
             "height_deviation": np.sqrt(altimetry_variance_ft2(feet)) * FOOT_M,
             "rounding_deviation": self._step_ft(mode_s) * FOOT_M / math.sqrt(12.0),
+            "climb_deviation": nothing,
             "speed_deviation": nothing,
             "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
             "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.aircraft.equipage import Equipage
-from components.estimation.carried_errors import EAST, HEIGHT, NORTH, SPEED_EAST, SPEED_NORTH
+from components.estimation.carried_errors import (
+    CLIMB,
+    EAST,
+    HEIGHT,
+    NORTH,
+    SPEED_EAST,
+    SPEED_NORTH,
+)
 from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, ToldError
 from components.surveillance.altimetry import altimetry_variance_ft2
@@ -19,8 +26,8 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
-#: What an aircraft without a velocity may have, and how much others change theirs on the way from
-#: a message to a scan, a deviation.
+#: What an aircraft without a velocity may have, a deviation; and how much another one changes its
+#: own on the way from a message to a scan, where no filter says so by its own motion.
 _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
 #: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
 _LEAST_M2 = 1e-4
@@ -42,8 +49,10 @@ def lasting_errors(position_errors: str) -> dict[str, LastingError]:
 
 #: The altimeter of an aircraft, which speaks through its broadcasts and its replies.
 ALTIMETER = ToldError(HEIGHT, "height_deviation", math.inf)
-#: What is new in each height: its rounding, of one that climbs, and how far it was carried on.
+#: What is new in each height: its rounding, of one that climbs; and in each vertical rate, by which
+#: heights are carried on.
 ROUNDING = ToldError(HEIGHT, "rounding_deviation", 0.0, of_aircraft=False)
+VERTICAL_RATE = ToldError(CLIMB, "climb_deviation", 0.0, of_aircraft=False)
 
 
 def told_errors(position_errors: str) -> tuple[ToldError, ...]:
@@ -51,7 +60,7 @@ def told_errors(position_errors: str) -> tuple[ToldError, ...]:
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
     found = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
-    return (*found, ALTIMETER, ROUNDING)
+    return (*found, ALTIMETER, ROUNDING, VERTICAL_RATE)
 
 
 @dataclass(frozen=True)
@@ -100,26 +109,29 @@ class StatedByAircraft:
         self, north_east_down_m_s: FloatArray, velocity_age_s: FloatArray, age_s: FloatArray
     ) -> dict[str, FloatArray]:
         """Return velocities of some age, and what errs of them and of places, as `TOLD`."""
-        turned = (_MANOEUVRE_M_S2 * velocity_age_s) ** 2 + _LEAST_M2
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
+        tells, nothing = self.errs or self.rounds, np.zeros(len(age_s))
+        # Whose errors are told is filtered by one who knows how targets move on the way.
+        turned = nothing if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
         found = dict.fromkeys(TOLD, np.full(len(age_s), np.nan))
-        found |= dict(
-            zip(TOLD, [*north_east_down_m_s, turned, turned, climb + turned], strict=False)
-        )
-        if not (self.errs or self.rounds):
+        # Whole knots last while a flight is steady and are new while it is not: counted as both.
+        new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)
+        found |= dict(zip(TOLD, [*north_east_down_m_s, new, new, turned + _LEAST_M2], strict=False))
+        if not tells:
             return found
-        nothing, known = np.zeros(len(age_s)), ~np.isnan(north_east_down_m_s[0])
+        known = ~np.isnan(north_east_down_m_s[0])
         place = self.equipage.position_deviation_m[self.craft] if self.errs else nothing
         rounding_m2 = (25.0 * FOOT_M) ** 2 / 12.0 if self.rounds else 0.0
         _, _, high = self.place_m2(nothing)
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
-        carried_m = np.where(known, 0.5 * _MANOEUVRE_M_S2 * age_s, _UNKNOWN_M_S) * age_s
+        carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * age_s
         white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
         return found | {
             "place_deviation": place,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
-            "rounding_deviation": np.sqrt(rounding_m2 + np.where(known, climb * age_s**2, 0.0)),
+            "rounding_deviation": nothing + math.sqrt(rounding_m2),
+            "climb_deviation": nothing + math.sqrt(climb),
             "speed_deviation": np.sqrt(self.speed_m2_s2), "bearing_deviation": nothing,
             "delay_deviation": nothing, "range_deviation": nothing,
             "age_s": np.where(known, age_s, 0.0),

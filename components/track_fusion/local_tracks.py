@@ -83,7 +83,7 @@ def local_tracks(
     tentative: bool,
 ) -> tuple[LocalTracks, IntArray]:
     """Return the tracks of a message in the frames of their replicas, and the row of each."""
-    row = np.repeat(np.arange(len(message)), np.diff(message.offsets))
+    row = message.row_of_entries
     kept = message.track_status != DELETED
     if not tentative:
         kept &= message.track_status != TENTATIVE

@@ -139,7 +139,7 @@ class Cues(Component):
         half = np.where(tracks.has_range[entry], half, self.p.sigmas * np.sqrt(angular))
         half = np.maximum(half, math.radians(self.p.least_half_angle_deg))
         kept = half <= math.radians(self.p.most_half_angle_deg)
-        row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))[entry]
+        row = tracks.row_of_entries[entry]
         return row[kept], entry[kept], half[kept]
 
     def _message(

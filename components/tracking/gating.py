@@ -82,15 +82,21 @@ def gated_pairs(
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
                 told = rules.carried.told(scans, cells)
-                white = rules.carried.white(
-                    scans, cells, rows, rules.estimator.models, selected(part.weights, track)
-                )
+                white = rules.carried.white(scans, cells, rows)
                 measured[:2], place = levelled(measured[:2], pose.take(track))
+                mine_then = part.take(track)
+                since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
+                ages = rules.carried.ages(scans, cells, since)
+                foreseen = [
+                    ages.added(found, model, state)
+                    for found, model, state in zip(
+                        rules.estimator.expect(kind, mine_then.estimates(), place, told),
+                        rules.estimator.models, mine_then.states(), strict=True,
+                    )
+                ]  # fmt: skip
                 pairs = pair_measurement(
-                    rules.estimator.expect(kind, part.take(track).estimates(), place, told),
-                    np.arange(len(track)), measured,
-                    by_angles(white, measured),
-                    None, part.weights,
+                    foreseen, np.arange(len(track)), measured, by_angles(white, measured), None,
+                    part.weights,
                 )  # fmt: skip
             else:
                 variance = spread(track, cells, rows)

@@ -38,7 +38,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     if tracks is None or len(fused.target) == 0:
         return errors
     row_of_track = np.repeat(np.searchsorted(wake.ticks, tracks.tick), np.diff(tracks.offsets))
-    row_of_entry = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
+    row_of_entry = fused.row_of_entries
     held = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
     track = np.flatnonzero(held)
     first = np.searchsorted(row_of_track[track], row_of_entry, side="left")

@@ -330,13 +330,16 @@ def _start_by_told(
     cells = detection[telling]
     effects = rules.carried.told(scans, cells).effects(position[:, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
-    models = rules.estimator.models
-    even = np.full((len(models), len(cells)), 1.0 / len(models))
-    white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6], models, even)
+    white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
     own = covariance[:6, :6, telling]
     for i in (3, 4, 5):
         own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
     own[:3, :3] = _diagonal(white[:3])
+    ages = rules.carried.ages(scans, cells, np.zeros(len(cells)))
+    for model in rules.estimator.models:
+        begun = np.zeros((model.size, len(cells)))
+        begun[:6] = state[:6, telling]
+        own += ages.errors(model, begun)[0] / len(rules.estimator.models)
     covariance[:6, :6, telling] = symmetric(own + product_transposed(effects, effects))
     covariance[:6, 6:, telling] = -effects
     covariance[6:, :6, telling] = -effects.swapaxes(0, 1)

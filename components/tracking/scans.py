@@ -13,6 +13,7 @@ from components.messages.columns import POSE, TOLD
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.recorded_columns import row_of_entries
 from dsa_des.block.wake import Wake
 
 _MEASURED = ("azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s")
@@ -79,7 +80,7 @@ class Scans:
         """Return the looks with targets' velocities along the axes of frames with some origins."""
         if np.isnan(self.measured[4:]).all():
             return self
-        look = np.repeat(np.arange(len(self)), np.diff(self.offsets))
+        look = row_of_entries(self.offsets)
         measured = self.measured.copy()
         places = selected(self.pose[:3], look)
         measured[4:] = vectors_in_frame(selected(origin_deg_m, look), places, measured[4:])
@@ -167,7 +168,7 @@ def scans_of(fused: FusedDetections) -> Scans:
     is what was measured at one instant among the entries of a row, and a row without entries is
     none.
     """
-    row = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
+    row = fused.row_of_entries
     mask = np.asarray(fused.contributors, dtype=np.int64)
     tick = fused.measured_tick
     pose = fused.pose_columns()

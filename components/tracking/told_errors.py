@@ -4,7 +4,7 @@ An error that an aircraft has, whoever hears it, is one state for all sensors: i
 through its broadcasts and through its replies.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +13,13 @@ import numpy as np
 from components.estimation.batched import times
 from components.estimation.carried_errors import BEARING, RANGE, ToldErrors
 from components.estimation.frame import SensorPose
-from components.estimation.motion import Motion
+from components.estimation.told_ages import Ages
 from components.messages.columns import TOLD
 from components.messages.detections import SensorOffer, ToldError
 from components.tracking.scans import Scans
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
+_AGES = ("age_s", "velocity_age_s")
 # Nearer to the vertical azimuths say nothing.
 _LEAST_COS = 1e-3
 
@@ -65,32 +66,18 @@ class CarriedErrors:
         assert scans.told is not None
         return scans.told[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
-    def white(
-        self,
-        scans: Scans,
-        cells: IntArray,
-        rows: list[int],
-        models: Sequence[Motion],
-        weights: FloatArray,
-    ) -> FloatArray:
-        """Return variances of what is new in some detections, of a place along all axes alike.
-
-        What is told is of some time ago: targets have changed since as `models` have it, with
-        `weights` (models, n).
-        """
+    def white(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
+        """Return variances of what is new in some detections, of a place along all axes alike."""
         assert scans.told is not None
         variance = scans.variance[rows][:, cells]
         variance[:3] = scans.told[TOLD.index("white_variance"), cells]
-        carried_s, age_s = (
-            scans.told[TOLD.index(name), cells] for name in ("age_s", "velocity_age_s")
-        )
-        for model, weight in zip(models, weights, strict=True):
-            moved, turned = model.noise(carried_s), model.noise(age_s)
-            for i in range(3):
-                variance[i] += weight * moved[i, i]
-            for i in range(3, len(rows)):
-                variance[i] += weight * turned[i, i]
         return np.asarray(variance)
+
+    def ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
+        """Return how old what some detections tell is, for tracks last updated so long ago."""
+        assert scans.told is not None
+        place, velocity = (scans.told[TOLD.index(name), cells] for name in _AGES)
+        return Ages(place, velocity, since_s)
 
 
 def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:

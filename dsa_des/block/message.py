@@ -28,6 +28,7 @@ from dsa_des.block.recorded_columns import (
     nothing_in,
     per_entry,
     per_row,
+    row_of_entries,
     static,
 )
 
@@ -155,6 +156,19 @@ class Message:
         if known is None or known.tick is not self.tick or known.run is not run:
             known = self.__dict__["_instants"] = RunTicks(run, self.tick)
         return known
+
+    @instants.setter
+    def instants(self, known: RunTicks) -> None:
+        self.run, self.tick, self.__dict__["_instants"] = known.run, known.tick, known
+
+    @property
+    def row_of_entries(self) -> IntArray:
+        """Row of each entry, where a class has `offsets`."""
+        offsets = self.offsets  # type: ignore[attr-defined]
+        known = self.__dict__.get("_row_of_entries")
+        if known is None or known[0] is not offsets:
+            known = self.__dict__["_row_of_entries"] = offsets, row_of_entries(offsets)
+        return known[1]
 
     @classmethod
     def empty(cls, **others: Any) -> Self:

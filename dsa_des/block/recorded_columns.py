@@ -81,8 +81,38 @@ def same_bits(some: AnyArray, others: AnyArray) -> bool:
         return False
     bits = f"u{some.itemsize}"
     some, others = some.view(bits), others.view(bits)
-    return bool(some[0] == others[0] and some[-1] == others[-1] and (some == others).all())
+    if some[0] != others[0] or some[-1] != others[-1]:
+        return False
+    return not (some.strides[0] or others.strides[0]) or bool((some == others).all())
 
+
+def constant(value: Any, rows: int, kind: Any) -> AnyArray:
+    """Return a column that holds the same in all rows: one value, seen `rows` times."""
+    return np.broadcast_to(np.array(value, dtype=kind), rows)
+
+
+def of_one_value(values: AnyArray) -> bool:
+    """Return whether a column is known to hold the same in all rows, without a look at them."""
+    return not values.strides[0]
+
+
+def seen_once(values: AnyArray) -> AnyArray:
+    """Return a column that holds the same in all of many rows as `constant`; others as they are."""
+    if len(values) < _MANY:
+        return values
+    once = constant(values[0], len(values), values.dtype)
+    return once if same_bits(values, once) else values
+
+
+def picked(values: AnyArray, rows: IntArray) -> AnyArray:
+    """Return some rows of a column; of one that is constant, without a look at them."""
+    if len(values) and of_one_value(values):
+        return constant(values[0], len(rows), values.dtype)
+    return values.take(rows)
+
+
+# Of fewer rows, to look whether they are the same costs more than they do.
+_MANY = 64
 
 _NAN = np.full((), np.nan)
 _NAN.flags.writeable = False
@@ -241,14 +271,22 @@ def _known(kind: str) -> str:
 _RECORDED = "recorded"
 
 
-def instants_of(message: Any, counts: int | IntArray = 1) -> Columns:
-    """Return the columns that say when each row of a message is, `counts` times each."""
+def instants_of(message: Any, row: IntArray | None = None) -> Columns:
+    """Return the columns that say when each row of a message is, or of which row each entry is."""
     columns: Columns = {"tick": message.tick}
     if not says_no_runs(message.run):
         columns["replica"] = message.run
-    if isinstance(counts, int) and counts == 1:
+    if row is None:
         return columns
-    return {name: _repeated(values, counts) for name, values in columns.items()}
+    return {name: picked(values, row) for name, values in columns.items()}  # type: ignore[arg-type]
+
+
+def row_of_entries(offsets: IntArray) -> IntArray:
+    """Return the row of each entry; where none has two, much faster than repeating them."""
+    counts = offsets[1:] - offsets[:-1]
+    if counts.max(initial=0) > 1:
+        return np.repeat(np.arange(len(counts)), counts)
+    return (counts > 0).nonzero()[0]
 
 
 class DerivedColumns:
@@ -332,9 +370,9 @@ class DerivedColumns:
         if self._rows:
             tables[self._row_table] = self._filled(message, self._rows, instants_of(message))
         if self._entries:
-            counts = np.diff(message.offsets)
-            made = instants_of(message, counts)
-            tables[self._entry_table] = self._filled(message, self._entries, made, counts)
+            row = message.row_of_entries
+            made = instants_of(message, row)
+            tables[self._entry_table] = self._filled(message, self._entries, made, row)
         return tables
 
     def _filled(
@@ -342,7 +380,7 @@ class DerivedColumns:
         message: Any,
         filled: list[tuple[str, Filled]],
         made: Columns,
-        counts: IntArray | None = None,
+        row: IntArray | None = None,
     ) -> Columns:
         dicts = []
         for name, how in filled:
@@ -354,8 +392,8 @@ class DerivedColumns:
                 continue
             if how.instant:
                 values = Instants(values, getattr(message, "ticks_per_s", _NANOSECONDS))
-            if how.in_entries and counts is not None:
-                values = _repeated(values, counts)
+            if how.in_entries and row is not None:
+                values = _of_entries(values, row)
             made[_names(name, how)[0]] = values
         for name, how in dicts:
             held = getattr(message, name) if how.value is None else how.value(message)
@@ -389,7 +427,7 @@ def _in_order(message_type: type, base: type) -> Iterator[str]:
     yield from dict.fromkeys(name for names in of_kinds for name in names)
 
 
-def _repeated(values: Any, counts: int | IntArray) -> Any:
+def _of_entries(values: Any, row: IntArray) -> Any:
     if isinstance(values, Text):
-        return Text(np.repeat(values.codes, counts), values.names)
-    return np.repeat(values, counts)
+        return Text(values.codes.take(row), values.names)
+    return picked(values, row)

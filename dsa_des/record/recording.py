@@ -14,8 +14,10 @@ from dsa_des.block.recorded_columns import (
     Instants,
     Schema,
     Text,
+    constant,
     is_empty,
     nothing_in,
+    of_one_value,
     same_bits,
 )
 from dsa_des.errors import nearest
@@ -253,13 +255,15 @@ class Recorder:
         if self._ends is not None and self._ends.early:
             kept = self._ends.before_ends(instants)
             order = np.flatnonzero(kept) if order is None else order[kept[order]]
-        count = len(instants) if order is None else len(order)
-        if count == 0:
+        if order is not None:
+            instants = instants.take(order)
+        if len(instants) == 0:
             return
-        ordered: Columns = {}
-        for name, kind in self._schemas[table].items():
-            ordered[name] = self._column(table, name, kind, pieces, order, instants)
-        self.rows[table] += count
+        ordered = {
+            name: self._column(table, name, kind, pieces, order, instants)
+            for name, kind in self._schemas[table].items()
+        }
+        self.rows[table] += len(instants)
         for sink in self.sinks:
             sink.write(table, ordered)
 
@@ -272,33 +276,37 @@ class Recorder:
         order: IntArray | None,
         instants: RunTicks,
     ) -> AnyArray | Text:
-        count = len(instants) if order is None else len(order)
-        if name in ("time_s", "tick", "replica"):
-            values = self._time_column(name, instants)
-            return values if order is None else values[order]
+        """Return a column of all pieces in their order; `instants` are in it already."""
+        if name == "replica":
+            return instants.run
+        if name == "tick":
+            return instants.tick
+        if name == "time_s":
+            return instants.tick / self._ticks_per_s
         if kind == "text":
             text = self._texts.setdefault((table, name), _TextCodes(name))
-            codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
-            return Text(codes if order is None else codes[order], text.names)
-        if kind == "float64" and all(_is_missing(columns.get(name)) for _, columns in pieces):
-            return nothing_in(count)
+            codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
+            return Text(codes, text.names)
         parts = [
             _values(self._in_seconds(columns.get(name)), kind, len(columns["tick"]))
             for _, columns in pieces
         ]
-        values = np.concatenate(parts) if len(parts) > 1 else parts[0]
-        if same_bits(values, np.broadcast_to(values[:1], len(values))):
-            values, order = np.broadcast_to(values[:1].copy(), count), None
-        return values if order is None else values[order]
+        if all(map(is_empty, parts)):
+            return nothing_in(len(instants))
+        return _joined(parts, order)
 
     def _in_seconds(self, values: Any) -> Any:
         """Return instants as seconds since the start of their run."""
         return values.ticks / self._ticks_per_s if isinstance(values, Instants) else values
 
-    def _time_column(self, name: str, instants: RunTicks) -> AnyArray:
-        if name == "replica":
-            return instants.run
-        return instants.tick if name == "tick" else instants.tick / self._ticks_per_s
+
+def _joined(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
+    """Return the values of all parts in order; where all are the same, as one of them."""
+    first, kind = parts[0][0], parts[0].dtype
+    if all(same_bits(part, constant(first, len(part), kind)) for part in parts):
+        return constant(first, sum(map(len, parts)) if order is None else len(order), kind)
+    values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+    return values if order is None else values.take(order)
 
 
 def _instants(columns: Columns) -> RunTicks:
@@ -321,10 +329,10 @@ class _TextCodes:
         """Return one piece's codes into our names; -1 is null."""
         count = len(columns["tick"])
         if self._column == "block":
-            return np.full(count, self._lookup((block,))[0], dtype=np.int32)
+            return constant(self._lookup((block,))[0], count, "int32")
         text = columns.get(self._column)
         if text is None:
-            return np.full(count, -1, dtype=np.int32)
+            return constant(-1, count, "int32")
         if not isinstance(text, Text):
             raise TypeError(f"column {self._column!r} must be Text")
         return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
@@ -343,11 +351,10 @@ class _TextCodes:
         return lookup
 
 
-def _is_missing(values: Any) -> bool:
-    return values is None or is_empty(values)
-
-
 def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
-        return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
-    return np.asarray(values, dtype=np.dtype(kind))
+        return nothing_in(count) if kind == "float64" else constant(0, count, kind)
+    values = np.asarray(values)
+    if values.dtype == kind:
+        return values
+    return constant(values[0], count, kind) if of_one_value(values) else values.astype(kind)

@@ -4,7 +4,8 @@ Within an instant SimPy orders events by priority. Blocks in look-ahead windows 
 the others by depth; ties within a depth go by name, or at random under ``shuffle_ties``.
 """
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -83,7 +84,6 @@ class Node:
     processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
-    cpu_s: float = 0.0
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
     #: Whether it may run ahead of the window (`Window.ahead`).
@@ -188,10 +188,7 @@ class Node:
         return window.ahead if self.ahead else window.end
 
     def _demanded(self, start: int, end: int) -> RunTicks:
-        instants = [demand.between(start, end) for demand in self.demands]
-        if len(instants) == 1:
-            return instants[0]
-        return union(instants) if instants else RunTicks.none()
+        return _all_of([demand.between(start, end) for demand in self.demands])
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -209,27 +206,23 @@ class Node:
             scans, instants = self.clock.between(start, end)
         else:
             instants = self._demanded(start, end) if self.on_demand else RunTicks.none()
-            scans = np.full(len(instants), -1, dtype=np.int64)
+            scans = _no_scans(len(instants))
         arrivals = [
             channel.next_arrivals(end)
             for port in self._trigger_ports
             for channel in self.channels.get(port, [])
         ]
-        arrivals = [new for new in arrivals if len(new)]
-        if arrivals:
-            own = instants
-            if len(own) == 0 and len(arrivals) == 1:
-                instants = arrivals[0]
-            else:
-                instants = union([own, *arrivals])
-            numbered = np.full(len(instants), -1, dtype=np.int64)
-            if len(own):
-                numbered[last_of_run(instants, own)] = scans
-            scans = numbered
+        if any(map(len, arrivals)):
+            own, numbers = instants, scans
+            instants = _all_of([own, *arrivals])
+            scans = _no_scans(len(instants))
+            if len(own) and self.clock is not None:
+                scans = scans.copy()
+                scans[last_of_run(instants, own)] = numbers
         runs = self.simulation.runs
         if runs.early:
             kept = runs.before_ends(instants)
-            instants, scans, end = instants.take(kept), scans[kept], runs.cut(end)
+            instants, scans = instants.take(kept), scans[kept]
         if len(instants):
             self._run(instants, scans, end)
 
@@ -331,6 +324,22 @@ class Node:
                     node.wake_at(arrival)
 
 
+def _all_of(parts: Sequence[RunTicks]) -> RunTicks:
+    """Return the instants of all parts."""
+    filled = [part for part in parts if len(part)]
+    if len(filled) > 1:
+        return union(filled)
+    return filled[0] if filled else RunTicks.none()
+
+
+#: The scan number at instants that are none of a block's own scans, seen as often as asked for.
+_NO_SCAN = np.broadcast_to(np.int64(-1), 1 << 40)
+
+
+def _no_scans(rows: int) -> IntArray:
+    return _NO_SCAN[:rows]
+
+
 def _now(tick: int) -> RunTicks:
     return RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
 
@@ -343,7 +352,9 @@ def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
     """
     sent = message.tick
     if sent is ran.tick:
-        return message if says_no_runs(ran.run) else message.of_runs(ran.run)
+        message = message if says_no_runs(ran.run) else copy(message)
+        message.instants = ran  # with what is known of them
+        return message
     if sent.dtype == np.int64:
         if not says_no_runs(ran.run) and says_no_runs(message.run):
             if ran.one_run:

@@ -66,8 +66,3 @@ class Runs:
     def over(self, tick: int) -> bool:
         """Return whether all runs that go are over before a tick of theirs."""
         return self.early and bool((self.ends[self.going.start : self.going.stop] <= tick).all())
-
-    def cut(self, end: int) -> int:
-        """Return the end of a window, or that of the run that goes alone if it comes first."""
-        alone = self.early and len(self.going) == 1
-        return min(end, int(self.ends[self.going.start])) if alone else end

@@ -5,6 +5,7 @@ import pytest
 
 from components.estimation.carried_errors import (
     BEARING,
+    CLIMB,
     EAST,
     HEIGHT,
     NORTH,
@@ -21,8 +22,8 @@ from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
 
-WAYS = (NORTH, EAST, HEIGHT, HEIGHT, SPEED_NORTH, SPEED_EAST, BEARING, RANGE)
-DEVIATIONS = np.array([30.0, 30.0, 25.0, 2.0, 4.0, 4.0, 0.15, 38.0])
+WAYS = (NORTH, EAST, HEIGHT, HEIGHT, SPEED_NORTH, SPEED_EAST, BEARING, RANGE, CLIMB)
+DEVIATIONS = np.array([30.0, 30.0, 25.0, 2.0, 4.0, 4.0, 0.15, 38.0, 0.9])
 
 
 def pose(count):
@@ -36,7 +37,7 @@ def pose(count):
 
 def told(count, at_range):
     deviation = DEVIATIONS[:, np.newaxis] * np.ones(count)
-    deviation[[0, 1, 4, 5] if at_range else [6, 7]] = 0.0
+    deviation[[0, 1, 4, 5, 8] if at_range else [6, 7]] = 0.0
     return ToldErrors(WAYS, deviation, np.full(count, 0.4), np.full(count, at_range))
 
 
@@ -116,7 +117,7 @@ def tracked(estimator, looks, place, errors, white):
 
 
 START = np.array([90_000.0, -50_000.0, -3000.0, 20.0, -40.0, 3.0])
-COUNT, LASTS_S = 25, (300.0, 300.0, np.inf, 0.0, 300.0, 300.0, 0.0, np.inf)
+COUNT, LASTS_S = 25, (300.0, 300.0, np.inf, 0.0, 300.0, 300.0, 0.0, np.inf, 0.0)
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "imm"])
@@ -136,15 +137,16 @@ def test_tracks_are_those_of_one_batch_that_knows_how_errors_are_correlated(name
     far = np.linalg.norm(away)
     white_m2, white = np.array([4.0, 4.0, 4.0, 0.04, 0.04, 0.25]), np.zeros((6, 1))
     white[3:, 0] = white_m2[3:]
-    kind, still = Kind(True, False, True), np.zeros((14, 1))
+    kind, still = Kind(True, False, True), np.zeros((6 + len(WAYS), 1))
     rng, true = np.random.default_rng(11), START + np.array([120.0, -90.0, 40.0, 6.0, 5.0, -2.0])
     # Errors of place (three axes) and velocity in time, without any state.
     apart = np.abs(np.subtract.outer(np.arange(COUNT), np.arange(COUNT)))
     in_time = [np.exp(-apart / t) if t > 0.0 else np.eye(COUNT) for t in LASTS_S]
-    effects = np.zeros((6, 8))
+    effects = np.zeros((6, 9))
     effects[0, 0], effects[1, 1], effects[2, 2], effects[2, 3] = 30.0, 30.0, -25.0, -2.0
     effects[3, 4] = effects[4, 5] = 4.0
     effects[0, 4] = effects[1, 5] = 4.0 * 0.4
+    effects[5, 8], effects[2, 8] = -0.9, -0.9 * 0.4
     whole = np.kron(np.eye(COUNT), np.diag(white_m2))
     for i, by in enumerate(in_time):
         whole += np.kron(by, np.outer(effects[:, i], effects[:, i]))

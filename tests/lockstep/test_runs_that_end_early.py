@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from components.encounters.ending import ClosestApproachPassed
@@ -129,7 +130,23 @@ def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
     )
     NEAR[text] = NEAR[HEAD_ON]
     scene = loaded(tmp_path, text)
-    simulation = lock.same_as_alone(lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}))
+    scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0})
+    simulation = lock.same_as_alone(scenes)
+    together = lock_step(scenes)
+    fusion = together.nodes["fusion"]
+    came, runner = [], fusion.runner
+
+    class Watching:
+        @staticmethod
+        def run(wake):
+            came.extend(
+                together.runs.before_ends(new.instants) for new in wake.arrivals("detections")
+            )
+            return runner.run(wake)
+
+    fusion.runner = Watching
+    together.run()
+    assert np.concatenate(came).all()
     assert simulation.runs.early
     one, first = lock.tables_of(Simulation, scene)
     assert first["state_tracks"].num_rows > 0

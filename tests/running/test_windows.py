@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.cli import main
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import Window, Windows
+from dsa_des.running.windows import Rewinder, Window, Windows
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.runs import Runs
 
@@ -192,3 +193,13 @@ def test_a_pacer_that_was_stopped_ends_the_run():
 
     simulation.run(stop, pacer)
     assert pacer.time_s == 2.0
+
+
+def test_an_end_found_in_a_window_that_is_undone_was_never_found():
+    runs = Runs(1, 100)
+    rewinder = Rewinder([], set(), None, runs)
+    rewinder.mark()
+    runs.note_ends(RunTicks.of_run(0, np.array([40])), "over")
+    assert runs.early and runs.ended_by == {0: "over"}
+    rewinder.restore()
+    assert not runs.early and runs.ended_by == {} and runs.ends.tolist() == [100]

@@ -1,11 +1,7 @@
-"""What stands where on the page, in a real browser: names, zoom, and pages beside each other.
-
-Left out by name where Playwright's Python package or a Chromium is missing.
-"""
+"""What stands where on the page, in a real browser: names, zoom, and pages beside each other."""
 
 import itertools
 import math
-import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -20,22 +16,9 @@ from tests.results.test_study_report import call
 from tests.results.test_study_report import folder as studied
 from tests.view.test_page import SCENE
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None:
-    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
-
 study = studied
 NEAR = SCENE.format(title="t", name="near")
 INTRUDER = NEAR[NEAR.index("[[blocks.traffic.intruders]]") :]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield launched
-        launched.close()
 
 
 def opened_page(browser, path, width=1280, height=800, hash=""):

@@ -126,6 +126,29 @@ def test_who_sits_left_and_who_sits_right_attend_each_for_themselves():
     assert abs(seen / runs - 0.75) < 2.6 * math.sqrt(0.75 * 0.25 / runs)
 
 
+@pytest.mark.parametrize(("between", "share"), [("integral", 0.5), ("as_at_scan", 0.75)])
+def test_a_search_that_is_half_way_round_has_met_half(between, share):
+    """As at the scan, the first one counts as a whole period: three of four are over by then."""
+    pilot = {"search": "round", "round_s": 40.0, "smallest_arcmin": 0.0, "scan_rate_hz": "1/10",
+             "between_scans": between}  # fmt: skip
+    count = 300
+    targets = [met(f"t{k}", range_m=9000.0) for k in range(count)]
+    found = rows(run(scene(pilot, targets, duration_s=21)))
+    seen = [sum(row["time_s"] == time_s for row in found) / count for time_s in (0.0, 10.0, 20.0)]
+    for part, wanted in zip(seen, (share - 0.5, share - 0.25, share), strict=True):
+        assert abs(part - wanted) <= 2.6 * math.sqrt(wanted * (1.0 - wanted) / count), seen
+
+
+def test_who_looks_out_in_a_run_sees_all_who_come():
+    pilot = {"beta_per_sr_s": 1e9, "left_looking": 0.5, "looking": "spells"}
+    both = scene(pilot, [met("a"), met("b", bearing_deg=-20.0)], duration_s=3)
+    spells = dsa_des.load_scene(both)
+    found = tables_of([scene_of(spells, Replica(k, {})) for k in range(40)], lock_step)
+    seen = found["detections"].to_pylist()
+    first, second = ({row["replica"] for row in seen if row["target"] == name} for name in "ab")
+    assert first == second and 8 < len(first) < 32
+
+
 def test_a_search_in_glances_comes_round_so_much_later():
     pilot = {"search": "round", "round_s": 30.0, "smallest_arcmin": 4.0, "left_looking": 0.5}
     found, deviation = share_seen(pilot, before_s=8.0, targets=600)

@@ -79,7 +79,7 @@ def _signal(message: Signals, column: str, which: str | None, key: str) -> Float
     mine = message.signal == message.names.index(column)
     if which is not None:
         mine &= message.element == int(which)
-    row = np.repeat(np.arange(len(message)), np.diff(message.offsets))
+    row = message.row_of_entries
     found = np.full(len(message), np.nan)
     found[row[mine]] = message.value[mine]
     return found

@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
+from components.radar.rain import rain_spread_m_s
 from dsa_des.errors import SceneError
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -228,6 +229,13 @@ def test_a_canceller_takes_out_rain_by_where_the_wind_blows_it(wind_mps):
         before = noise_like("radar.threshold", plain[name], {})
         after = noise_like("radar.threshold", found[name], {})
         assert after == pytest.approx(left * before, rel=5e-3)
+
+
+def test_rain_s_own_rates_spread_by_turbulence_fall_and_at_most_6_m_s_of_shear():
+    """Nathanson, "Radar design principles", chapter 6."""
+    assert rain_spread_m_s(0.0, 0.0, 0.05) == pytest.approx(1.0)
+    assert rain_spread_m_s(0.0, math.radians(90.0), 0.05) == pytest.approx(math.sqrt(2.0))
+    assert rain_spread_m_s(9e5, 0.0, 0.05) == pytest.approx(math.sqrt(37.0))
 
 
 @covers("beam_shape_loss", "beam_spacing", of=LINK_BUDGETS)

@@ -193,6 +193,13 @@ def test_a_beam_visits_cones_first(kind):
     assert usual[-1] > 0.1
     assert first[0] == usual[0]
     assert first[1:] == [0.0] * (len(first) - 1)
+    # Everything is as it is when the scan begins, as a radar sees it that does not sweep.
+    swept, still = (
+        [row["true_range_m"] for row in rows(run(cued(kind, **keys)), block="sensor",
+                                             target="rolling")]
+        for keys in ({"beam_sweep": True, "cued_beam_first": True}, {})
+    )  # fmt: skip
+    assert swept[0] != still[0] and swept[1:] == still[1:]
     assert lit("diving", cued_beam_first=True) == lit("diving")
 
 

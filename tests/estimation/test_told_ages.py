@@ -1,0 +1,187 @@
+"""Places and velocities that are told of earlier instants: tracks of flights by the filter's model.
+
+Flights are drawn exactly as the filter's model has them, and told with errors that are as stated:
+whatever the noise, the ages and the errors, the mean normalised error squared is 6. Flights without
+any noise have less: how much less is worked out by a recursion for each axis by itself.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from components.estimation.carried_errors import (
+    CLIMB,
+    EAST,
+    HEIGHT,
+    NORTH,
+    SPEED_EAST,
+    SPEED_NORTH,
+    ToldErrors,
+)
+from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
+from components.estimation.frame import pose_in_frame
+from components.estimation.measurement import Kind
+from components.estimation.motion import ConstantVelocity
+from components.estimation.told_ages import Ages
+from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
+
+KIND = Kind(True, False, True)
+WAYS = (NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB)
+LASTS_S = (300.0, 300.0, np.inf, 300.0, 300.0, 0.0)
+# As ADS-B of NACp 10 and NACv 3 tells.
+DEVIATION = np.array([4.1, 4.1, 26.0, 0.41, 0.41, 0.87])
+WHITE_M2, COUNT, LOOKS = 1e-4, 500, 20
+
+
+@cache
+def ages_of(look):
+    return np.random.default_rng(100 + look).uniform(0.0, 0.5, 2)
+
+
+def pose():
+    """Banked on the southern hemisphere."""
+    ones = np.ones(COUNT)
+    return pose_in_frame(
+        (-41.3 * ones, 173.2 * ones, 2400.0 * ones), (-41.29 * ones, 173.2 * ones, 2400.0 * ones),
+        (np.radians(217.0) * ones, 0.07 * ones, -0.35 * ones),
+    )  # fmt: skip
+
+
+def flown_on(rng, state, intensity, for_s):
+    """Return states after a time, exactly as white acceleration moves them."""
+    moved, gained = state.copy(), np.sqrt(intensity * for_s) * rng.normal(size=(3, COUNT))
+    apart = np.sqrt(intensity * for_s**3 / 12.0) * rng.normal(size=(3, COUNT))
+    moved[:3] += for_s * state[3:] + 0.5 * for_s * gained + apart
+    moved[3:] += gained
+    return moved
+
+
+def nees_of(estimator, intensity, flown, seed=5):
+    """Return the NEES at every look, (looks, tracks)."""
+    rng, place = np.random.default_rng(seed), pose()
+    estimator = estimator.carrying(LASTS_S)
+    lasts = np.array(LASTS_S)[:, np.newaxis]
+    kept = np.exp(-1.0 / np.maximum(lasts, 1e-9))
+    errors = rng.normal(size=(6, COUNT))
+    true = np.zeros((6, COUNT))
+    true[:3] = np.array([[90_000.0], [-50_000.0], [-3000.0]])
+    true[3:] = 40.0 * rng.normal(size=(3, COUNT))
+    tracks, found, now_s = None, [], 0.0
+    plain = ToldErrors((), np.zeros((0, COUNT)), np.zeros(COUNT), np.zeros(COUNT, dtype=bool))
+    for look in range(LOOKS):
+        end_s = look + 1.0
+        ages, seen = ages_of(look), {}
+        for when, what in sorted(
+            [(end_s - ages[0], "place"), (end_s - ages[1], "velocity"), (end_s, "now")]
+        ):
+            true, now_s = flown_on(rng, true, flown, when - now_s), when
+            seen[what] = true
+        errors = kept * errors + np.sqrt(1.0 - kept**2) * rng.normal(size=errors.shape)
+        off = DEVIATION[:, np.newaxis] * errors * np.array([[1], [1], [-1], [1], [1], [-1]])
+        white = np.sqrt(WHITE_M2) * rng.normal(size=(6, COUNT))
+        said = np.concatenate([seen["place"][:3], seen["velocity"][3:]]) + off + white
+        said[:3] += ages[0] * (said[3:] - white[3:])
+        told = ToldErrors(
+            WAYS, np.repeat(DEVIATION[:, np.newaxis], COUNT, axis=1), np.full(COUNT, ages[0]),
+            np.zeros(COUNT, dtype=bool),
+        )  # fmt: skip
+        age = Ages(*(np.full(COUNT, one) for one in (*ages, 1.0 if look else 0.0)))
+        model = estimator.models[0]
+        if tracks is None:
+            tracks = begun(said, told, age, model, place)
+        else:
+            tracks = estimator.predict(tracks, np.ones(COUNT))
+            foreseen = estimator.expect(KIND, tracks, place, told)
+            foreseen = [age.added(foreseen[0], model, tracks.states[0])]
+            measured = plain.expected(KIND, said, place)
+            away = np.linalg.norm(said[:3] - place.position_m, axis=0)
+            level = away * np.cos(measured[1])
+            variance = WHITE_M2 * np.stack(
+                [1 / level**2, 1 / away**2, *np.ones((4, COUNT))]
+            )  # fmt: skip
+            every = np.arange(COUNT)
+            pairs = pair_measurement(foreseen, every, measured, variance, None, tracks.weights)
+            tracks = estimator.update(tracks, every, pairs, every)
+        state, covariance = tracks.states[0][:6], tracks.covariances[0][:6, :6]
+        error = (state - true).T[..., np.newaxis]
+        found.append(
+            (error * np.linalg.solve(covariance.transpose(2, 0, 1), error)).sum(axis=(1, 2))
+        )
+    return np.array(found)
+
+
+def begun(said, told, age, model, place):
+    state, covariance = np.zeros((12, COUNT)), np.zeros((12, 12, COUNT))
+    state[:6] = said
+    effects = told.effects(said[:3], place)
+    new = age.errors(model, state)[0]
+    for i in range(6):
+        new[i, i] += WHITE_M2
+        covariance[6 + i, 6 + i] = 1.0
+    covariance[:6, :6] = new + np.einsum("ikn,jkn->ijn", effects, effects)
+    covariance[:6, 6:], covariance[6:, :6] = -effects, -effects.swapaxes(0, 1)
+    return Estimates([state], [covariance], np.ones((1, COUNT)))
+
+
+def inside(nees):
+    """Return at which looks the mean lies within the 99.9 % bounds of independent tracks."""
+    low, high = chi2.ppf([0.0005, 0.9995], 6 * COUNT) / COUNT
+    mean = nees.mean(axis=1)
+    return (low < mean) & (mean < high)
+
+
+@pytest.mark.parametrize("intensity_m2_s3", [1.2e-5, 0.1, 4.0])
+def test_tracks_of_flights_by_the_model_are_as_wrong_as_they_say(intensity_m2_s3):
+    """Ages taken for errors of their own: up to 6.8 at a noise of 0.1, 6.5 to 8.3 at 4."""
+    estimator = ExtendedKalmanFilter(ConstantVelocity(intensity_m2_s3))
+    assert inside(nees_of(estimator, intensity_m2_s3, intensity_m2_s3)).all()
+
+
+def test_so_are_those_of_sigma_points():
+    estimator = UnscentedKalmanFilter(ConstantVelocity(0.1), SigmaPoints(0.1))
+    assert inside(nees_of(estimator, 0.1, 0.1)).all()
+
+
+def test_flights_without_noise_have_as_much_less_as_a_recursion_says():
+    estimator = ExtendedKalmanFilter(ConstantVelocity(1.2e-5))
+    found = nees_of(estimator, 1.2e-5, 0.0).mean(axis=1)
+    level = [straight(*DEVIATION[[0, 3]], 0.0, 1.2e-5)]
+    expected = 2.0 * level[0] + straight(DEVIATION[2], 0.0, DEVIATION[5], 1.2e-5)
+    assert 4.9 < expected[-1] < 5.3
+    np.testing.assert_allclose(found[4:], expected[4:], atol=4.0 * np.sqrt(12.0 / COUNT))
+
+
+def straight(place_m, speed_m_s, climb_m_s, intensity):
+    """Return E[NEES] of one axis of a flight without noise: of the filter's own gains.
+
+    The state is place, velocity, and what lasts of the errors of both; ages are errors of their own
+    here, which at so little noise is the same.
+    """
+    kept = np.exp(-1.0 / 300.0) if speed_m_s else 1.0
+    step = np.diag([1.0, 1.0, kept, kept])
+    step[0, 1] = 1.0
+    believed = true = None
+    found = []
+    for look in range(LOOKS):
+        age = ages_of(look)[0]
+        slope = np.array([[1.0, 0.0, place_m, age * speed_m_s], [0.0, 1.0, 0.0, speed_m_s]])
+        rough = WHITE_M2 * np.eye(2) + climb_m_s**2 * np.array([[age**2, age], [age, 1.0]])
+        drift = np.diag([0.0, 0.0, 1.0 - kept**2, 1.0 - kept**2])
+        if believed is None:
+            effect = slope[:, 2:]
+            believed = np.block([[effect @ effect.T + rough, -effect], [-effect.T, np.eye(2)]])
+            true = believed
+        else:
+            noise = drift.copy()
+            noise[:2, :2] = intensity * np.array([[1.0 / 3.0, 0.5], [0.5, 1.0]])
+            believed = step @ believed @ step.T + noise
+            true = step @ true @ step.T + drift
+            gain = np.linalg.solve(slope @ believed @ slope.T + rough, slope @ believed).T
+            left = np.eye(4) - gain @ slope
+            believed, true = (
+                left @ one @ left.T + gain @ rough @ gain.T for one in (believed, true)
+            )
+        found.append(np.trace(np.linalg.solve(believed[:2, :2], true[:2, :2])))
+    return np.array(found)
