@@ -14,9 +14,9 @@ from components.messages.detections import LastingError, LastingPart
 from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_of_step
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
+from dsa_des.arrays.column_values import nothing_in
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
-from dsa_des.block.recorded_columns import nothing_in
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
 

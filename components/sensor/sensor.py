@@ -42,12 +42,12 @@ from components.sensor.measurement_errors import (
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
 from components.sensor.parameters import SensorParameters
+from dsa_des.arrays.column_values import constant, picked
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
-from dsa_des.block.recorded_columns import constant, picked
 from dsa_des.block.wake import Wake
 
 # Up to so many targets, counting row by row is mostly the overhead of rows.
