@@ -13,6 +13,8 @@ import pytest
 sys.path.extend(sorted({str(p.parent) for p in Path(__file__).parent.rglob("*.py")} - {*sys.path}))
 # What runs tests in parallel sets the width of its own terminal, which our tables would obey.
 os.environ.pop("COLUMNS", None)
+# As many workers as processors: threads of linear algebra would spin while others compute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def keep_bytecode_elsewhere() -> None:

@@ -5,6 +5,7 @@ import atexit
 import contextlib
 import gc
 import importlib
+import importlib.metadata
 import io
 import json
 import os
@@ -15,6 +16,8 @@ import socket
 import sys
 import threading
 import types
+
+from dsa_des.block.entry_points import registered
 
 _LIBRARIES = (
     "numpy", "scipy.special", "scipy.optimize", "pydantic", "pyarrow.parquet", "simpy", "networkx",
@@ -35,6 +38,9 @@ def load() -> None:
                 with contextlib.suppress(ImportError):  # an extra that is not installed here
                     importlib.import_module(found.name)
     build_models()
+    for group in importlib.metadata.entry_points().groups:
+        if group.startswith("dsa_des."):
+            registered(group)
     gc.collect()
     gc.freeze()
 
@@ -129,6 +135,8 @@ def _take(job: dict, stdout: int, stderr: int) -> None:
         path.insert(0, first.get(words[0], os.path.dirname(os.path.abspath(words[0]))))
     sys.path[:] = path
     importlib.invalidate_caches()
+    if asked != before:
+        registered.cache_clear()
 
 
 def begin(job: dict) -> None:

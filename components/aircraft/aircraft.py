@@ -167,9 +167,12 @@ class Aircraft(Parameters):
     engine: Literal["propeller", "turbofan", "turbojet"] = Field(
         default="propeller", description="Propulsion type (Table 4.5)."
     )
-    mode_s: bool = Field(default=False, description="Whether it has a Mode S transponder.")
+    mode_s: bool = Field(
+        default=False, strict=True, description="Whether it has a Mode S transponder."
+    )
     mode_c: bool = Field(
         default=False,
+        strict=True,
         description="Whether a Mode C one, which gives no identity; Mode S counts first.",
     )
     ads_b: AdsBEquipage | None = Field(
@@ -208,7 +211,17 @@ class Roster:
 
     @classmethod
     def of(cls, targets: Sequence[tuple[str, Aircraft]]) -> "Roster":
-        """Return the roster of (name, aircraft) pairs."""
+        """Return the roster of (name, aircraft) pairs; two with one address are refused."""
+        bearers: dict[str, str] = {}
+        for name, craft in targets:
+            if craft.icao_address and (craft.mode_s or craft.ads_b):
+                other = bearers.setdefault(craft.icao_address.upper(), name)
+                if other != name:
+                    raise ValueError(
+                        f"icao_address {craft.icao_address!r} is that of {other!r} and of "
+                        f"{name!r}: each aircraft has one of its own; give another, or leave it "
+                        "out"
+                    )
         return cls(tuple(name for name, _ in targets), tuple(craft for _, craft in targets))
 
     def __len__(self) -> int:

@@ -16,7 +16,7 @@ from components.geometry import TrajectoryState
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 
-class Flights(Protocol):
+class AllFlights(Protocol):
     """The flights of all aircraft of all runs, with all manoeuvres that came so far."""
 
     @property
@@ -52,7 +52,7 @@ class KnownFlights:
 
     Parameters
     ----------
-    flights : Flights
+    flights : AllFlights
     run, known : (rows,) of int
         Of each row its run, and how many manoeuvres of the ownship it knows.
     seen : sequence of callables
@@ -61,7 +61,7 @@ class KnownFlights:
 
     def __init__(
         self,
-        flights: Flights,
+        flights: AllFlights,
         run: IntArray,
         known: IntArray,
         seen: Sequence[Callable[..., Any]] = (),
@@ -89,7 +89,7 @@ class KnownFlights:
         row, column : (n,) of int
             Row of the message, and index of the target in the roster.
         time_s, ahead_s : (n,)
-            See `Flights.states`.
+            See `AllFlights.states`.
 
         Returns
         -------

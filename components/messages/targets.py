@@ -92,10 +92,17 @@ def truth_columns(states: Any) -> Columns:
 
 
 def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[str, Any]:
-    columns = np.arange(count)
-    state = _together(flights(columns, time_s[:, np.newaxis]))
+    columns, rows = np.arange(count), len(time_s)
+    # All three instants are asked for at once.
+    times_s = np.concatenate([time_s, time_s + STEP_S, time_s - STEP_S])
+    asked = flights.take_rows(np.tile(np.arange(rows), 3))(columns, times_s[:, np.newaxis])
+    states = _together(asked)
+    state, after, before = (
+        {name: values[first : first + rows] for name, values in states.items()}
+        for first in (0, rows, 2 * rows)
+    )
+    velocity = _velocity(flights, columns, time_s, state, after, before)
     row, column = np.nonzero(state["present"])
-    velocity = _velocity(flights, columns, time_s, state)
     return {
         "tick": tick[row],
         "counts": np.bincount(row, minlength=len(tick)),
@@ -106,36 +113,38 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
     }
 
 
-def _velocity(flights: Any, columns: IntArray, time_s: FloatArray, here: Any) -> list[FloatArray]:
+_State = dict[str, Any]
+
+
+def _velocity(
+    flights: Any, columns: IntArray, time_s: FloatArray, here: _State, after: _State, before: _State
+) -> list[FloatArray]:
     """Return the velocity north, east and down of everybody at each time, (rows, 1 + targets)."""
-    after, there_after = _moved(flights, columns, time_s + STEP_S, here)
-    before, there_before = _moved(flights, columns, time_s - STEP_S, here)
-    velocity = (after - before) / (2.0 * STEP_S)
+    there_after, there_before = after["present"], before["present"]
+    way_after, way_before = _way(here, after), _way(here, before)
+    velocity = (way_after - way_before) / (2.0 * STEP_S)
     one_sided = here["present"] & ~(there_after & there_before)
     rows = np.flatnonzero(one_sided.any(axis=1))
     if len(rows):
         part = flights.take_rows(rows)
         here = {name: values[rows] for name, values in here.items()}
         for near, there, step_s in (
-            (after, there_after, STEP_S),
-            (before, there_before, -STEP_S),
+            (way_after, there_after, STEP_S),
+            (way_before, there_before, -STEP_S),
         ):
-            far, still_there = _moved(part, columns, time_s[rows] + 2.0 * step_s, here)
-            slope = (4.0 * near[:, rows] - far) / (2.0 * step_s)
-            fits = one_sided[rows] & there[rows] & still_there
+            far = _together(part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis]))
+            slope = (4.0 * near[:, rows] - _way(here, far)) / (2.0 * step_s)
+            fits = one_sided[rows] & there[rows] & far["present"]
             velocity[:, rows] = np.where(fits, slope, velocity[:, rows])
             one_sided[rows] &= ~fits
         velocity[:, one_sided] = np.nan
     return list(velocity)
 
 
-def _moved(
-    flights: Any, columns: IntArray, time_s: FloatArray, here: Any
-) -> tuple[FloatArray, Any]:
-    """Return where everybody is at other times, north, east and down of where they are here."""
-    there = _together(flights(columns, time_s[:, np.newaxis]))
+def _way(here: _State, there: _State) -> FloatArray:
+    """Return where everybody is in one state, north, east and down of where they are in another."""
     places = [*(here[name] for name in _PLACE), *(there[name] for name in _PLACE)]
-    return np.stack(line_of_sight_ned(*places, validate=False)), there["present"]
+    return np.stack(line_of_sight_ned(*places, validate=False))
 
 
 def _together(states: Any) -> dict[str, Any]:

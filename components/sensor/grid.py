@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.geometry import TWO_PI, past, rising_sector, wrap_pi
+from dsa_des.arrays.column_values import nothing_in
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.recorded_columns import nothing_in
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
 # times one degree in radians and 110 degrees in radians differ in the last bit.

@@ -5,7 +5,7 @@ What each row holds is what a run alone would give, to the bit; a single run is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from components.messages.steering import Manoeuvre
 from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.wake import ReplicaRuns, Wake
+from dsa_des.block.wake import Wake
 
 
 class FlightsOfRuns(NamedTuple):
@@ -99,7 +99,7 @@ class FlownFlights:
         time_s: FloatArray,
         ahead_s: FloatArray | float,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of ownships and of targets; see `messages.known_flights.Flights`."""
+        """Return states of ownships and of targets; see `messages.known_flights.AllFlights`."""
         if self.rates_hz is not None:
             rate = self.rates_hz[run]
             time_s = np.floor(time_s * rate) / rate
@@ -182,19 +182,22 @@ def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArr
     return ((ownship[mine] == run) & (ticks >= came[mine])).astype(np.int64)
 
 
-def flights_of_runs(face: Any, replicas: ReplicaRuns) -> FlightsOfRuns | None:
-    """Return the flights of all replicas, or None where they cannot be put together."""
-    type(face).prepare(replicas.parameters)
-    parameters = getattr(face, "flown_of", None)
-    found: FlightsOfRuns | None = None if parameters is None else parameters(replicas.parameters)
-    return _made_one_by_one(face, replicas) if found is None else found
+def flights_of_runs(
+    face: Any, parameters: Sequence[Any], make: Callable[[int], Any]
+) -> FlightsOfRuns | None:
+    """Return the flights of all runs, or None where they cannot be put together."""
+    type(face).prepare(parameters)
+    of_parameters = getattr(face, "flown_of", None)
+    flights: FlightsOfRuns | None = None if of_parameters is None else of_parameters(parameters)
+    if flights is not None:
+        return flights
+    return _made_one_by_one(face, map(make, range(len(parameters))))
 
 
-def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> FlightsOfRuns | None:
+def _made_one_by_one(face: Any, sources: Iterable[Any]) -> FlightsOfRuns | None:
     own, targets = [], []
     aircraft: list[tuple[str, Aircraft]] = []
-    for number in range(len(replicas)):
-        source = replicas.make(number)
+    for source in sources:
         own.append(source.own)
         targets += list(source.targets)
         aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)

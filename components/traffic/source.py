@@ -1,7 +1,7 @@
 """The base class of traffic sources: states at the instants that sensors ask for."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from fractions import Fraction
@@ -50,7 +50,7 @@ from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Context, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
-from dsa_des.block.wake import ReplicaRuns, Wake
+from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 
@@ -203,23 +203,25 @@ class TrafficSource(Component):
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Do what can be done at once for blocks with these parameters, which will be made."""
 
-    def together(self, replicas: ReplicaRuns) -> "TrafficSource | None":
-        """Return what flies the flights of all replicas."""
+    def together(
+        self, parameters: Sequence[Any], make: Callable[[int], Component]
+    ) -> "TrafficSource | None":
+        """Return what flies the flights of all runs."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
         asked = self._offered is not None and self._offered.asked
         if asked or self.built(ATTITUDE):
             return None
-        flights = flights_of_runs(self, replicas)
+        flights = flights_of_runs(self, parameters, make)
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
         if flights is None or (allows and flights.roster is not self.roster):
             return None
         # A flight into the ground is said of its own replica, by itself.
-        for number in range(len(replicas)):
+        for number in range(len(parameters)):
             self._check_terrain(partial(_one_of, flights.own, number))
         found = copy(self)
-        found._fly(flights, [p.update_rate_hz for p in replicas.parameters])
+        found._fly(flights, [p.update_rate_hz for p in parameters])
         return found
 
     @property

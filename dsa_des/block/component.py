@@ -1,6 +1,6 @@
 """What a block is: its inputs and outputs, what it is told, and the class it derives from."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -22,7 +22,7 @@ from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Stream, Streams
 
 if TYPE_CHECKING:
-    from dsa_des.block.wake import ReplicaRuns, Runner, Wake
+    from dsa_des.block.wake import Wake
 
 
 Mode = Literal["sampled", "queued", "trigger"]
@@ -342,12 +342,16 @@ class Component:
             effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
         )
 
-    def together(self, replicas: "ReplicaRuns") -> "Runner | None":
-        """Return what runs this block for all replicas in lock step, or None: one instance each.
+    def together(
+        self, parameters: Sequence[Any], make: Callable[[int], "Component"]
+    ) -> "Component | None":
+        """Return what runs this block for all runs in lock step, or None: one instance each.
 
         Asked of a block that cannot be shared as it is, once it is set up. What it returns gets the
-        rows of all replicas, which may go side by side, and gives what each instance would. It must
+        rows of all runs, which may go side by side, and gives what each instance would. It must
         be sure that each of them would ask and offer its neighbours the same as this one does.
+        `parameters` are the block's in each run; `make` gives the block as the run of a number has
+        it, not set up.
         """
         return None
 

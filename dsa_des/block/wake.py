@@ -1,9 +1,9 @@
 """One wake of a block: the instants it runs at and its inputs there."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -124,29 +124,3 @@ class Wake:
     def arrivals(self, port: str) -> list[Arrivals]:
         """Return the new rows of each wire into `port`, sorted by source name."""
         return self._arrived.get(port, [])
-
-
-@dataclass(frozen=True)
-class ReplicaRuns:
-    """The replicas of one block.
-
-    Parameters
-    ----------
-    parameters : sequence
-        The block's parameters in each replica.
-    make : callable
-        Given a replica's number, returns the block as that replica has it, not set up.
-    """
-
-    parameters: Sequence[Any]
-    make: Callable[[int], Any]
-
-    def __len__(self) -> int:
-        return len(self.parameters)
-
-
-class Runner(Protocol):
-    """What handles the wakes of a block in place of the block itself."""
-
-    def run(self, wake: Wake) -> Any:
-        """Handle rows of many replicas, as `Component.run` does those of one."""

@@ -13,7 +13,6 @@ from typing import Any
 
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
-from dsa_des.block.wake import ReplicaRuns, Runner
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
@@ -89,7 +88,7 @@ class Replicas(Timeline):
         #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
-        self.together: dict[str, Runner] = {}
+        self.together: dict[str, Component] = {}
         _check_alike(self._scenes)
         self.seeds = _seeds_of(self._scenes)
         self.streams = Streams(self.seeds)
@@ -133,12 +132,12 @@ class Replicas(Timeline):
                 names.update(n for n in fields if getattr(other, n) != getattr(first, n))
         return names
 
-    def _together(self, name: str, face: Component) -> Runner | None:
+    def _together(self, name: str, face: Component) -> Component | None:
         """Return what runs a block for all replicas though they differ, if it offers that."""
         if self.scene.duration_s is None and face.natural_duration_s() is not None:
             return None
         try:
-            return face.together(ReplicaRuns(self._parameters_of(name), partial(self._made, name)))
+            return face.together(self._parameters_of(name), partial(self._made, name))
         except BaseException as error:
             if must_pass(error):
                 raise

@@ -84,7 +84,6 @@ class Node:
     processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
-    cpu_s: float = 0.0
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
     #: Whether it may run ahead of the window (`Window.ahead`).

@@ -158,7 +158,7 @@ def explain(
             message = message.replace(
                 "a valid number, unable to parse string as a number", "a number"
             )
-            message = message.replace("a valid boolean, unable to interpret input", "true or false")
+            message = re.sub("a valid boolean(, unable.*)?", "true or false", message)
             message = re.sub(r"a valid dictionary.*", "a table", message)
             message = re.sub("a valid (list|tuple)", "a list", message)
             if item["type"] == "literal_error":

@@ -185,9 +185,22 @@ def test_the_tracker_follows_and_two_runs_are_the_same(scene):
         ("ether", "velocity_age_s = 9", "velocity_age_s = 9: must be less than or equal to 5"),
         ("ether", 'reception = "certian"', "did you mean 'certain'?"),
         ("kea", "ads_b = { nacpp = 3 }", "nacp"),
+        ("kea", "mode_s = 1", "mode_s = 1: must be true or false"),
+        ("kea", 'mode_c = "yes"', "mode_c = 'yes': must be true or false"),
     ],
 )
 def test_bad_equipage_and_reach_are_refused(scene, where, wrong, said):
     with pytest.raises(dsa_des.SceneError) as caught:
         scene(**{where: wrong})
     assert said in str(caught.value)
+
+
+ADDRESS = 'mode_s = true\nicao_address = "4840D6"'
+
+
+@pytest.mark.parametrize("other", ['ads_b = {}\nicao_address = "4840d6"', ADDRESS])
+def test_two_aircraft_with_one_address_are_refused(scene, other):
+    with pytest.raises(dsa_des.SceneError) as caught:
+        Simulation(scene(kea=ADDRESS, moa=other))
+    assert "6' is that of 'kea' and of 'moa': each aircraft has one" in str(caught.value)
+    assert Simulation(scene(kea=ADDRESS, moa='mode_c = true\nicao_address = "4840D6"'))

@@ -1,9 +1,4 @@
-"""The page in a real browser: what is on screen is what was recorded.
-
-Left out by name where Playwright's Python package or a Chromium is missing.
-"""
-
-import shutil
+"""The page in a real browser: what is on screen is what was recorded."""
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -14,11 +9,6 @@ import dsa_des
 from components.examples import folder
 from components.view.command import view
 from tests.view.test_page import SCENE, luminance
-
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None:
-    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
 
 FADE_S = 4.0
 
@@ -31,14 +21,6 @@ def recorded(tmp_path_factory):
     done = CliRunner().invoke(view, [str(out)], catch_exceptions=False)
     assert done.exit_code == 0
     return out
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield launched
-        launched.close()
 
 
 @pytest.fixture

@@ -1,11 +1,7 @@
-"""What stands where on the page, in a real browser: names, zoom, and pages beside each other.
-
-Left out by name where Playwright's Python package or a Chromium is missing.
-"""
+"""What stands where on the page, in a real browser: names, zoom, and pages beside each other."""
 
 import itertools
 import math
-import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -20,22 +16,9 @@ from tests.results.test_study_report import call
 from tests.results.test_study_report import folder as studied
 from tests.view.test_page import SCENE
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None:
-    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
-
 study = studied
 NEAR = SCENE.format(title="t", name="near")
 INTRUDER = NEAR[NEAR.index("[[blocks.traffic.intruders]]") :]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield launched
-        launched.close()
 
 
 def opened_page(browser, path, width=1280, height=800, hash=""):
@@ -285,6 +268,33 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     right.evaluate("App.seek(3)")
     left.locator("#link").click()
     assert page.url.endswith("#t=3&up=heading")
+    assert wrong == []
+    page.close()
+
+
+_ALTITUDE_WORDS = """([far_m]) => {
+  const said = [], text = Canvas.text, state = Data.truths;
+  const east = Data.ownship(1).east;
+  Data.truths = () => [{ east: east + far_m, north: Data.ownship(1).north, alt: 900 }];
+  Canvas.text = (c, words, x, y, colour, align = "left", ...rest) => {
+    Canvas.font(c);
+    const wide = c.measureText(words).width;
+    const left = x - (align === "right" ? wide : align === "center" ? wide / 2 : 0);
+    said.push([words, left, left + wide]);
+    text(c, words, x, y, colour, align, ...rest);
+  };
+  Altitude.draw(1, { truth: true, sensors: new Set(), fade: 1, bands: false });
+  [Canvas.text, Data.truths] = [text, state];
+  return [document.getElementById("altitude").clientWidth, said];
+}"""
+
+
+def test_no_distance_on_the_altitudes_is_cut_off(browser, tmp_path):
+    page, wrong = opened_page(browser, shown(recorded(tmp_path, NEAR)))
+    for far_m in range(9000, 20000, 250):
+        width, said = page.evaluate(_ALTITUDE_WORDS, [far_m])
+        assert any("km" in words for words, *_ in said)
+        assert all(left >= 0 and right <= width for _, left, right in said), (far_m, width, said)
     assert wrong == []
     page.close()
 
