@@ -175,7 +175,7 @@ class SessionControl:
     def sentence(self) -> str:
         """Return what was decided, for the terminal."""
         taken = sum(answer["type"] == "taken" for answer in self._answers.values())
-        return f"{taken} decisions taken in, up to {self._now[0]:.1f} s"
+        return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 
     def _told(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
         """Return what pages are told of a decision that was taken in: of its time, s, the alert's

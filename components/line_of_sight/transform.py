@@ -19,11 +19,11 @@ from components.sensor.ladder_values import (
     over_roster,
     wrapped_apart_mrad,
 )
+from dsa_des.arrays.column_values import seen_once
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
 from dsa_des.block.message import Message
-from dsa_des.block.recorded_columns import seen_once
 from dsa_des.block.wake import Wake
 
 _MRAD_PER_DEG = 1e3 * np.pi / 180.0

@@ -25,6 +25,7 @@ from components.messages.columns import (
 from components.messages.looks import look_columns
 from components.messages.reach import Reach
 from components.messages.targets import RelativeTargets
+from dsa_des.arrays.column_values import picked
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
 from dsa_des.block.message import (
@@ -38,7 +39,6 @@ from dsa_des.block.message import (
     per_row,
     static,
 )
-from dsa_des.block.recorded_columns import picked
 from dsa_des.time.clock import ClockSpec
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.

@@ -11,9 +11,9 @@ from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
 from components.messages.columns import POSE, TOLD
 from components.messages.fused import FusedDetections
+from dsa_des.arrays.entries import row_of_entries
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.recorded_columns import row_of_entries
 from dsa_des.block.wake import Wake
 
 _MEASURED = ("azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s")

@@ -12,110 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dsa_des.arrays.column_values import Columns, Instants, Text, picked
 from dsa_des.arrays.run_ticks import says_no_runs
-from dsa_des.arrays.types import AnyArray, IntArray
-
-
-@dataclass(frozen=True, eq=False)
-class Text:
-    """A text column kept as codes into a tuple of names (code -1 is null).
-
-    Parameters
-    ----------
-    codes : ndarray of int
-    names : tuple of str
-    """
-
-    codes: AnyArray
-    names: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.codes)
-
-
-@dataclass(frozen=True, eq=False)
-class Instants:
-    """A column of instants: ticks, which are recorded as seconds since the start of the run.
-
-    Parameters
-    ----------
-    ticks : ndarray of int64
-    ticks_per_s : int
-        As the message knows it (its field of that name, 10⁹ without one); a recorder knows it
-        itself. A single value is given in seconds.
-    """
-
-    ticks: IntArray
-    ticks_per_s: int = 10**9
-
-    def __len__(self) -> int:
-        return len(self.ticks)
-
-    def __getitem__(self, rows: Any) -> Any:
-        if isinstance(rows, int):
-            return self.ticks[rows] / self.ticks_per_s
-        return Instants(self.ticks[rows], self.ticks_per_s)
-
-
-#: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
-#: In float64, NaN means null.
-#: Beside arrays and text, `Instants` on the way to a recorder, which makes seconds of them.
-Columns = dict[str, AnyArray | Text]
-Schema = dict[str, str]
-
-
-def nothing_in(rows: int) -> AnyArray:
-    """Return a float64 column that is null in all rows: one NaN, seen `rows` times."""
-    column: AnyArray = np.ndarray((rows,), np.float64, buffer=_NAN, strides=(0,))
-    return column
-
-
-def is_empty(values: Any) -> bool:
-    """Return whether a column is known to be null in all rows, without a look at them."""
-    return isinstance(values, np.ndarray) and values.base is _NAN
-
-
-def same_bits(some: AnyArray, others: AnyArray) -> bool:
-    """Return whether two columns are the same, NaN and the sign of 0 too; differing ends tell."""
-    if some.dtype != others.dtype or len(some) != len(others):
-        return False
-    bits = f"u{some.itemsize}"
-    some, others = some.view(bits), others.view(bits)
-    if some[0] != others[0] or some[-1] != others[-1]:
-        return False
-    return not (some.strides[0] or others.strides[0]) or bool((some == others).all())
-
-
-def constant(value: Any, rows: int, kind: Any) -> AnyArray:
-    """Return a column that holds the same in all rows: one value, seen `rows` times."""
-    return np.broadcast_to(np.array(value, dtype=kind), rows)
-
-
-def of_one_value(values: AnyArray) -> bool:
-    """Return whether a column is known to hold the same in all rows, without a look at them."""
-    return not values.strides[0]
-
-
-def seen_once(values: AnyArray) -> AnyArray:
-    """Return a column that holds the same in all of many rows as `constant`; others as they are."""
-    if len(values) < _MANY:
-        return values
-    once = constant(values[0], len(values), values.dtype)
-    return once if same_bits(values, once) else values
-
-
-def picked(values: AnyArray, rows: IntArray) -> AnyArray:
-    """Return some rows of a column; of one that is constant, without a look at them."""
-    if len(values) and of_one_value(values):
-        return constant(values[0], len(rows), values.dtype)
-    return values.take(rows)
-
-
-# Of fewer rows, to look whether they are the same costs more than they do.
-_MANY = 64
-
-_NAN = np.full((), np.nan)
-_NAN.flags.writeable = False
+from dsa_des.arrays.types import IntArray
 
 # How a field of a message depends on its rows.
 PER_ROW = "row"  # first axis is the rows
@@ -279,14 +178,6 @@ def instants_of(message: Any, row: IntArray | None = None) -> Columns:
     if row is None:
         return columns
     return {name: picked(values, row) for name, values in columns.items()}  # type: ignore[arg-type]
-
-
-def row_of_entries(offsets: IntArray) -> IntArray:
-    """Return the row of each entry; where none has two, much faster than repeating them."""
-    counts = offsets[1:] - offsets[:-1]
-    if counts.max(initial=0) > 1:
-        return np.repeat(np.arange(len(counts)), counts)
-    return (counts > 0).nonzero()[0]
 
 
 class DerivedColumns:

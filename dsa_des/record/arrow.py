@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dsa_des.arrays.column_values import Columns, Schema, Text, is_empty, nothing_in
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
-from dsa_des.block.recorded_columns import Columns, Schema, Text, is_empty, nothing_in
 from dsa_des.record.notes import Notes
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.

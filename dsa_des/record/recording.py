@@ -5,11 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
-from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.message import Message, rows_of
-from dsa_des.block.recorded_columns import (
-    LEADING,
+from dsa_des.arrays.column_values import (
     Columns,
     Instants,
     Schema,
@@ -20,6 +16,10 @@ from dsa_des.block.recorded_columns import (
     of_one_value,
     same_bits,
 )
+from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.types import AnyArray, IntArray
+from dsa_des.block.message import Message, rows_of
+from dsa_des.block.recorded_columns import LEADING
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
 from dsa_des.time.runs import Runs

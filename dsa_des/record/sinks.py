@@ -5,8 +5,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from dsa_des.arrays.column_values import Columns, Schema, Text, same_bits
 from dsa_des.arrays.types import AnyArray
-from dsa_des.block.recorded_columns import Columns, Schema, Text, same_bits
 
 
 def attempt(

@@ -176,7 +176,7 @@ def swap_type(
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
-        return [Problem(source, "--swap", f"the scene has no block{hint}", name)], []
+        return [Problem(source, "--swap", f"the scene has no such block{hint}", name)], []
     try:
         cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped

@@ -171,7 +171,7 @@ class _Reader:
             what = f"there is no file {name}" if chain else "there is no such file"
             message = what + _similar_file(path, shipped=bool(chain))
         elif is_folder(path):
-            message = f"{name} is a folder; a TOML file is needed"
+            message = f"{f'{name} ' if chain else ''}is a folder; a TOML file is needed"
         else:
             message = f"{name} {tables}"
         if at or chain:

@@ -13,9 +13,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
-from dsa_des.block.recorded_columns import Text
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dsa_des.block.recorded_columns import Text
+from dsa_des.arrays.column_values import Text
 from dsa_des.record.sinks import ColumnSink, MemorySink
 
 SCHEMA = {

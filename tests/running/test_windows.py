@@ -181,6 +181,10 @@ def test_a_pacer_waits_for_what_is_final_only():
     assert np.array(ran) / simulation.ticks_per_s == pytest.approx([0.2, 0.2, 0.4, 0.4])
     assert waits == pytest.approx([0.1, 0.1])  # 0.1 s of wall time at twice its speed
     assert pacer.windows == 2
+    pacer.max_lag_s, pacer.total_lag_s = 205.3, 0.02
+    assert pacer.sentence().endswith(
+        "behind by at most 205.3 s, 10.0 ms on average, over 2 windows"
+    )
 
 
 def test_a_pacer_that_was_stopped_ends_the_run():

@@ -272,6 +272,33 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     page.close()
 
 
+_ALTITUDE_WORDS = """([far_m]) => {
+  const said = [], text = Canvas.text, state = Data.truths;
+  const east = Data.ownship(1).east;
+  Data.truths = () => [{ east: east + far_m, north: Data.ownship(1).north, alt: 900 }];
+  Canvas.text = (c, words, x, y, colour, align = "left", ...rest) => {
+    Canvas.font(c);
+    const wide = c.measureText(words).width;
+    const left = x - (align === "right" ? wide : align === "center" ? wide / 2 : 0);
+    said.push([words, left, left + wide]);
+    text(c, words, x, y, colour, align, ...rest);
+  };
+  Altitude.draw(1, { truth: true, sensors: new Set(), fade: 1, bands: false });
+  [Canvas.text, Data.truths] = [text, state];
+  return [document.getElementById("altitude").clientWidth, said];
+}"""
+
+
+def test_no_distance_on_the_altitudes_is_cut_off(browser, tmp_path):
+    page, wrong = opened_page(browser, shown(recorded(tmp_path, NEAR)))
+    for far_m in range(9000, 20000, 250):
+        width, said = page.evaluate(_ALTITUDE_WORDS, [far_m])
+        assert any("km" in words for words, *_ in said)
+        assert all(left >= 0 and right <= width for _, left, right in said), (far_m, width, said)
+    assert wrong == []
+    page.close()
+
+
 def test_three_runs_are_the_most(tmp_path):
     done = CliRunner().invoke(view, [str(tmp_path)] * 4)
     assert done.exit_code == 2 and "4 runs: at most 3 stand beside each other" in done.output

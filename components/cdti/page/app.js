@@ -112,7 +112,8 @@ const App = (() => {
     if (frame) {
       Panel.put(get("time"), `${frame.t.toFixed(1)} s`);
       const late = frame.lag > 0.1;
-      Panel.put(get("lag"), `lag ${(1000 * frame.lag).toFixed(0)} ms`);
+      const told = frame.lag < 10 ? `${(1000 * frame.lag).toFixed(0)} ms` : `${frame.lag.toFixed(0)} s`;
+      Panel.put(get("lag"), `lag ${told}`);
       get("lag").className = late ? "late" : "";
     }
     Panel.status(words());

@@ -35,8 +35,12 @@ const Altitude = (() => {
     c.moveTo(left, 0); c.lineTo(left, height - bottom);
     c.stroke();
     const step = Symbols.niceStep(far / 4);
+    Canvas.font(c);
     for (let m = step; m < far; m += step) {
-      Canvas.text(c, `${+(m / 1000).toFixed(2)} km`, x(m), height - 4, Symbols.colours.faint, "center");
+      const words = `${+(m / 1000).toFixed(2)} km`;
+      const last = x(m) + c.measureText(words).width / 2 > width;  // its middle is too near the edge
+      Canvas.text(c, words, last ? width : x(m), height - 4, Symbols.colours.faint,
+        last ? "right" : "center");
     }
     for (const up of [-apart / 1.2, 0, apart / 1.2]) {
       Canvas.text(c, `${Math.round(own.alt + up)} m`, left - 11, y(own.alt + up) + 4,

@@ -347,13 +347,17 @@ to when flown (the same encounters in every row; bold: the published number is i
 {otherwise}
 
 **Which assumption makes the difference.** How long a pilot takes to turn, and how much of the time
-is spent looking out. 12.5 s for 5 s, and half of the time for all of it, each change the ratio of
-NMAC about as much as all the haze does twice over; both together give what is published. That is
-no proof that it was assumed: the text of the study was not at hand, and its block has no key for
-the first, and looks out all the time unless it is told otherwise. So the scene keeps that block's
-defaults and 5 s, and its rows above stay outside. Not open to us, then: what the published pilots
-do once they see, how long it takes them, their encounters and their well clear. Ours judge range
-and speed exactly, which pilots do not.
+is spent looking out; all the haze is worth 0.08 of NMAC. With either of the two, 12.5 s for 5 s or
+half of the time for all of it, three of the four published numbers are inside, and 0.625 lies above
+ours; with both, those of one pilot are inside, and those of two lie below ours. No pilot of ours
+gives all four: 0.331 is less than 0.625 · 0.625 = 0.391, which two would leave who fail
+independently of each other, where ours leave more than that product. Two manoeuvres at once, which
+ours leave out, may help where neither does alone. None of this chose the scene: the text of the
+study was not at hand, and its block has no key for the first of the two, and looks out all the time
+unless it is told otherwise. So the scene keeps that block's defaults and 5 s, and three rows stay
+outside. Not open to us, then: what the published pilots do once they see and how long it takes
+them, how much they look out, their encounters, and their well clear. Ours judge range and speed
+exactly, which pilots do not.
 """
 
 

@@ -203,11 +203,12 @@ flight or draw, by the counts of altitudes in the model's file, and times 500 ft
 
 {layers}
 
-Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach, more
-than by the counts: pairs that begin near each other are rejected, and slow ones weigh less. Climbs
-do the rest, as ways in through the lid. So rows are outside because of who flies how high, not of
-how volumes are counted: where altitudes are spread wide, as from 3000 ft up, encounters give the
-gas's number or less. Not open: which model and which ownship gave the published numbers.
+Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach: they
+weigh by relative speed, climb until then, and those that begin near each other are rejected, of
+which the counts know nothing. Climbs do the rest, as ways in through the lid. So rows are outside
+because of who flies how high, not of how volumes are counted: where altitudes are spread wide, as
+from 3000 ft up, encounters give the gas's number or less.
+Not open: which model and which ownship gave the published numbers.
 """
 VOLUMES = {
     "nmac": PRESETS["nmac"],
