@@ -34,7 +34,7 @@ _STEPS = 60
 _CLOSE = 1e-15
 
 
-def combined(
+def intersected(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what a second piece of information does to estimates."""

@@ -1,7 +1,9 @@
 """The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,6 @@ _ANGLES = (
 )  # fmt: skip
 _RANGES = ("range_m", "range_variance_m2")
 _RATES = ("range_rate_m_s", "range_rate_variance_m2_s2")
-_VALUES = (*_ANGLES, *_RANGES)
 
 
 class Fusion(Component):
@@ -157,42 +158,21 @@ class Fusion(Component):
         entries : dict of (fused,) of int
             By sensor, which entry of its message belongs to each fused detection; -1 for none.
         """
-        count = len(row)
-        contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
-        angle_source = np.full(count, -1, dtype=np.int64)
-        range_source = np.full(count, -1, dtype=np.int64)
-        names = (*_VALUES, *_RATES) if self.by_range_rate else _VALUES
-        values: dict[str, Any] = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
-        measured_tick = np.zeros(count, dtype=np.int64)
-        pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
-        moves = np.full((3, count), np.nan) if self._with_pose and self.by_range_rate else None
-        told = np.full((len(TOLD), count), np.nan) if self._told else None
-        found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
-        for index in self.by_angles:
-            name = self.sensors[index]
-            if name in found and len(found[name]):
-                contributors[found[name]] |= 1 << index
-                angle_source[found[name]] = index
-                _copy(values, _ANGLES, found[name], arrivals[name], entries[name])
-                chosen, message = entries[name][found[name]], arrivals[name].message
-                measured_tick[found[name]] = message.measured_ticks()[chosen]
-                if pose is not None:
-                    pose[:, found[name]] = poses(message)[:, chosen]
-        for index in self.by_range:
-            name = self.sensors[index]
-            if name in found and len(found[name]):
-                range_source[found[name]] = index
-                _copy(values, _RANGES, found[name], arrivals[name], entries[name])
-                if told is not None:
-                    chosen = entries[name][found[name]]
-                    told[:, found[name]] = told_columns(arrivals[name].message)[:, chosen]
-        for index in self.by_range_rate:
-            name = self.sensors[index]
-            if name in found and len(found[name]):
-                _copy(values, _RATES, found[name], arrivals[name], entries[name])
-                if moves is not None:
-                    chosen = entries[name][found[name]]
-                    moves[:, found[name]] = velocities(arrivals[name].message)[:, chosen]
+        every = _Entries(self.sensors, arrivals, entries)
+        contributors: Any = np.zeros(len(row), dtype=mask_type(len(self.sensors)))
+        for index, (rows, _) in every.found.items():
+            contributors[rows] |= 1 << index
+        angle_source, of_angles = every.best(self.by_angles)
+        range_source, of_range = every.best(self.by_range)
+        values = {name: every.taken(attrgetter(name), of_angles) for name in _ANGLES}
+        values |= {name: every.taken(attrgetter(name), of_range) for name in _RANGES}
+        pose = every.taken(poses, of_angles) if self._with_pose else None
+        told = every.taken(told_columns, of_range) if self._told else None
+        moves = None
+        if self.by_range_rate:
+            _, of_rate = every.best(self.by_range_rate)
+            values |= {name: every.taken(attrgetter(name), of_rate) for name in _RATES}
+            moves = every.taken(velocities, of_rate) if self._with_pose else None
         message = FusedWithPose if self._navigation_errs else FusedDetections
         return message(
             tick=instants.tick,
@@ -204,7 +184,7 @@ class Fusion(Component):
             range_source=range_source,
             roster=next(iter(arrivals.values())).message.roster,
             sensors=self.sensors,
-            measured_tick=measured_tick,
+            measured_tick=every.taken(Detections.measured_ticks, of_angles),
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
@@ -242,28 +222,38 @@ def told_columns(message: Detections) -> FloatArray:
     return np.stack([message.told_by_target[name] for name in TOLD])
 
 
-def _copy(
-    values: dict[str, FloatArray],
-    columns: tuple[str, ...],
-    at: IntArray,
-    new: Arrivals,
-    entry: IntArray,
-) -> None:
-    chosen, message = entry[at], new.message
-    if len(at) == len(entry):
-        for column in columns:
-            values[column] = getattr(message, column)[chosen]
-        return
-    for column in columns:
-        values[column][at] = getattr(message, column)[chosen]
+class _Entries:
+    """The entries of all sensors, one after the other, and which of them fused rows may take."""
 
+    def __init__(
+        self, sensors: Sequence[str], arrivals: dict[str, Arrivals], entries: dict[str, IntArray]
+    ) -> None:
+        self._messages = [new.message for new in arrivals.values()]
+        self._rows = len(next(iter(entries.values())))
+        #: By sensor, the rows to which it gives an entry, and that entry's number among all.
+        self.found: dict[int, tuple[IntArray, IntArray]] = {}
+        start = 0
+        for name, new in arrivals.items():
+            rows = (entries[name] >= 0).nonzero()[0]
+            if len(rows):
+                self.found[sensors.index(name)] = rows, entries[name].take(rows) + start
+            start += len(new.message.target)
 
-def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
-    """Return the entry detected at exactly the same instant."""
-    entry = np.full(len(asked), -1, dtype=np.int64)
-    if len(keys):
-        entry[asked.searchsorted(keys)] = np.arange(len(keys))
-    return entry
+    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray]:
+        """Return the sensor and the entry that each row takes, -1 for none; the last one counts."""
+        sensor, entry = np.full((2, self._rows), -1, dtype=np.int64)
+        for index in ranked:
+            if index in self.found:
+                rows, mine = self.found[index]
+                sensor[rows], entry[rows] = index, mine
+        return sensor, entry
+
+    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray) -> Any:
+        """Return what rows take of a message's entries, (..., rows); NaN or 0 for none."""
+        parts = [of(message) for message in self._messages]
+        none = np.nan if parts[0].dtype.kind == "f" else 0
+        parts.append(np.full((*parts[0].shape[:-1], 1), none, dtype=parts[0].dtype))
+        return np.concatenate(parts, axis=-1).take(entry, axis=-1)
 
 
 def latest_in_gate(

@@ -13,7 +13,6 @@ from components.fusion.fusion_block import (
     Fusion,
     latest_in_gate,
     poses,
-    same_instant,
     velocities,
 )
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
@@ -133,9 +132,7 @@ class PickBest(Fusion):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake, width) for new in arrivals.values()]
-        # A sensor reports in an order that tells nothing of the targets.
-        in_order = [np.sort(key, kind="stable") for key in keys] if len(wake) > 1 else []
-        union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)[0]
+        union, positions = sorted_union(keys)
         row = union // width
         target = union - row * width
         if self.gate_ticks:
@@ -145,26 +142,16 @@ class PickBest(Fusion):
                 for name, new in arrivals.items()
             }
         else:
-            entries = {
-                name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
-            }
+            entries = {name: np.full(len(union), -1, dtype=np.int64) for name in arrivals}
+            for entry, at in zip(entries.values(), positions, strict=True):
+                entry[at] = np.arange(len(at))
         fused = self.combine(wake.instants, row, target, arrivals, entries)
         if all_true:
             return fused
         return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
 
 
-def _union(keys: list[IntArray], width: int) -> IntArray:
-    """Return every target of one row once, ascending."""
-    there = np.zeros(width, dtype=bool)
-    for key in keys:
-        there[key] = True
-    return there.nonzero()[0]
-
-
 def _keys(new: Arrivals, wake: Wake, width: int) -> IntArray:
-    """Return instant · width + target of every detection, ascending."""
-    if len(wake) == 1:
-        return new.message.target
+    """Return instant · width + target of every detection."""
     row = last_of_run(wake.instants, new.instants)  # they are among them
     return row.take(new.message.row_of_entries) * width + new.message.target

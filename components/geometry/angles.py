@@ -90,10 +90,10 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
     """`wrap_pi` for a contiguous array that is known to be finite."""
     result = angle + 0.0
+    if angle.min(initial=0.0) > -np.pi and angle.max(initial=0.0) <= np.pi:
+        return result
     size = np.abs(angle)
     outside = (size > np.pi) | (angle == -np.pi)
-    if np.count_nonzero(outside) == 0:
-        return result
     # Within three half turns the first difference is exact, and the second brings the true 2 pi.
     once = angle - np.copysign(TWO_PI, angle)
     once -= np.copysign(_TWO_PI_REST, angle)
@@ -145,18 +145,22 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned: FloatArray = np.multiply(angle < 0.0, TWO_PI, dtype=np.float64)
+    below = angle < 0.0
+    if not np.count_nonzero(below):
+        return angle + 0.0
+    turned: FloatArray = np.multiply(below, TWO_PI, dtype=np.float64)
     turned += angle
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
-    turned[turned >= TWO_PI] = 0.0
+    if turned.max() >= TWO_PI:
+        turned[turned >= TWO_PI] = 0.0
     return turned
 
 
 def wrap_longitude_deg(lon_deg: FloatArray) -> FloatArray:
     """Wrap degrees into [-180, 180); a value already there keeps its bits."""
-    inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
-    if inside.all():
+    if lon_deg.min(initial=0.0) >= -180.0 and lon_deg.max(initial=0.0) < 180.0:
         return lon_deg
+    inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
     wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
     wrapped = np.where(inside, lon_deg, wrapped)
     return np.where(wrapped >= 180.0, -180.0, np.where(wrapped < -180.0, -180.0, wrapped))
@@ -169,9 +173,9 @@ def wrap_difference_rad(angle: FloatArray) -> FloatArray:
 
 def wrap_heading_rad(angle: FloatArray) -> FloatArray:
     """Wrap radians into [0, 2 pi); a value already there keeps its bits."""
-    inside = (angle >= 0.0) & (angle < TWO_PI)
-    if inside.all():
+    if angle.min(initial=0.0) >= 0.0 and angle.max(initial=0.0) < TWO_PI:
         return angle
+    inside = (angle >= 0.0) & (angle < TWO_PI)
     wrapped = angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI))
     wrapped = np.where(inside, angle, wrapped)
     # A tiny negative angle plus 2 pi rounds to 2 pi; the direction meant is 0.
@@ -194,6 +198,9 @@ _SHORTEST_RUN = 1e-200
 
 # With so many angles it pays to look whether they are all the same.
 _LOOK_FOR_ONE_ANGLE = 64
+
+# A difference of this size has no turns to take off, whatever its rounding error.
+_LESS_THAN_HALF_A_TURN_DEG = 179.0
 
 # Below this size 360·n and longitude - 360·n are exact in doubles; above it fmod does the work.
 _LARGE_LONGITUDE_DEG = 1e12
@@ -251,9 +258,11 @@ def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
         Radians in [-pi, pi], within 4e-16; in 0.6 of the time of arctan2.
     """
     ahead = slope_angle(across, np.abs(along))
-    behind = np.copysign(np.pi, across)
-    behind -= ahead
-    np.copyto(ahead, behind, where=along < 0.0)
+    backward = along < 0.0
+    if np.count_nonzero(backward):
+        behind = np.copysign(np.pi, across)
+        behind -= ahead
+        np.copyto(ahead, behind, where=backward)
     return ahead
 
 
@@ -296,8 +305,12 @@ def longitude_difference_deg(
 def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArray:
     """Give the double nearest to lon2 - lon1 in [-180, 180), for checked arrays of one axis up."""
     total, low = _two_difference(lon1, lon2)
+    largest = max(total.max(initial=0.0), -total.min(initial=0.0))
+    if largest < _LESS_THAN_HALF_A_TURN_DEG:
+        total += low
+        return total
     # The two-sum is exact for any size; only whole turns of an absurd total are not.
-    if total.size and max(total.max(), -total.min()) > _LARGE_LONGITUDE_DEG:
+    if largest > _LARGE_LONGITUDE_DEG:
         total, low = _two_difference(_reduced(lon1), _reduced(lon2))
     return _add_wrapped(total, low)[0]
 

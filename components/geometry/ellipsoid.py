@@ -258,8 +258,8 @@ def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
     cosine = 1.0 - sine
     cosine *= 1.0 + sine
     np.sqrt(cosine, out=cosine)
-    steep = np.abs(sine) > 0.7
-    if np.count_nonzero(steep):
+    if max(sine.max(initial=0.0), -sine.min(initial=0.0)) > 0.7:
+        steep = np.abs(sine) > 0.7
         cosine[steep] = _cos_deg(angle_deg[steep])
     return cosine
 

@@ -370,16 +370,16 @@ class ImageCamera(ElectroOptical):
             del self.patches[next(iter(self.patches))]
 
     def _measured(
-        self, cells: Cells, found: IntArray, look: Look, azimuth_rad: FloatArray,
+        self, cells: Cells, detected: IntArray, look: Look, azimuth_rad: FloatArray,
         elevation_rad: FloatArray, range_m: FloatArray,
     ) -> Any:  # fmt: skip
         """Report the spot's place in the picture, with what errors the scene adds to it."""
-        column, row = (look.extras[name][found] for name in ("column_px", "row_px"))
+        column, row = (look.extras[name][detected] for name in ("column_px", "row_px"))
         seen = self.axes.pointing(*self.pinhole.direction(column, row))
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)
-        return super()._measured(cells, found, look, azimuth_rad, elevation_rad, range_m)
+        return super()._measured(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what the picture says of each cell."""

@@ -200,7 +200,7 @@ _BEHIND = tuple(-point for point in _AHEAD[0]), tuple(-weight for weight in _AHE
 class RangeRates(Protocol):
     """Gives true range rates."""
 
-    def __call__(self, cells: Cells, found: IntArray, /) -> FloatArray:
+    def __call__(self, cells: Cells, detected: IntArray, /) -> FloatArray:
         """Return those of some cells, m/s."""
 
 
@@ -224,14 +224,14 @@ class RangeRate(Effect[RangeRates]):
         return range_rates
 
 
-def range_rates(cells: Cells, found: IntArray) -> FloatArray:
+def range_rates(cells: Cells, detected: IntArray) -> FloatArray:
     """Return the rate of the slant range of some cells, m/s, positive when it opens.
 
     Differences of the range itself over a few hundredths of a second, by the scene's own model of
     the Earth, whatever the two fly. Where one of them changes its velocity at once within that
     time, the rate is between the one before and the one after.
     """
-    (rate,) = _rates_of(cells, found, lambda seen, times: (seen["range_m"],))
+    (rate,) = _rates_of(cells, detected, lambda seen, times: (seen["range_m"],))
     return rate
 
 
@@ -254,21 +254,21 @@ def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatAr
 
 def _rates_of(
     cells: Cells,
-    found: IntArray,
+    detected: IntArray,
     quantities: Callable[[Mapping[str, Any], int], tuple[FloatArray, ...]],
 ) -> list[FloatArray]:
     """Return the rates of quantities of some cells, from differences over a few steps."""
     rates: list[FloatArray] = []
-    missing = np.arange(len(found))
+    missing = np.arange(len(detected))
     for points, weights in (_CENTRAL, _AHEAD, _BEHIND):
         if len(missing) == 0 and rates:
             break
-        each, times = found[missing], len(points)
+        each, times = detected[missing], len(points)
         ahead_s = np.repeat(np.array(points) * STEP_S, len(each))
         seen = cells.seen_at(np.tile(each, times), ahead_s)
         for number, values in enumerate(quantities(seen, times)):
             if number == len(rates):
-                rates.append(np.full(len(found), np.nan))
+                rates.append(np.full(len(detected), np.nan))
             total = np.zeros(len(each))
             for weight, value in zip(weights, values.reshape(times, -1), strict=True):
                 total += weight * value

@@ -240,28 +240,28 @@ class Strength:
         self._block = block
         self._draws = block.stream("measured strength")
 
-    def __call__(self, cells: Cells, found: IntArray, look: Look) -> Look:
-        """Return the look with the measured strength of the cells that are detected (`found`)."""
+    def __call__(self, cells: Cells, detected: IntArray, look: Look) -> Look:
+        """Return the look with the measured strength of its detected cells."""
         if "snr" not in look.signal:  # a radar of one's own that says no strength
             return look
         block = self._block
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
-            keys = cells.roster.keys_of(cells.target[found])
-            draws = self._draws.of_runs(cells.run[found])
-            tail = 1.0 - draws.uniform(keys, cells.scan[found])
+            keys = cells.roster.keys_of(cells.target[detected])
+            draws = self._draws.of_runs(cells.run[detected])
+            tail = 1.0 - draws.uniform(keys, cells.scan[detected])
         else:
-            tail = look.tail[found]
+            tail = look.tail[detected]
         # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
         # noise hears it as signal.
-        mean = look.signal["snr"][found]
+        mean = look.signal["snr"][detected]
         with np.errstate(divide="ignore", invalid="ignore"):
-            floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][found]) / mean, 1.0)
-        floor = floor if block.p.clutter_threshold == "noise" else np.ones(len(found))
-        snr = np.empty(len(found))
-        for crossing, part in block.crossings_of(cells, found):
+            floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][detected]) / mean, 1.0)
+        floor = floor if block.p.clutter_threshold == "noise" else np.ones(len(detected))
+        snr = np.empty(len(detected))
+        for crossing, part in block.crossings_of(cells, detected):
             for model, chosen in block.models_in_use(cells):
-                some = part[_within(found[part], chosen, len(cells))]
+                some = part[_within(detected[part], chosen, len(cells))]
                 output = 1.0 + measured_snr(
                     tail[some],
                     mean[some],
@@ -271,10 +271,10 @@ class Strength:
                 )
                 snr[some] = np.maximum(output * floor[some] - 1.0, 0.0)
         snr_db, confidence = extras["snr_db"].copy(), look.confidence.copy()
-        snr_db[found] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
-        confidence[found] = snr_db[found] - block.false_alarm_zero_db()
+        snr_db[detected] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
+        confidence[detected] = snr_db[detected] - block.false_alarm_zero_db()
         signal: FloatArray = look.signal["snr"].copy()
-        signal[found] = snr
+        signal[detected] = snr
         return replace(
             look, extras={**extras, "snr_db": snr_db}, confidence=confidence, signal={"snr": signal}
         )

@@ -116,9 +116,9 @@ class Radar(SweepingSensor):
         rate = {"range_rate": self.p.range_rate_resolution_m_s}
         return super().steps | (rate if self.p.measures_range_rate else {})
 
-    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
+    def range_rate(self, cells: Cells, detected: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
-        return None if self._rates is None else self._rates(cells, found)
+        return None if self._rates is None else self._rates(cells, detected)
 
     def _in_body(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -112,7 +112,22 @@ class ModelsOfCells(Protocol):
 FLUCTUATION = Hook("RCS", ModelsOfCells, "which Swerling model each cell has")
 MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 
-_UNKNOWN = "the targets are not known before the run"
+
+def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise: str) -> Verdict:
+    """Return the verdict on an effect that targets call for by what one `says` they have."""
+    rosters = known_targets(context)
+    if not rosters:
+        return Verdict(True, "the targets are not known before the run")
+    found = [
+        f"target {name!r} has {said}"
+        for roster in rosters
+        for name, craft in zip(roster.names, roster.aircraft, strict=True)
+        if (said := says(craft))
+    ]
+    if not found:
+        return Verdict(False, otherwise)
+    more = "" if len(found) == 1 else f" (and {len(found) - 1} more like it)"
+    return Verdict(True, found[0] + more)
 
 
 class RcsFluctuation(Effect[ModelsOfCells]):
@@ -126,12 +141,11 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         """Ask the radar's ``swerling``, and where it has none each target's."""
         if block.p.swerling is not None:
             return Verdict(block.p.swerling not in (0, 5), f"swerling is {block.p.swerling}")
-        if not known_targets(block.context):
-            return Verdict(True, _UNKNOWN)
-        found = [(name, craft) for name, craft in _crafts(block.context) if craft.swerling % 5]
-        if not found:
-            return Verdict(False, "every target has swerling 0 or 5")
-        return Verdict(True, f"{_first(found)} swerling {found[0][1].swerling}{_more(found)}")
+        return _by_targets(
+            block.context,
+            lambda craft: f"swerling {craft.swerling}" if craft.swerling % 5 else "",
+            otherwise="every target has swerling 0 or 5",
+        )
 
     def build(self, block: Any) -> ModelsOfCells:
         """Return what tells each cell's fluctuation model."""
@@ -149,12 +163,11 @@ class AspectRcs(Effect[CellValues]):
         """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
         if not block.p.aspect_rcs:
             return Verdict(False, "aspect_rcs is false")
-        if not known_targets(block.context):
-            return Verdict(True, _UNKNOWN)
-        found = [(name, craft) for name, craft in _crafts(block.context) if craft.rcs_table]
-        if not found:
-            return Verdict(False, "no target has an rcs_table")
-        return Verdict(True, f"{_first(found)} an rcs_table{_more(found)}")
+        return _by_targets(
+            block.context,
+            lambda craft: "an rcs_table" if craft.rcs_table else "",
+            otherwise="no target has an rcs_table",
+        )
 
     def build(self, block: Any) -> CellValues:
         """Return each cell's mean RCS; a target without a table has its constant."""
@@ -189,19 +202,6 @@ def constant_rcs_m2(cells: Cells) -> FloatArray:
     """Return each cell's RCS where no target has a table, m²."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
     return rcs
-
-
-def _crafts(context: Context) -> Iterable[tuple[str, Aircraft]]:
-    for roster in known_targets(context):
-        yield from zip(roster.names, roster.aircraft, strict=True)
-
-
-def _first(found: list[tuple[str, Aircraft]]) -> str:
-    return f"target {found[0][0]!r} has"
-
-
-def _more(found: list[tuple[str, Aircraft]]) -> str:
-    return "" if len(found) == 1 else f" (and {len(found) - 1} more like it)"
 
 
 #: Scatterers of an echo whose strengths are fixed, and of one whose strengths change with time.

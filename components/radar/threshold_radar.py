@@ -189,12 +189,12 @@ class LinkBudgetRadar(Radar):
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
         return None
 
-    def crossings_of(self, cells: Cells, found: IntArray) -> list[tuple[Crossing, IntArray]]:
+    def crossings_of(self, cells: Cells, detected: IntArray) -> list[tuple[Crossing, IntArray]]:
         """Return the thresholds that some cells cross, each with which of them."""
         cued = self.cued_crossing()
         if cued is None or cells.cued is None:
-            return [(self.crossing, np.arange(len(found)))]
-        inside = cells.cued[found]
+            return [(self.crossing, np.arange(len(detected)))]
+        inside = cells.cued[detected]
         return [(cued, np.flatnonzero(inside)), (self.crossing, np.flatnonzero(~inside))]
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:

@@ -46,29 +46,29 @@ class Wander:
     def __call__(
         self,
         cells: Cells,
-        found: IntArray,
+        detected: IntArray,
         azimuth_rad: FloatArray,
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> Place:
         """Return where some cells' targets seem to be, in body axes, from where they are."""
-        keys = cells.roster.keys_of(cells.target[found])
-        when, run = cells.instant_ns[found], cells.run[found]
-        extent_m = cells.roster.extents_m[cells.craft[found]]
+        keys = cells.roster.keys_of(cells.target[detected])
+        when, run = cells.instant_ns[detected], cells.run[detected]
+        extent_m = cells.roster.extents_m[cells.craft[detected]]
         length_m, span_m, height_m = (
             self._share * extent_m[:, axis] * self._process(keys, when, axis, run)
             for axis in range(3)
         )
-        heading = cells.azimuth_rad[found] + cells.relative_heading_rad[found]
+        heading = cells.azimuth_rad[detected] + cells.relative_heading_rad[detected]
         north_east_down = body_to_ned(
             length_m,
             span_m,
             height_m,
             heading,
-            cells.target_pitch_rad[found],
-            cells.target_roll_rad[found],
+            cells.target_pitch_rad[detected],
+            cells.target_roll_rad[detected],
         )
-        yaw, pitch, roll = (angle[found] for angle in cells.own_attitude)
+        yaw, pitch, roll = (angle[detected] for angle in cells.own_attitude)
         off = ned_to_body(*north_east_down, yaw, pitch, roll)
         along = unit_vector(azimuth_rad, elevation_rad)
         x, y, z = (range_m * to + by for to, by in zip(along, off, strict=True))

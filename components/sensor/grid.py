@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.geometry import TWO_PI, past, rising_sector, wrap_pi
+from dsa_des.arrays.column_values import nothing_in
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -259,7 +260,7 @@ class SensorGrid:
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:
-            return azimuth, elevation, np.full(len(range_m), np.nan)
+            return azimuth, elevation, nothing_in(len(range_m))
         return azimuth, elevation, self._range_grid.round(range_m)
 
     def round_rate(self, range_rate_m_s: FloatArray) -> FloatArray:

@@ -278,8 +278,8 @@ class Cueing(Protocol):
 class Strengthening(Protocol):
     """Says how strong detections came out."""
 
-    def __call__(self, cells: Cells, found: IntArray, look: Look, /) -> Look:
-        """Return the look with the strength of the cells that are detected (`found`)."""
+    def __call__(self, cells: Cells, detected: IntArray, look: Look, /) -> Look:
+        """Return the look with the strength of its `detected` cells."""
 
 
 class Judging(Protocol):

@@ -103,18 +103,18 @@ class ErrorModel:
         }
 
     def __call__(
-        self, cells: Cells, found: IntArray, look: Look, true: Mapping[str, FloatArray]
+        self, cells: Cells, detected: IntArray, look: Look, true: Mapping[str, FloatArray]
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-        """Return what is measured of some cells (`found`), and its variances by column.
+        """Return what is measured of the `detected` cells, and its variances by column.
 
         `true` is the truth by quantity, in the sensor's axes.
         """
-        signal = {name: all_[found] for name, all_ in look.signal.items()}
+        signal = {name: all_[detected] for name, all_ in look.signal.items()}
         of_signal = self._of_signal(signal)
-        keys = cells.roster.keys_of(cells.target[found])
-        when = cells.scan[found], cells.instant_ns[found], cells.run[found]
+        keys = cells.roster.keys_of(cells.target[detected])
+        when = cells.scan[detected], cells.instant_ns[detected], cells.run[detected]
         if look.noise is not None and self._signal:
-            true = self._in_cells(true, look.noise[found], keys, when[0], when[2])
+            true = self._in_cells(true, look.noise[detected], keys, when[0], when[2])
         values = self._off(true, lambda name, error: error(keys, *when, of_signal.get(name)))
         return self._stated(self._valid(values), of_signal, signal)
 

@@ -60,7 +60,7 @@ class Measuring(Component):
         """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1)."""
         return self.grid.round(azimuth_rad, elevation_rad, range_m)
 
-    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
+    def range_rate(self, cells: Cells, detected: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return None
 
@@ -82,7 +82,7 @@ class Measuring(Component):
     def _measured(
         self,
         cells: Cells,
-        found: IntArray,
+        detected: IntArray,
         look: Look,
         azimuth_rad: FloatArray,
         elevation_rad: FloatArray,
@@ -91,13 +91,13 @@ class Measuring(Component):
         """Return what is measured of lines of sight in body axes, and columns beside."""
         if self.wander is not None:
             line = azimuth_rad, elevation_rad, range_m
-            azimuth_rad, elevation_rad, range_m = self.wander(cells, found, *line)
+            azimuth_rad, elevation_rad, range_m = self.wander(cells, detected, *line)
         azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
         true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
-        if (rate := self.range_rate(cells, found)) is not None:
+        if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
         if self._error_model is not None:
-            return self._in_body(*self._error_model(cells, found, look, true))
+            return self._in_body(*self._error_model(cells, detected, look, true))
         return self._in_body(*self._on_grid(true))
 
     def report_noise(

@@ -289,24 +289,24 @@ class Sensor(Measuring):
             for judge in self._judgements:
                 look = judge(cells, look)
             self._idle, self._idle_run = None if len(cells) or run < 0 else look, run
-        found = look.detected.nonzero()[0]
+        detected = look.detected.nonzero()[0]
         decided = look
         for measures in self._strengths:
-            look = measures(cells, found, look)
+            look = measures(cells, detected, look)
         culled = None if targets.culled is None else targets.culled[rows]
         evaluated, skipped = counted(
             reason, len(targets.roster), culled, targets.hidden is not None
         )
         if len(wake) == 1:
-            offsets = np.array([0, len(found)], dtype=np.int64)
+            offsets = np.array([0, len(detected)], dtype=np.int64)
         else:
-            offsets = offsets_of(cells.row[found], len(wake))
+            offsets = offsets_of(cells.row[detected], len(wake))
         measured: dict[str, Any] = {}
-        p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
-                   cells.range_m[found])  # fmt: skip
+        p, q, r = (cells.body_azimuth_rad[detected], cells.body_elevation_rad[detected],
+                   cells.range_m[detected])  # fmt: skip
         azimuth, elevation, range_m = p, q, r
-        if len(found):
-            azimuth, elevation, range_m, measured = self._measured(cells, found, look, p, q, r)
+        if len(detected):
+            azimuth, elevation, range_m, measured = self._measured(cells, detected, look, p, q, r)
         detections = self._message(
             tick=wake.ticks,
             run=wake.run,
@@ -314,16 +314,16 @@ class Sensor(Measuring):
             evaluated=evaluated,
             skipped=skipped,
             offsets=offsets,
-            target=cells.target[found],
+            target=cells.target[detected],
             azimuth_rad=azimuth,
             elevation_rad=elevation,
             range_m=range_m,
-            confidence=look.confidence[found],
+            confidence=look.confidence[detected],
             true_azimuth_rad=p,
             true_elevation_rad=q,
             true_range_m=r,
             **measured,
-            extras={name: values[found] for name, values in self._extras(cells, look).items()},
+            extras={name: values[detected] for name, values in self._extras(cells, look).items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
             looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,

@@ -293,11 +293,11 @@ class Active(CooperativeSensor):
         step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0) if self._errs else 0.0
         return self._altimeters.reported_ft(who, altitude_m, step, self._errs) * FOOT_M
 
-    def _climb(self, cells: Cells, found: AnyArray, now_m: FloatArray) -> FloatArray:
+    def _climb(self, cells: Cells, detected: AnyArray, now_m: FloatArray) -> FloatArray:
         """Return how fast reported altitudes changed in the last 5 s; NaN where none was then."""
-        then = cells.seen_at(found, np.full(len(found), -CLIMB_OVER_S))
-        before_m = self.reported_altitude_m(cells, found, then["alt_m"])
-        known = then["present"] & (cells.state_ns[found] >= CLIMB_OVER_S * NANOSECONDS)
+        then = cells.seen_at(detected, np.full(len(detected), -CLIMB_OVER_S))
+        before_m = self.reported_altitude_m(cells, detected, then["alt_m"])
+        known = then["present"] & (cells.state_ns[detected] >= CLIMB_OVER_S * NANOSECONDS)
         return np.where(known, (now_m - before_m) / CLIMB_OVER_S, np.nan)
 
     def measured_range_m(self, cells: Cells, which: AnyArray) -> FloatArray:
@@ -317,28 +317,28 @@ class Active(CooperativeSensor):
     def _measured(
         self,
         cells: Cells,
-        found: AnyArray,
+        detected: AnyArray,
         look: Look,
         azimuth_rad: FloatArray,
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Any]]:
         """Return measured lines of sight in body axes, and their variances."""
-        own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
-        distance = self.measured_range_m(cells, found)
+        own = OwnBelief(*(cells.own_belief(name)[detected] for name in OwnBelief.__annotations__))
+        distance = self.measured_range_m(cells, detected)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
-        keys, bearings = cells.roster.keys_of(cells.target[found]), self._bearings
-        drawn = bearings.of_runs(cells.run[found]).normal(keys, cells.scan[found])
+        keys, bearings = cells.roster.keys_of(cells.target[detected]), self._bearings
+        drawn = bearings.of_runs(cells.run[detected]).normal(keys, cells.scan[detected])
         # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
-        turned = own.yaw_rad - cells.own_attitude[0][found]
-        bearing = cells.azimuth_rad[found] + turned + deviation * np.clip(drawn, -CUT, CUT)
-        altitude = look.extras["reported_alt_m"][found]
+        turned = own.yaw_rad - cells.own_attitude[0][detected]
+        bearing = cells.azimuth_rad[detected] + turned + deviation * np.clip(drawn, -CUT, CUT)
+        altitude = look.extras["reported_alt_m"][detected]
         rise = sine_of_elevation(altitude - own.alt_m, distance)
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
         azimuth, elevation, _ = in_body(own, ned)
         variances = variances_in_body(
-            own, ned, self._variances(cells, found, ned, altitude, deviation)
+            own, ned, self._variances(cells, detected, ned, altitude, deviation)
         )
         beside: dict[str, Any] = {
             "azimuth_variance_rad2": variances[0],
@@ -346,20 +346,20 @@ class Active(CooperativeSensor):
             "range_variance_m2": variances[2],
         }
         if self._errs:
-            beside["told_by_target"] = self._told(cells, found, altitude, deviation)
+            beside["told_by_target"] = self._told(cells, detected, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
 
     def _told(
-        self, cells: Cells, found: AnyArray, altitude_m: FloatArray, deviation: FloatArray
+        self, cells: Cells, detected: AnyArray, altitude_m: FloatArray, deviation: FloatArray
     ) -> dict[str, FloatArray]:
         """Return the deviations of all errors, as `TOLD`."""
-        nothing = np.zeros(len(found))
-        mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
+        nothing = np.zeros(len(detected))
+        mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
         feet = altitude_m / FOOT_M
         position_m, attitude_rad = navigation_noise(self.context)
-        now = np.zeros(len(found))
-        own = velocity_of(cells, found, now, cells.seen_at(found, now), "own")
-        return dict.fromkeys(TOLD, np.full(len(found), np.nan)) | {
+        now = np.zeros(len(detected))
+        own = velocity_of(cells, detected, now, cells.seen_at(detected, now), "own")
+        return dict.fromkeys(TOLD, np.full(len(detected), np.nan)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
             "place_deviation": nothing,
             "height_deviation": np.sqrt(altimetry_variance_ft2(feet)) * FOOT_M,
@@ -380,16 +380,16 @@ class Active(CooperativeSensor):
     def _variances(
         self,
         cells: Cells,
-        found: AnyArray,
+        detected: AnyArray,
         ned: FloatArray,
         altitude_m: FloatArray,
         deviation: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return variances of the place across, along and vertical, m²."""
         if not self._errs:
-            least = np.full(len(found), _LEAST_M2)
+            least = np.full(len(detected), _LEAST_M2)
             return least, least, least
-        mode_s = cells.roster.equipage.mode_s[cells.craft[found]]
+        mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
         # The altitude is that of no pose; bearing and range are counted from the ownship's own.
         position_m, attitude_rad = navigation_noise(self.context)
         place_m2 = max(position_m[:2]) ** 2

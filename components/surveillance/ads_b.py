@@ -265,7 +265,7 @@ class AdsB(CooperativeSensor):
     def _report(
         self,
         cells: Cells,
-        found: IntArray,
+        detected: IntArray,
         number: IntArray,
         sent_ns: IntArray,
         who: Who,
@@ -274,19 +274,19 @@ class AdsB(CooperativeSensor):
         extras: dict[str, AnyArray],
     ) -> None:
         """Fill in what was decoded of some cells."""
-        those = who.take(found)
-        sent = self._sent(cells, found, number, sent_ns, those, here_ns, equipage)
+        those = who.take(detected)
+        sent = self._sent(cells, detected, number, sent_ns, those, here_ns, equipage)
         said = self._broadcasts.position(
             equipage, those, sent,
             lambda: self._broadcasts.velocity(equipage, those, sent),
         )  # fmt: skip
         for name, values in zip(PLACE, said, strict=True):
-            extras[f"reported_{name}"][found] = values
-        extras["reported_s"][found] = sent_ns / NANOSECONDS
+            extras[f"reported_{name}"][detected] = values
+        extras["reported_s"][detected] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
-            extras[name][found] = getattr(equipage, name)[those.craft]
+            extras[name][detected] = getattr(equipage, name)[those.craft]
         moving, number, sent_ns = self._last_received(
-            "velocity", cells, found, who, here_ns, equipage
+            "velocity", cells, detected, who, here_ns, equipage
         )
         if not len(moving):
             return
@@ -330,26 +330,26 @@ class AdsB(CooperativeSensor):
         lat, lon, alt = place
         return Sent(lat, lon, alt, velocity, number, instant_ns)
 
-    def _own_velocity(self, cells: Cells, found: IntArray) -> FloatArray:
-        now = np.zeros(len(found))
-        return velocity_of(cells, found, now, cells.seen_at(found, now), "own")
+    def _own_velocity(self, cells: Cells, detected: IntArray) -> FloatArray:
+        now = np.zeros(len(detected))
+        return velocity_of(cells, detected, now, cells.seen_at(detected, now), "own")
 
     def _measured(
         self,
         cells: Cells,
-        found: IntArray,
+        detected: IntArray,
         look: Look,
         azimuth_rad: FloatArray,
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return lines of sight to what is reported, at the scan, and their variances."""
-        said = {name: values[found] for name, values in look.extras.items()}
-        own = OwnBelief(*(cells.own_belief(name)[found] for name in OwnBelief.__annotations__))
+        said = {name: values[detected] for name, values in look.extras.items()}
+        own = OwnBelief(*(cells.own_belief(name)[detected] for name in OwnBelief.__annotations__))
         velocity = np.stack([
             said["reported_north_m_s"], said["reported_east_m_s"], -said["reported_climb_m_s"]
         ])  # fmt: skip
-        age_s = cells.state_ns[found] / NANOSECONDS - said["reported_s"]
+        age_s = cells.state_ns[detected] / NANOSECONDS - said["reported_s"]
         place = [said[f"reported_{name}"] for name in PLACE]
         ned = towards(own, *carried_on(place, np.nan_to_num(velocity) * age_s))
         # Its velocity is in its own axes, which are turned against ours.
@@ -357,12 +357,14 @@ class AdsB(CooperativeSensor):
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = in_body(own, ned)
         stated = StatedByAircraft(
-            cells.roster.equipage, cells.craft[found], said,
+            cells.roster.equipage, cells.craft[detected], said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
         )  # fmt: skip
         variances = variances_in_body(own, ned, stated.place_m2(age_s))
         rate_variance = stated.speed_m2_s2
-        moves = np.stack([look.signal[f"own_{axis}"][found] for axis in ("north", "east", "down")])
+        moves = np.stack(
+            [look.signal[f"own_{axis}"][detected] for axis in ("north", "east", "down")]
+        )
         rate = ((moving - moves) * ned).sum(axis=0) / distance
         beside = {
             "azimuth_variance_rad2": variances[0],
@@ -371,7 +373,7 @@ class AdsB(CooperativeSensor):
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
             "told_by_target": stated.told(
-                moving, cells.state_ns[found] / NANOSECONDS - said["velocity_s"], age_s
+                moving, cells.state_ns[detected] / NANOSECONDS - said["velocity_s"], age_s
             ),
         }
         return azimuth, elevation, distance, beside

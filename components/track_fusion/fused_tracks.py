@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, times
-from components.estimation.covariance_intersection import Rule, combined, inverse
+from components.estimation.covariance_intersection import Rule, intersected, inverse
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind, linearised
 from components.estimation.motion import ConstantVelocity
@@ -73,7 +73,7 @@ def fused_states(
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
                 information = product(weighed, angles.jacobian)
                 pull = times(weighed, angles.residual)
-            shift, found, _ = combined(p[:, :, into], information, pull, rule)
+            shift, found, _ = intersected(p[:, :, into], information, pull, rule)
             x[:, into] += shift
             p[:, :, into] = found
     status = np.full(count, TENTATIVE)

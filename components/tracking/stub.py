@@ -100,7 +100,7 @@ class TrackerStub(Component):
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[column], **now)
         self._held = self._held.after(replica, table, wake.first_run)
-        return self._tracks(fused, wake.instants.take(updated), targets, last, pool, first)
+        return self._tracks(fused, wake.instants.part(updated), targets, last, pool, first)
 
     def _tracks(
         self,
@@ -126,7 +126,7 @@ class TrackerStub(Component):
         message: type[Tracks] = Tracks
         if isinstance(fused, FusedWithPose):
             message, pose = TracksWithPose, {n: pool[n][entry] for n in POSE}
-        return message(
+        tracks = message(
             tick=ticks,
             run=instants.run,
             offsets=offsets_of(row, len(ticks)),
@@ -143,6 +143,8 @@ class TrackerStub(Component):
             updated=entry >= first[row],
             **({"own_of_entries": pose} if pose else {}),
         )
+        tracks.instants = instants
+        return tracks
 
 
 def _pool(

@@ -84,7 +84,10 @@ def same_bits(some: AnyArray, others: AnyArray) -> bool:
 
 def constant(value: Any, rows: int, kind: Any) -> AnyArray:
     """Return a column that holds the same in all rows: one value, seen `rows` times."""
-    return np.broadcast_to(np.array(value, dtype=kind), rows)
+    one = np.array(value, dtype=kind)
+    one.flags.writeable = False
+    column: AnyArray = np.ndarray((rows,), one.dtype, buffer=one, strides=(0,))
+    return column
 
 
 def of_one_value(values: AnyArray) -> bool:

@@ -57,7 +57,7 @@ class RunTicks:
     #: Keys that were asked for, with the bits of a tick in them, and what bounds these.
     _keys: tuple[int, IntArray] | None = field(default=None, init=False, repr=False)
     _extent: tuple[int, int] | None = field(default=None, init=False, repr=False)
-    #: Of a union: its parts, and the positions of each one's instants.
+    #: Parts of them, and the positions of each part's instants.
     _parts: list[tuple["RunTicks", IntArray]] = field(default_factory=list, init=False, repr=False)
 
     def __len__(self) -> int:
@@ -88,6 +88,12 @@ class RunTicks:
             return self
         tick = self.tick[rows]
         return RunTicks(no_runs(len(tick)) if says_no_runs(self.run) else self.run[rows], tick)
+
+    def part(self, rows: IntArray) -> "RunTicks":
+        """Return some of them, ascending, and remember where they are; none stands here twice."""
+        found = self.take(rows)
+        self._parts.append((found, rows))
+        return found
 
     def later(self, ticks: int | IntArray) -> "RunTicks":
         """Return instants of the same runs so much later."""
@@ -185,16 +191,14 @@ def _key(part: RunTicks, bits: int) -> IntArray:
     return part._keys[1]
 
 
-#: The last unions: several blocks ask for that of the same instants.
-_unions: deque[RunTicks] = deque(maxlen=2)
+#: What was put together last, and the unions: several blocks ask for that of the same instants.
+_unions: deque[tuple[set[RunTicks], RunTicks]] = deque(maxlen=2)
 
 
 def union(parts: Sequence[RunTicks]) -> RunTicks:
     """Return every instant once, in order; each part is in order."""
-    for known in _unions:
-        if len(known._parts) == len(parts) and all(
-            _positions(known, one) is not None for one in parts
-        ):
+    for put_together, known in _unions:
+        if put_together == set(parts):  # the same objects
             return known
     if _one_run(parts):
         ticks, positions = sorted_union([part.tick for part in parts])
@@ -214,12 +218,12 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
     for position in positions:
         position.flags.writeable = False  # whoever asks is given it
     instants._parts = list(zip(parts, positions, strict=True))
-    _unions.append(instants)
+    _unions.append((set(parts), instants))
     return instants
 
 
 def _positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
-    """Return where a part's instants are in a union, if it is a part."""
+    """Return where a part's instants are, if it is known to be one."""
     return next((positions for one, positions in instants._parts if one is part), None)
 
 

@@ -109,7 +109,9 @@ class RunClock:
         offsets = self._offsets[runs]
         earliest, latest = int(offsets.min()), int(offsets.max())
         scans, ticks = clock.between(start + clock.offset - latest, end + clock.offset - earliest)
-        within = ticks + (offsets - clock.offset)[:, np.newaxis]
-        wanted = (within >= start) & (within < end)
-        which, scan = np.nonzero(wanted)
-        return scans[scan], RunTicks(runs[which], within[which, scan])
+        later = offsets - clock.offset
+        first, last = np.searchsorted(ticks, [start - later, end - later])
+        counts = last - first
+        place = np.arange(counts.sum()) + np.repeat(first - (counts.cumsum() - counts), counts)
+        tick = ticks.take(place) + np.repeat(later, counts)
+        return scans.take(place), RunTicks(np.repeat(runs, counts), tick)
