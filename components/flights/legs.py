@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from geographiclib.geodesic import Geodesic
+from pydantic import Field, model_validator
 
 from components.flights.attitude import STANDARD_GRAVITY_MPS2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
 from components.flights.leg_motion import FORMULAS, Kind, Segment, turn_parameters
 from components.geometry import enu_to_geodetic, heading_from_deg
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.parameters import Parameters
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:
@@ -22,71 +24,38 @@ def require(condition: bool, name: str, value: object, allowed: str) -> None:
         raise ValueError(f"{name} is {value}: it must {allowed}")
 
 
-@dataclass(frozen=True)
-class Leg:
-    """What all legs have in common.
+class Leg(Parameters):
+    """What all legs but those over waypoints have in common.
 
-    Parameters
-    ----------
-    duration_s : float, optional
-        How long the leg lasts. Only the last leg may leave it out; the last leg is flown for
-        ever in any case.
-    speed_mps : float, optional
-        Ground speed at flight altitude, from this leg on. Left out: as before.
-    climb_mps : float, optional
-        Rate of climb during this leg. Left out: the trajectory's own.
+    The last leg is flown for ever; only it may leave its length out.
     """
 
-    duration_s: float | None = None
-    speed_mps: float | None = None
-    climb_mps: float | None = None
-
-    def __post_init__(self) -> None:
-        kind = type(self).__name__.lower()
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float | int):
-                name = f"{kind} {field.name}"
-                require(math.isfinite(value), name, value, "be finite")
-                if field.name in ("duration_s", "angle_deg"):
-                    require(value > 0.0, name, value, "be positive")
-                if field.name == "speed_mps":
-                    require(value >= 0.0, name, value, "be 0 or more")
+    duration_s: float | None = Field(
+        default=None, gt=0, description="Length of the leg, s; the last one is held for ever."
+    )
 
 
-@dataclass(frozen=True)
 class Straight(Leg):
-    """Fly straight: along the geodesic of the ellipsoid, at constant ground speed.
+    """Fly straight: along the geodesic of the ellipsoid, at constant ground speed at altitude."""
 
-    Parameters
-    ----------
-    heading_deg : float, optional
-        Heading at the start of the leg, clockwise from true north. Left out: straight on.
-    """
-
-    heading_deg: float | None = None
+    kind: Literal["straight"] = "straight"
+    heading_deg: float | None = Field(default=None, description="New heading, deg from north.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
+    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
 
 
-@dataclass(frozen=True)
 class Turn(Leg):
-    """Turn at a constant rate.
+    """Turn at a constant rate; positive is to the right."""
 
-    Parameters
-    ----------
-    rate_deg_s : float, optional
-        Rate of turn, positive to the right.
-    radius_m : float, optional
-        Instead of the rate: radius, positive to the right.
-    angle_deg : float, optional
-        Instead of the duration: how far to turn, positive whichever way.
-    """
+    kind: Literal["turn"] = "turn"
+    rate_deg_s: float | None = Field(default=None, description="Rate of turn, deg/s.")
+    radius_m: float | None = Field(default=None, description="Radius instead of a rate, m.")
+    angle_deg: float | None = Field(default=None, gt=0, description="Angle to turn through, deg.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
+    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
 
-    rate_deg_s: float | None = None
-    radius_m: float | None = None
-    angle_deg: float | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    @model_validator(mode="after")
+    def _one_of_each(self) -> Self:
         if (self.rate_deg_s is None) == (self.radius_m is None):
             raise ValueError(
                 f"turn rate_deg_s is {self.rate_deg_s} and radius_m is {self.radius_m}: "
@@ -99,101 +68,72 @@ class Turn(Leg):
             )
         require(self.rate_deg_s != 0.0, "turn rate_deg_s", self.rate_deg_s, "not be 0")
         require(self.radius_m != 0.0, "turn radius_m", self.radius_m, "not be 0")
+        return self
 
 
-@dataclass(frozen=True)
 class Climb(Leg):
-    """Fly straight on with a rate of climb, for a time or up (or down) to an altitude.
+    """Climb or descend straight ahead, for a time or to an altitude, and level off there."""
 
-    Parameters
-    ----------
-    to_alt_m : float, optional
-        Instead of the duration: the altitude to reach. If this is the last leg the aircraft
-        levels off there.
-    """
+    kind: Literal["climb"] = "climb"
+    climb_mps: float = Field(description="Rate of climb, m/s.")
+    to_alt_m: float | None = Field(default=None, description="Altitude to level off at, m.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
 
-    to_alt_m: float | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self.climb_mps is not None, "climb climb_mps", self.climb_mps, "be given")
+    @model_validator(mode="after")
+    def _one_end(self) -> Self:
         if self.duration_s is not None and self.to_alt_m is not None:
             raise ValueError(
                 f"climb duration_s is {self.duration_s} and to_alt_m is {self.to_alt_m}: "
                 "give one of the two"
             )
+        return self
 
 
-@dataclass(frozen=True)
 class Stationary(Leg):
-    """Stay where we are, keeping the heading; the next leg flies on at the speed before it."""
+    """Stay in place, keeping the heading; the next leg flies on at the speed before it."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(not self.speed_mps, "stationary speed_mps", self.speed_mps, "be 0 or left out")
+    kind: Literal["stationary"] = "stationary"
 
 
-@dataclass(frozen=True)
-class Waypoint:
-    """A place to fly over: latitude, longitude, altitude, or offsets from the reference point.
+class Waypoint(Parameters):
+    """A place to fly over: degrees and metres, or an offset from the ownship's start.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m : float, optional
-        Geodetic position. Altitude left out: the one before.
-    east_m, north_m, up_m : float, optional
-        Instead: offsets in the reference point's tangent frame. Up left out: the altitude before.
-    speed_mps : float, optional
-        Ground speed on the way *to* this waypoint, and from then on.
+    An altitude that is left out is the one before.
     """
 
-    lat_deg: float | None = None
-    lon_deg: float | None = None
-    alt_m: float | None = None
-    east_m: float | None = None
-    north_m: float | None = None
-    up_m: float | None = None
-    speed_mps: float | None = None
+    lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float | None = Field(default=None, description="Longitude, deg.")
+    alt_m: float | None = Field(default=None, description="Altitude, m.")
+    east_m: float | None = Field(default=None, description="Offset to the east, m.")
+    north_m: float | None = Field(default=None, description="Offset to the north, m.")
+    up_m: float | None = Field(default=None, description="Offset upward, m.")
+    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed to it, m/s.")
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if value is not None:
-                require(math.isfinite(value), f"waypoint {field.name}", value, "be finite")
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
         geodetic = self.lat_deg is not None and self.lon_deg is not None
         offset = self.east_m is not None and self.north_m is not None
         offsets = (self.east_m, self.north_m, self.up_m)
         mixed = offsets if geodetic else (self.lat_deg, self.lon_deg, self.alt_m)
         if geodetic == offset or any(value is not None for value in mixed):
             raise ValueError(
-                f"waypoint is {self}: it must have lat_deg and lon_deg, or east_m and north_m"
+                f"waypoint is ({self}): it must have lat_deg and lon_deg, or east_m and north_m"
             )
-        if self.lat_deg is not None:
-            require(abs(self.lat_deg) <= 90.0, "waypoint lat_deg", self.lat_deg, "lie in [-90, 90]")
+        return self
 
 
-@dataclass(frozen=True)
-class Waypoints:
+class Waypoints(Parameters):
     """Fly over waypoints one after the other, climbing evenly, straight between them.
 
     After the last one the aircraft keeps its heading and speed and flies level.
-
-    Parameters
-    ----------
-    points : tuple of Waypoint
-        At least one.
-    speed_mps : float, optional
-        Ground speed from this leg on, unless a waypoint says otherwise.
     """
 
-    points: tuple[Waypoint, ...]
-    speed_mps: float | None = None
-
-    def __post_init__(self) -> None:
-        require(len(self.points) > 0, "waypoints points", self.points, "hold at least one")
+    kind: Literal["waypoints"] = "waypoints"
+    points: list[Waypoint] = Field(min_length=1, description="Waypoints in order.")
+    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed, m/s.")
 
 
-AnyLeg = Straight | Turn | Climb | Stationary | Waypoints
+AnyLeg = Annotated[Straight | Turn | Climb | Stationary | Waypoints, Field(discriminator="kind")]
 
 
 Position = tuple[float, float, float]
@@ -227,8 +167,7 @@ class LegBuilder:
                         "duration_s is None: it must be given, only the last leg may go on for ever"
                     )
             except ValueError as error:
-                kind = type(leg).__name__.lower()
-                raise ValueError(f"{self.name}: legs[{number}] ({kind}): {error}") from error
+                raise ValueError(f"{self.name}: legs[{number}] ({leg.kind}): {error}") from error
         if not legs:
             self._straight(self.climb, None)
         elif isinstance(legs[-1], Waypoints) or getattr(legs[-1], "to_alt_m", None) is not None:
@@ -237,16 +176,15 @@ class LegBuilder:
 
     def _fly(self, leg: AnyLeg) -> float | None:
         """Add a leg's segments; returns how long they last, None for ever."""
-        if leg.speed_mps is not None and not isinstance(leg, Stationary):
+        if isinstance(leg, Stationary):
+            return self._hold(0.0, 0.0, leg.duration_s)
+        if leg.speed_mps is not None:
             self.speed = leg.speed_mps
         if isinstance(leg, Waypoints):
             for point in leg.points:
                 self._to_waypoint(point)
             return 0.0
         climb = self.climb if leg.climb_mps is None else leg.climb_mps
-        if isinstance(leg, Stationary):
-            climb = 0.0 if leg.climb_mps is None else leg.climb_mps
-            return self._hold(climb, 0.0, leg.duration_s)
         if isinstance(leg, Turn):
             return self._turn(leg, climb)
         if isinstance(leg, Climb):
@@ -308,8 +246,8 @@ class LegBuilder:
             if abs(rise) < 1e-3:
                 return
             raise ValueError(
-                f"waypoint {point} lies straight above or below the place before it: use a "
-                "stationary leg with climb_mps"
+                f"waypoint ({point}) lies straight above or below the place before it: use a "
+                "climb leg with a speed_mps of 0"
             )
         self.heading = heading_from_deg(line["azi1"])
         level = geodesic_parameters(*self.position, self.heading, self.speed, 0.0)

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -132,12 +132,22 @@ class SteeringPlan(NamedTuple):
             lasts_s = min(part[0][0] for part in parts if part)
             climb_mps = _mean(plan.climbs, lasts_s, plan.climb_mps)
             speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
-            if plan.turns and (rate_deg_s := plan.turns[0][1]):
-                legs.append(Turn(lasts_s, speed_mps, climb_mps, rate_deg_s=rate_deg_s))
-            else:
-                legs.append(Straight(lasts_s, speed_mps, climb_mps))
+            rate_deg_s = plan.turns[0][1] if plan.turns else 0.0
+            legs.append(_leg(lasts_s, speed_mps, climb_mps, rate_deg_s))
             plan = plan.after(lasts_s)
-        return [*legs, Straight(speed_mps=plan.speed_mps, climb_mps=plan.climb_mps)]
+        return [*legs, _leg(None, plan.speed_mps, plan.climb_mps)]
+
+
+def _leg(
+    lasts_s: float | None, speed_mps: float, climb_mps: float, rate_deg_s: float = 0.0
+) -> AnyLeg:
+    """Return a leg; what a plan holds is sound and not checked again."""
+    flown: dict[str, Any] = {
+        "duration_s": lasts_s, "speed_mps": speed_mps, "climb_mps": climb_mps,
+    }  # fmt: skip
+    if rate_deg_s:
+        return Turn.model_construct(**flown, rate_deg_s=rate_deg_s)
+    return Straight.model_construct(**flown)
 
 
 def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:

@@ -3,15 +3,15 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
-from components.flights import legs
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
+from components.flights.legs import AnyLeg
 from components.flights.many_flights import Starts
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import enu_to_geodetic
@@ -21,72 +21,6 @@ from components.traffic.wind_effect import CrabAngles
 from components.traffic.wires import OverheadWire
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
-
-
-class _Leg(Parameters):
-    duration_s: float | None = Field(
-        default=None, gt=0, description="Length of the leg, s; the last one is held for ever."
-    )
-
-
-class StraightLeg(_Leg):
-    """Fly straight."""
-
-    kind: Literal["straight"]
-    heading_deg: float | None = Field(default=None, description="New heading, deg from north.")
-    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
-    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
-
-
-class TurnLeg(_Leg):
-    """Turn at a constant rate; positive is to the right."""
-
-    kind: Literal["turn"]
-    rate_deg_s: float | None = Field(default=None, description="Rate of turn, deg/s.")
-    radius_m: float | None = Field(default=None, description="Radius instead of a rate, m.")
-    angle_deg: float | None = Field(default=None, gt=0, description="Angle to turn through, deg.")
-    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
-    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
-
-
-class ClimbLeg(_Leg):
-    """Climb or descend straight ahead."""
-
-    kind: Literal["climb"]
-    climb_mps: float = Field(description="Rate of climb, m/s.")
-    to_alt_m: float | None = Field(default=None, description="Altitude to level off at, m.")
-    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
-
-
-class StationaryLeg(_Leg):
-    """Stay in place."""
-
-    kind: Literal["stationary"]
-
-
-class Point(Parameters):
-    """A waypoint: degrees and metres, or an offset from the ownship's start."""
-
-    lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
-    lon_deg: float | None = Field(default=None, description="Longitude, deg.")
-    alt_m: float | None = Field(default=None, description="Altitude, m.")
-    east_m: float | None = Field(default=None, description="Offset to the east, m.")
-    north_m: float | None = Field(default=None, description="Offset to the north, m.")
-    up_m: float | None = Field(default=None, description="Offset upward, m.")
-    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed to it, m/s.")
-
-
-class WaypointsLeg(Parameters):
-    """Fly over waypoints."""
-
-    kind: Literal["waypoints"]
-    points: list[Point] = Field(min_length=1, description="Waypoints in order.")
-    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed, m/s.")
-
-
-AnyLeg = Annotated[
-    StraightLeg | TurnLeg | ClimbLeg | StationaryLeg | WaypointsLeg, Field(discriminator="kind")
-]
 
 
 class Flight(Parameters):
@@ -237,16 +171,8 @@ def flight_arguments(
         "yaw_deg": flight.yaw_deg,
         "pitch_deg": flight.pitch_deg,
         "roll_deg": flight.roll_deg,
-        "legs": [_leg(leg) for leg in flight.legs],
+        "legs": flight.legs,
     }
-
-
-def _leg(leg: Any) -> Any:
-    values = leg.model_dump(exclude={"kind", "points"})
-    if leg.kind == "waypoints":
-        points = tuple(legs.Waypoint(**point.model_dump()) for point in leg.points)
-        return legs.Waypoints(points, **values)
-    return getattr(legs, leg.kind.capitalize())(**values)
 
 
 def _intruders(

@@ -87,6 +87,10 @@ def _bounds(info: FieldInfo) -> str:
 
 
 def _default(info: FieldInfo) -> str:
+    # What tells tables of a list apart has to be given.
+    tag = typing.get_origin(info.annotation) is typing.Literal
+    if tag and len(typing.get_args(info.annotation)) == 1:
+        return "required"
     if info.default is PydanticUndefined:
         return "required" if info.is_required() else "-"
     value = info.default

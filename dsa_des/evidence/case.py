@@ -108,6 +108,9 @@ class BesideStudy(Parameters):
     study: ScenePath
     about: _Text
     replicas: int | None = Field(default=None, ge=1)
+    of_system: bool = Field(
+        default=False, description="It is of the system too: changes of its scene are made here."
+    )
 
 
 class SampleSource(Parameters):
@@ -216,7 +219,9 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
         if one.name in {*studies, SENSITIVITY}:
             raise SceneError([file.problem(("beside", place, "name"), "is given twice", one.name)])
         many = one.replicas or replicas
-        studies[one.name] = read_study(one.study, sets=[f"replicas={many}"] if many else [])
+        changed = [f"replicas={many}"] if many else []
+        changed += _set_of_system(tables) if one.of_system else []
+        studies[one.name] = read_study(one.study, sets=changed)
     varied: tuple[tuple[SensitivityKey, Any, str], ...] = ()
     if tables.sensitivity:
         varied, studies[SENSITIVITY] = _sensitivity(file, tables, studies[ASSESSED])
@@ -228,10 +233,13 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     return case
 
 
+def _set_of_system(tables: CaseTables) -> list[str]:
+    return [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
+
+
 def _assessed(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
     sets = [f"replicas={replicas}"] if replicas else []
-    sets += [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
-    study = read_study(tables.study, sets=sets)
+    study = read_study(tables.study, sets=[*sets, *_set_of_system(tables)])
     if len(study.cells) != 1:
         message = f"has {len(study.cells)} cells; a case is one: a study without axes"
         raise SceneError([file.problem(("study",), message, str(file.data["study"]))])
@@ -264,14 +272,13 @@ def _sensitivity(
         for key, value in stated.items()
     }
     axis = {"values": [AS_STATED, *(label for _, _, label in varied)], "set": columns}
-    sets = [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
     keys = {
         "axes": {CHANGED: axis},
         "compare": {"axis": CHANGED, "baseline": AS_STATED},
         "replicas": min(tables.sensitivity_replicas, assessed.replicas),
         "figures": [], "requirements": [],
     }  # fmt: skip
-    return varied, read_study(tables.study, sets=sets, keys=keys)
+    return varied, read_study(tables.study, sets=_set_of_system(tables), keys=keys)
 
 
 def written(value: Any) -> str:

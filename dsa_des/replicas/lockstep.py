@@ -16,7 +16,7 @@ from dsa_des.block.foreign_calls import must_pass
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
-from dsa_des.running.effects import plan, unspent
+from dsa_des.running.effects import build_effects
 from dsa_des.running.grain import Grain
 from dsa_des.running.loops import opened_loops
 from dsa_des.running.simulation import Simulation
@@ -162,11 +162,8 @@ class Replicas(Timeline):
     def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
         def make(number: int) -> Component:
             scene, component = self._scenes[number], self._made(name, number)
-            context = component.context
             self._check_same_length(face, component)
-            planned = plan(component, scene.tolerance)
-            context.tolerance = unspent(planned, scene.tolerance)
-            context.effects = {i.effect.name: i.effect.build(component) for i in planned if i.built}
+            build_effects(component, scene.tolerance)
             component.setup()
             self._check_same_word(face, component)
             return component

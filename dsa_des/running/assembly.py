@@ -1,6 +1,6 @@
 """The blocks of a scene, built and set up: with their neighbours known and their effects built."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
@@ -9,14 +9,11 @@ from dsa_des.block.component import Component, Consumer, Context, Producer
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
-from dsa_des.running.effects import Planned, plan, unspent
+from dsa_des.running.effects import Planned, WrapEffect, build_effects
 from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK
-
-#: Given each planned effect and what was built of it, returns what is used instead.
-WrapEffect = Callable[[Planned, Any], Any]
 
 # What a block raises, before anything runs, because of what its table says: nothing it can be
 # made of, or nothing that can be computed or held in memory.
@@ -116,19 +113,10 @@ class Assembly:
         tolerance = self._scene.tolerance
         for name, component in self.components.items():
             component.context.duration_s = self.duration_s
-            known = len(problems)
             with self._preparing(name, problems):
-                mine = plan(component, tolerance, everything=self._everything)
-                built = {i: i.effect.build(component) for i in mine if i.built}
-            if len(problems) > known:
-                continue
-            planned += mine
-            if not self._everything:
-                component.context.tolerance = unspent(mine, tolerance)
-            component.context.effects = {
-                item.effect.name: effect if wrap is None else wrap(item, effect)
-                for item, effect in built.items()
-            }
+                planned += build_effects(
+                    component, tolerance, everything=self._everything, wrap=wrap
+                )
         _raise_any(problems)
         return planned
 

@@ -4,7 +4,7 @@ Latencies, delays, loss, jitter, drift and shared processors are effects of the 
 listed as those of blocks are.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,10 @@ class Planned:
         return f"{self.effect.name}: {'' if self.built else 'not '}simulated, {self.because}"
 
 
+#: Given each planned effect and what was built of it, returns what is used instead.
+WrapEffect = Callable[[Planned, Any], Any]
+
+
 def plan(
     block: Component, tolerance: Mapping[str, float], *, everything: bool = False
 ) -> list[Planned]:
@@ -71,6 +75,25 @@ def plan(
         elif everything and not built and effect.neutral:
             built, because = True, f"though {verdict.because}: everything is simulated"
         planned.append(Planned(block.name, effect, verdict, built, because))
+    return planned
+
+
+def build_effects(
+    block: Component,
+    tolerance: Mapping[str, float],
+    *,
+    everything: bool = False,
+    wrap: WrapEffect | None = None,
+) -> list[Planned]:
+    """Decide which of a block's effects are built, as `plan`, and give them to its context."""
+    planned = plan(block, tolerance, everything=everything)
+    built = {item: item.effect.build(block) for item in planned if item.built}
+    if not everything:
+        block.context.tolerance = unspent(planned, tolerance)
+    block.context.effects = {
+        item.effect.name: effect if wrap is None else wrap(item, effect)
+        for item, effect in built.items()
+    }
     return planned
 
 

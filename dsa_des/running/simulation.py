@@ -21,8 +21,8 @@ from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
-from dsa_des.running.assembly import Assembly, WrapEffect
-from dsa_des.running.effects import Planned, timing_plan
+from dsa_des.running.assembly import Assembly
+from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.node import Abort
 from dsa_des.running.nodes import (

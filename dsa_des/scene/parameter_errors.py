@@ -266,8 +266,8 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
         )
         if found:
             value = value[part]
-        elif position < len(loc) - 1 or not isinstance(value, Mapping):
-            continue
+        elif position < len(loc) - 1 or not isinstance(value, Mapping) or part in value.values():
+            continue  # a tag is a value of the table that it tells apart
         path.append(part)
     return tuple(path)
 

@@ -257,26 +257,38 @@ def test_the_files_that_a_newcomer_opens_are_there_and_as_few_as_the_page_says()
         assert int(count) == 1 + len(opened[what]) <= MOST_FILES.get(what, 6), what
 
 
-def test_a_stub_of_one_s_own_records_its_column_too(configs: Path, tmp_path: Path) -> None:
-    (tmp_path / "aged.py").write_text(
+@pytest.mark.parametrize(
+    ("block", "table", "message", "base"),
+    [
+        ("tracker", "tracks", "components.messages:Tracks", "components.tracking.stub:TrackerStub"),
+        (
+            "fusion", "fused", "components.messages:FusedDetections",
+            "components.fusion.pick_best:PickBest",
+        ),
+    ],
+)  # fmt: skip
+def test_a_subclass_of_ours_records_a_column_of_its_own(
+    configs: Path, tmp_path: Path, block: str, table: str, message: str, base: str
+) -> None:
+    imports = (f"from {where.replace(':', ' import ')} as {name}"
+               for where, name in ((message, "Sent"), (base, "Ours")))  # fmt: skip
+    (tmp_path / f"own_{table}.py").write_text(
+        "\n".join(imports) + "\n"
         "from dataclasses import dataclass\n"
         "import numpy as np\n"
-        "from components.messages import Tracks\n"
-        "from components.tracking.stub import TrackerStub\n"
         "from dsa_des.block.component import Output\n"
         "from dsa_des.block.message import column\n"
         "@dataclass(eq=False)\n"
-        "class Aged(Tracks):\n"
-        "    half_s: np.ndarray = column('s', '', 'half the age', default=None, kw_only=True)\n"
-        "class AgedStub(TrackerStub):\n"
-        "    outputs = {'tracks': Output(Aged, 'Held lines of sight.')}\n"
+        "class Own(Sent):\n"
+        "    half_m: np.ndarray = column('m', '', 'half the range', default=None, kw_only=True)\n"
+        "class Block(Ours):\n"
+        f"    outputs = {{'{table}': Output(Own, 'With half the range.')}}\n"
         "    def run(self, wake):\n"
-        "        tracks = super().run(wake)\n"
-        "        return tracks and Aged(**vars(tracks), half_s=0.5 * tracks.age_s)\n",
+        "        sent = super().run(wake)\n"
+        "        return None if sent is None else Own(**vars(sent), half_m=0.5 * sent.range_m)\n",
         encoding="utf-8",
     )
-    tracks = recorded(
-        configs / "first_light.toml", sets=["duration_s=5"], swaps=["tracker=aged:AgedStub"]
-    )["tracks"]
-    assert len(tracks["age_s"]) > 0
-    np.testing.assert_array_equal(tracks["half_s"], 0.5 * tracks["age_s"])
+    swap = [f"{block}=own_{table}:Block"]
+    rows = recorded(configs / "first_light.toml", sets=["duration_s=5"], swaps=swap)[table]
+    assert np.isfinite(rows["range_m"]).any()
+    np.testing.assert_array_equal(rows["half_m"], 0.5 * rows["range_m"])

@@ -12,6 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from dsa_des.block.shipped_files import folders
+from dsa_des.evidence.case import read_case
+from dsa_des.scene.examples import chosen_file
 from tests.evidence.small_case import Made, made
 
 #: Keys that name an item of a list.
@@ -175,6 +177,23 @@ def test_a_changed_parameter_leaves_what_stands_beside_the_system(case, pack, tm
                      "verdict", "command", "sample"}  # fmt: skip
     assert changed(one["parameters"], two["parameters"]) == {
         "/avoidance.turn_deg/value", "/avoidance.turn_deg/written_in"}  # fmt: skip
+
+
+def test_what_is_of_the_system_changes_with_it(case):
+    def turns(*sets):
+        studies = read_case(case, sets).studies
+        return [studies[name].scene(0).resolved()["blocks"]["avoidance"]["turn_deg"]
+                for name in ("assessed", "slow")]  # fmt: skip
+
+    change = "set.blocks.avoidance.turn_deg=20"
+    assert turns(change)[0] == 20 != turns(change)[1]
+    assert turns(change, "beside[0].of_system=true") == [20, 20]
+    # The shipped case: its tracks are the system's own, the pilot aboard has no radar.
+    shipped = chosen_file("noncooperative", "case")
+    found = read_case(shipped, ["set.blocks.radar.range_km=3"]).studies
+    ranges = {name: study.scene(0).resolved()["blocks"].get("radar", {}).get("range_km")
+              for name, study in found.items()}  # fmt: skip
+    assert ranges.pop("pilot-aboard") is None and set(ranges.values()) == {3}
 
 
 def test_a_rule_of_the_limit_allows_a_share_of_the_limit(case, pack, tmp_path):

@@ -44,7 +44,8 @@ def found(own, targets, fleet, samples, end_s):
     return [(t, r) if np.isfinite(r) else None for t, r in pairs]
 
 
-angles = st.floats(-180, 180)
+# As in scenes, no number is smaller than 1e-30 and not 0.
+angles = st.floats(-180, 180).map(lambda angle: round(angle, 20))
 legs = st.one_of(
     st.builds(Straight, duration_s=st.floats(1, 200), heading_deg=st.none() | angles),
     st.builds(

@@ -34,7 +34,7 @@ def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
                 (Straight(duration_s=40), Turn(rate_deg_s=draw.uniform(1, 5))),
                 (
                     Waypoints(
-                        (
+                        points=(
                             Waypoint(
                                 east_m=0, north_m=draw.uniform(0, 9e3), up_m=500, speed_mps=90
                             ),

@@ -92,7 +92,7 @@ def test_turns_in_a_row_lead_where_one_turn_leads():
     """A hundred pieces of a turn, each begun on the heading on which the one before ended."""
 
     def flown(pieces):
-        legs = [Turn(10.0 / pieces, rate_deg_s=2.0) for _ in range(pieces)]
+        legs = [Turn(duration_s=10.0 / pieces, rate_deg_s=2.0) for _ in range(pieces)]
         return ScriptedTrajectory(
             "own", lat_deg=-42.0, lon_deg=0.0, alt_m=189.0, heading_deg=10.0, speed_mps=50.0,
             legs=[*legs, Straight()],

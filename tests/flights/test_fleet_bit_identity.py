@@ -21,7 +21,7 @@ def scripted(count):
                 heading_deg=rng.uniform(0, 360),
                 speed_mps=0.0 if k % 7 == 3 else rng.uniform(10, 300),
                 climb_mps=rng.uniform(-2, 2) if k % 3 == 0 else 0.0,
-                legs=[Straight(40.0), Turn(rate_deg_s=2)] if k % 5 == 4 else (),
+                legs=[Straight(duration_s=40.0), Turn(rate_deg_s=2)] if k % 5 == 4 else (),
                 roll_deg=3.0 if k % 4 == 1 else None,
                 yaw_deg=10.0 if k % 6 == 5 else None,
                 start_time_s=5.0 * (k % 3),
@@ -88,7 +88,7 @@ def assert_each_same(fleet, low, high):
 def test_each_scripted_aircraft_at_a_time_of_its_own():
     several = ScriptedTrajectory(
         "many", lat_deg=1, lon_deg=2, alt_m=3, speed_mps=50,
-        legs=[leg for k in range(9) for leg in (Straight(3.0), Turn(rate_deg_s=3, duration_s=4))],
+        legs=[Straight(duration_s=3.0), Turn(rate_deg_s=3, duration_s=4)] * 9,
     )  # fmt: skip
     assert_each_same(ScriptedFleet([*scripted(40), several]), -5, 95)
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from covering import covers
+from scipy.optimize import brentq
 from scipy.special import ndtr
 from wired import chain, rows, run, sensor
 
@@ -83,6 +84,20 @@ def test_haze_takes_by_the_wavelength(wavelength_um, exponent):
     haze = 3.912 / 4000.0 * (wavelength_um / 0.55) ** -exponent
     keys = {"wavelength_um": wavelength_um, "weather": {"visibility_km": 4.0}}
     assert looked(**keys) == pytest.approx(by_hand(extinction_per_m=haze), rel=1e-4)
+
+
+def test_rain_takes_its_own_and_haze_what_is_left_of_the_visibility():
+    """Rain by itself says how much it takes, whatever the wavelength; Kim's exponent is haze's."""
+    alone = looked(weather={"rain_rate_mm_h": 1.0})
+    rain = brentq(lambda per_m: by_hand(extinction_per_m=per_m) - alone, 0.0, 5e-3)
+    assert rain > 1e-4
+    total = 3.912 / 5000.0
+    left = total - rain
+    visible_km = 3.912 / left / 1000.0
+    haze = left * (1.55 / 0.55) ** -(1.3 if visible_km > 6.0 else 0.16 * visible_km + 0.34)
+    both = looked(weather={"rain_rate_mm_h": 1.0, "visibility_km": 5.0})
+    assert both == pytest.approx(by_hand(extinction_per_m=rain + haze), rel=1e-3)
+    assert both < 0.98 * min(alone, by_hand(extinction_per_m=haze))
 
 
 @covers("pulse_ns", "errors", "beam_sweep", of=("laser.scanning",))

@@ -99,7 +99,7 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path, closed):
     scenes = lock.replicas_of(replace(scene, wires=late), *phases)
     simulation = lock.same_as_alone(scenes, window=11)
     assert not simulation.timeline.split
-    assert (simulation.time.runs == range(3)) == closed
+    assert (simulation.runs.going == range(3)) == closed
     _, tables = lock.tables_of(lock_step, scenes)
     fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
     assert len({*fused["replica"].to_pylist()}) == 3

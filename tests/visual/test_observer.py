@@ -285,6 +285,45 @@ def test_who_is_seen_stays_seen_and_darkness_hides_all():
     assert not rows(run(scene({"beta_per_sr_s": 1e9}, weather={"night": True})))
 
 
+def test_who_comes_over_the_limb_between_scans_counts_from_there_on():
+    """130 km away and climbing from the sea, it comes into view about 5 s after the start."""
+    low = -(130_000.0**2) / 2 / 6.37e6 - 900.0
+    far = met(range_m=130_000.0, up_m=low, climb_mps=9.0)
+    pilot = {"smallest_arcmin": 0.0, "beta_per_sr_s": 1e9}
+    fine, coarse = (
+        opportunity(run(scene({**pilot, "scan_rate_hz": rate}, [far], duration_s=9.1,
+                              terrain={"horizon": True})))
+        for rate in (50, 1)
+    )  # fmt: skip
+    whole, begun = coarse[1] - coarse[0], coarse[0]
+    assert 3 <= len(coarse) <= 7 and 0.1 * whole < begun < 0.9 * whole
+    np.testing.assert_allclose(coarse, fine[-5 - 50 * np.arange(len(coarse))[::-1]], rtol=1e-3)
+
+
+def test_a_search_faster_than_scans_is_no_more_than_certain():
+    pilot = {"search": "round", "round_s": 1.0, "scan_rate_hz": 0.5, "smallest_arcmin": 0.0,
+             "right_looking": 1.0}  # fmt: skip
+    looks = rows(run(scene(pilot, duration_s=7)), "looks")
+    assert [row["detection_probability"] for row in looks[1:]] == [1.0] * (len(looks) - 1)
+
+
+def test_confidence_is_the_size_over_the_smallest_that_is_seen():
+    for row in rows(run(scene({"beta_per_sr_s": 1e9, "smallest_arcmin": 4.0}))):
+        size = math.sqrt(AREA_M2 * 4.0 / math.pi) / row["true_range_m"]
+        assert row["confidence"] == pytest.approx(size / math.radians(4.0 / 60.0) - 1.0, rel=1e-3)
+
+
+def test_who_shows_two_sides_is_looked_for_as_far_as_both_show():
+    """Seen from in front and aside at once, it is larger than its largest side."""
+    body = {"front_m2": 12.0, "side_m2": 12.0, "horizontal_m2": 12.0}
+    slanting = met(heading_deg=37.0 + 45.0, eo=body)
+    pilot = {"beta_per_sr_s": 1e12, "smallest_arcmin": 4.0}
+    first = rows(run(scene(pilot, [slanting], duration_s=40)))[0]
+    size = (1.0 + first["confidence"]) * math.radians(4.0 / 60.0) * first["true_range_m"]
+    assert math.pi / 4.0 * size**2 > 1.2 * 12.0
+    assert 0.0 <= first["confidence"] < 0.06
+
+
 def test_wrong_seats_are_refused_in_one_line():
     for pilot, words in (
         ({"right_looking": 1.0, "azimuth_deg": [10, 90]}, r"azimuth_deg is \[10, 90\]: .* ahead"),

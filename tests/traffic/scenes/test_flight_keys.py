@@ -10,6 +10,8 @@ import pytest
 from covering import covers
 from wired import chain, rows, run, sensor
 
+import dsa_des
+
 START = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400.0}
 REFERENCE = START["lat_deg"], START["lon_deg"], START["alt_m"]
 RADAR = sensor("radar.range_boundary", scan_rate_hz=2, range_km=100.0)
@@ -224,3 +226,25 @@ def test_attitudes_follow_from_the_path_unless_given(traffic):
         level = crooked.direction(row["ned_azimuth_rad"], row["ned_elevation_rad"])
         turned = crooked.rotation(217.0 + 12.0 * row["time_s"], pitch, bank)
         np.testing.assert_allclose(turned @ level, body, atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("leg", "place", "said"),
+    [
+        ({"kind": "turn"}, "", "rate_deg_s is None and radius_m is None: give one of the two"),
+        ({"kind": "turn", "rate_deg_s": 0}, "", "rate_deg_s is 0.0: it must not be 0"),
+        ({"kind": "climb", "climb_mps": 3, "duration_s": 3, "to_alt_m": 9}, "", "give one of the"),
+        ({"kind": "waypoints", "points": [{"lat_deg": 3}]}, ".points[0]", "must have lat_deg and"),
+        ({"kind": "waypoints", "points": []}, ".points", "at least 1"),
+        ({"kind": "straight", "duration_s": -3}, ".duration_s", "must be greater than 0"),
+        ({"rate_deg_s": 3}, ".kind", "missing"),
+    ],
+)
+def test_a_leg_that_cannot_be_flown_is_named_with_its_place(leg, place, said):
+    straight = {"kind": "straight", "duration_s": 3}
+    scene = chain({"radar": RADAR}, ownship={**START, "legs": [straight, leg]}, targets=[])
+    with pytest.raises(dsa_des.SceneError) as caught:
+        dsa_des.load_scene(scene)
+    (problem,) = caught.value.problems
+    assert problem.key == f"blocks.traffic.ownship.legs[1]{place}"
+    assert said in problem.message
