@@ -75,8 +75,8 @@ def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
     effects = [shown(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
-        f"{cost.cpu_us_per_target_scan:.3g} ± {cost.cpu_spread_us:.1g}",
-        *(_NO_ERROR if math.isnan(error) else f"{error:.3g}" for error in errors),
+        f"{_plain(cost.cpu_us_per_target_scan)} ± {_plain(cost.cpu_spread_us, 1)}",
+        *(_NO_ERROR if math.isnan(error) else _plain(error) for error in errors),
         *effects,
         "; ".join(_remarks(cost) + comparison.remarks(cost.effect)),
     ]
@@ -99,7 +99,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     headings = ["us/target-scan", comparison.difference.name, *(c.heading for c in telling)]
     rows = [
         [
-            f"{row['cpu_us_per_target_scan']:.3g}",
+            _plain(row["cpu_us_per_target_scan"]),
             f"{row['error_p95']:.2%}",
             *(shown(change, row["effect"], _NO_ERROR) for change in telling),
             row["rung"],
@@ -110,6 +110,12 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     last = len(headings)
     title = "whole chain, the front"
     print_table(console, title, [*headings, "rungs"], rows, below=last, right=range(last))
+
+
+def _plain(value: float, digits: int = 3) -> str:
+    """Return a number rounded to so many digits; a large one without a power of ten."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if float(text) >= 10**digits else text
 
 
 def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:

@@ -1,4 +1,4 @@
-"""The figure of `dsa-des cost`: every rung's name can be read."""
+"""The figure and the table of `dsa-des cost`: every rung's name and cost can be read."""
 
 from itertools import combinations
 
@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.costs.climb import RungCost
-from dsa_des.costs.output import _put_labels, draw_costs
+from dsa_des.costs.climb import Comparison, RungCost
+from dsa_des.costs.output import _cells, _put_labels, draw_costs
 from dsa_des.costs.replay import Spread
 from dsa_des.record.drawing import kept_figures
 
@@ -57,3 +57,12 @@ def test_the_title_is_whole_and_off_the_panels(panels, tmp_path):
     assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
     for axes in figure.axes:
         assert not box.overlaps(axes.title.get_window_extent(renderer))
+
+
+def test_large_numbers_of_the_table_have_no_power_of_ten():
+    cost = _costs("tracker")[0]
+    cost.cpu_us_per_target_scan, cost.cpu_spread_us = 1236.4, 12.3
+    cost.errors = {"detection_probability": Spread(2e-12, 999.7, 3e4, 9)}
+    assert _cells(cost, Comparison([]))[1:5] == ["1,240 ± 10", "2e-12", "1,000", "30,000"]
+    cost.cpu_us_per_target_scan, cost.cpu_spread_us = 0.8644, 0.074
+    assert _cells(cost, Comparison([]))[1] == "0.864 ± 0.07"
