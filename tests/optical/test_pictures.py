@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from covering import covers
 
+import components.optical.image as image
+from components.optical.flow import find_spot
 from components.optical.picture import Pinhole, coverage, target_outlines, union_coverage
 from components.optical.silhouette import union_area
 from dsa_des.errors import SceneError
@@ -183,6 +185,29 @@ def test_smear_and_fine_clutter_hide_a_target_and_flow_grows_with_time(configs):
     flow = median("flow_column_px")
     assert flow > 1.0
     assert median("flow_column_px", frame_interval_s=0.08) == pytest.approx(2.0 * flow, rel=0.1)
+
+
+def test_a_target_hides_what_is_behind_it(configs, monkeypatch):
+    """A large target before a strong texture: in its middle there is itself and noise."""
+    middles, sides = [], []
+
+    def kept(picture, *rest):
+        spot = find_spot(picture, *rest)
+        if spot.pixels > 60:
+            row, column = int(spot.y), int(spot.x)
+            middles.append(picture[row - 1 : row + 2, column - 1 : column + 2].mean())
+            sides.append(picture[:2].std())
+        return spot
+
+    monkeypatch.setattr(image, "find_spot", kept)
+    near = (
+        'blocks.traffic.intruders=[{ name = "near", north_m = -240, east_m = -180, up_m = 20, '
+        "heading_deg = 130, speed_mps = 40, eo = { front_m2 = 9, side_m2 = 30, "
+        "horizontal_m2 = 21 } }]"
+    )
+    detections(configs, "blocks.eo.texture_contrast=0.3", "duration_s=2", TURNING, near)
+    assert len(middles) > 5 and np.mean(sides) > 0.15
+    assert np.std(middles) < 0.03 and np.mean(middles) == pytest.approx(1.0, abs=0.03)
 
 
 def test_it_is_the_same_in_any_window_and_beside_other_replicas(configs):

@@ -195,6 +195,14 @@ def test_who_is_asked_in_turn_is_asked_at_a_scan_of_his_own(scene):
     assert min(asked) >= 1 and max(asked) <= 15
 
 
+def test_bearings_are_off_the_nose_whatever_the_heading_is_believed_to_be(scene):
+    asker = 'measurement = "exact"\nreplies = "certain"\nfar_every = 1'
+    sets = ["navigation.attitude_bias_deg=[3, 0, 0]"]
+    seen = recorded(scene("mode_s = true", asker, roll=0, sets=sets, duration_s="6"))
+    off = column(seen, "azimuth_rad") - column(seen, "true_azimuth_rad")
+    assert len(off) > 3 and np.abs(off).max() < 1e-3
+
+
 def test_pure_functions():
     assert 1.0 - (1.0 - answered_in_round(np.array([0.95]))[0]) ** 10 == pytest.approx(0.95)
     assert np.degrees(bearing_deviation_rad(np.radians([9.9, -10.1]))) == pytest.approx([9.0, 15.0])
