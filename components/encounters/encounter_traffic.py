@@ -36,7 +36,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.block.ladder import Verified
 
-#: An encounter: its set, and its place there.
+#: An encounter: its set, and its index there.
 Encounter = tuple[EncounterSet, int]
 #: Time (s), north, east and altitude (m) of aircraft that are known at the same times.
 _Paths = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -47,12 +47,14 @@ _FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = Ordered
 MOST_FLOWN = 600
 
 
-def encounter_flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:
-    """Return the flights of an encounter, by its place in the set, the ownship's first."""
-    key = _key(found, place, dynamics)
+def encounter_flights(
+    encounter_set: EncounterSet, index: int, dynamics: str
+) -> list[SampledTrajectory]:
+    """Return the flights of an encounter, by its index in the set, the ownship's first."""
+    key = _key(encounter_set, index, dynamics)
     if key not in _FLOWN:
-        (flights,) = flights_of([(found, place)], dynamics)
-        _keep(key, found, flights)
+        (flights,) = flights_of([(encounter_set, index)], dynamics)
+        _keep(key, encounter_set, flights)
     return _FLOWN[key][1]
 
 
@@ -65,21 +67,23 @@ def prepare_flights(wanted: Iterable[Encounter], dynamics: str) -> None:
         flights = flights_of(encounters, dynamics)
     except ValueError:  # of one of them, which says so when it is asked for
         return
-    for key, (found, _), one in zip(new, encounters, flights, strict=False):
-        _keep(key, found, one)
+    for key, (encounter_set, _), one in zip(new, encounters, flights, strict=False):
+        _keep(key, encounter_set, one)
 
 
 def flights_of(encounters: Sequence[Encounter], dynamics: str) -> list[list[SampledTrajectory]]:
     """Return the flights of each encounter, to the bit as if it were asked for alone."""
     aircraft = [
-        (found, row)
-        for found, place in encounters
-        for row in range(found.first_rows[place], found.first_rows[place + 1])
+        (encounter_set, row)
+        for encounter_set, index in encounters
+        for row in range(encounter_set.first_rows[index], encounter_set.first_rows[index + 1])
     ]
     alike: dict[Any, list[int]] = {}
-    for number, (found, row) in enumerate(aircraft):
-        lasts = number if found.kind == TRACKS else found.seconds(row)
-        alike.setdefault((found.kind, lasts, found.reference_deg), []).append(number)
+    for number, (encounter_set, row) in enumerate(aircraft):
+        lasts = number if encounter_set.kind == TRACKS else encounter_set.seconds(row)
+        alike.setdefault((encounter_set.kind, lasts, encounter_set.reference_deg), []).append(
+            number
+        )
     made: dict[int, SampledTrajectory] = {}
     for numbers in alike.values():
         for some in _in_parts(numbers, len(_paths([aircraft[numbers[0]]], dynamics)[0])):
@@ -87,8 +91,11 @@ def flights_of(encounters: Sequence[Encounter], dynamics: str) -> list[list[Samp
             made.update(zip(some, flights, strict=True))
     each = iter(range(len(aircraft)))
     return [
-        [made[next(each)] for _ in range(found.first_rows[place], found.first_rows[place + 1])]
-        for found, place in encounters
+        [
+            made[next(each)]
+            for _ in range(encounter_set.first_rows[index], encounter_set.first_rows[index + 1])
+        ]
+        for encounter_set, index in encounters
     ]
 
 
@@ -98,10 +105,10 @@ def _in_parts(numbers: list[int], samples: int) -> list[list[int]]:
 
 
 def _paths(aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str) -> _Paths:
-    found, row = aircraft[0]
-    if found.kind != TRACKS:
+    encounter_set, row = aircraft[0]
+    if encounter_set.kind != TRACKS:
         return flown_events(aircraft, dynamics)
-    time_s, north, east, altitude = found.path(row)
+    time_s, north, east, altitude = encounter_set.path(row)
     return time_s, north[:, np.newaxis], east[:, np.newaxis], altitude[:, np.newaxis]
 
 
@@ -112,17 +119,17 @@ def _flown_alike(aircraft: Sequence[Encounter], dynamics: str) -> list[SampledTr
         east, north, 0.0,
         reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
     )  # fmt: skip
-    names = [found.names[row] for found, row in aircraft]
+    names = [encounter_set.names[row] for encounter_set, row in aircraft]
     return SampledTrajectory.together(names, time_s, lat, lon, altitude)
 
 
-def _key(found: EncounterSet, place: int, dynamics: str) -> Any:
+def _key(encounter_set: EncounterSet, index: int, dynamics: str) -> Any:
     # Of a set put elsewhere what was read is the same: the arrays stand for it.
-    return id(found.starts), found.reference_deg, place, dynamics
+    return id(encounter_set.starts), encounter_set.reference_deg, index, dynamics
 
 
-def _keep(key: Any, found: EncounterSet, flights: list[SampledTrajectory]) -> None:
-    _FLOWN[key] = found, flights
+def _keep(key: Any, encounter_set: EncounterSet, flights: list[SampledTrajectory]) -> None:
+    _FLOWN[key] = encounter_set, flights
     while len(_FLOWN) > MOST_FLOWN:
         _FLOWN.popitem(last=False)
 
@@ -221,8 +228,8 @@ class _EncounterTraffic(RecordedTraffic):
     """One encounter; its first aircraft is the ownship."""
 
     Parameters = OneEncounter
-    found: EncounterSet
-    place: int
+    encounter_set: EncounterSet
+    index: int
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -237,11 +244,11 @@ class _EncounterTraffic(RecordedTraffic):
         """Return the flights of the encounter."""
         if (self.p.lat_deg is None) != (self.p.lon_deg is None):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
-        self.found, self.place = _encounter_of(type(self), self.p)
-        own, *others = encounter_flights(self.found, self.place, self.p.dynamics)
-        notes = [f"encounter {self.found.numbers[self.place]} of {len(self.found)}"]
-        if self.found.skipped:
-            notes.append(f"{self.found.skipped} damaged encounters of the set were skipped")
+        self.encounter_set, self.index = _encounter_of(type(self), self.p)
+        own, *others = encounter_flights(self.encounter_set, self.index, self.p.dynamics)
+        notes = [f"encounter {self.encounter_set.numbers[self.index]} of {len(self.encounter_set)}"]
+        if self.encounter_set.skipped:
+            notes.append(f"{self.encounter_set.skipped} damaged encounters of the set were skipped")
         return TrafficFile(own, others, 0.0, notes)
 
     @classmethod
@@ -256,7 +263,7 @@ class _EncounterTraffic(RecordedTraffic):
             prepare_flights(encounters, dynamics)
 
     def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
-        at = self.found.reference_deg
+        at = self.encounter_set.reference_deg
         apart_m = float(line_of_sight(lat_deg, lon_deg, 0.0, *at, 0.0)[2])
         if apart_m > _FARTHEST_M:
             raise ValueError(
@@ -268,8 +275,8 @@ class _EncounterTraffic(RecordedTraffic):
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and the encounter with its weight."""
         which = {
-            "number": int(self.found.numbers[self.place]),
-            "weight": float(self.found.weights[self.place]),
+            "number": int(self.encounter_set.numbers[self.index]),
+            "weight": float(self.encounter_set.weights[self.index]),
         }
         return {**super().report(), "encounter": which}
 
@@ -308,21 +315,21 @@ class ModelTraffic(_EncounterTraffic):
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter that a block's parameters name, and its place there."""
+    """Return the set of an encounter that a block's parameters name, and its index there."""
     if issubclass(cls, ModelTraffic):
         return _made(_model_key(parameters), parameters.encounter), 0
     if parameters.file.suffix == ".toml":
-        found = read_made(parameters.file)
+        encounter_set = read_made(parameters.file)
     else:
-        found = read_set(parameters.file, parameters.skip_damaged)
-    return found, found.index_of(parameters.encounter)
+        encounter_set = read_set(parameters.file, parameters.skip_damaged)
+    return encounter_set, encounter_set.index_of(parameters.encounter)
 
 
 def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter where the scene puts it, and its place there."""
-    found, place = chosen_encounter(cls, parameters)
+    """Return the set of an encounter where the scene puts it, and its index there."""
+    encounter_set, index = chosen_encounter(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
-    return (found if None in at else replace(found, reference_deg=at)), place
+    return (encounter_set if None in at else replace(encounter_set, reference_deg=at)), index
 
 
 #: What makes encounters of a model: both files, the seed, and how miss distances are drawn.
@@ -347,8 +354,8 @@ def _made(key: _ModelKey, number: int) -> EncounterSet:
 def _make(key: _ModelKey, numbers: range) -> None:
     sampler = _sampler(key)
     pairs, rules = sampler.pairs(numbers, paths=False), sampler.rules
-    for place, number in enumerate(numbers):
-        one = pairs if len(numbers) == 1 else pairs.take(np.array([place]))
+    for index, number in enumerate(numbers):
+        one = pairs if len(numbers) == 1 else pairs.take(np.array([index]))
         made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
         _MADE[(*key, number)] = made
     while len(_MADE) > _MOST_MADE:

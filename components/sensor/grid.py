@@ -163,11 +163,16 @@ def _nearest(size: Any, steps: Any) -> Any:
 
 def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
     """Round sizes >= 0 of which all can be counted in steps."""
-    rest = np.fmod(size, step)
-    whole = size - rest
-    whole /= step
-    np.rint(whole, out=whole)
-    whole += _goes_up(whole, rest, step)
+    steps = size / step
+    whole = np.rint(steps)
+    # Off by at most 2^-53 of itself, the quotient tells which point is nearer, but half-way.
+    off = np.abs(steps - whole)
+    off += steps * 2.0**-51
+    unsure = off >= 0.5
+    if np.count_nonzero(unsure):
+        rest = np.fmod(size[unsure], step)
+        exact = np.rint((size[unsure] - rest) / step)
+        whole[unsure] = exact + _goes_up(exact, rest, step)
     whole *= step
     return whole
 

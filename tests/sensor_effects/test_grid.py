@@ -144,3 +144,13 @@ def test_a_prepared_grid_rounds_like_the_function(values, step, half):
         got = Grid(step, **limits).round(array)
         assert np.array_equal(got, round_to_grid(array, step, **limits))
         assert not np.signbit(got[got == 0.0]).any()
+
+
+@pytest.mark.parametrize("step", [0.0174532925199433, 0.1, 1.0 / 3.0, 2.0**-7, 76.2])
+def test_at_and_beside_half_steps_a_grid_rounds_as_remainders_say(step: float) -> None:
+    random = np.random.default_rng(7)
+    half = np.concatenate([random.integers(0, most, 2000) for most in (400, 2**40)]) * 0.5 * step
+    values = np.concatenate([half, np.nextafter(half, 0.0), np.nextafter(half, np.inf)])
+    assert np.array_equal(Grid(step).round(values), round_to_grid(values, step))
+    some = values[::97].tolist()
+    assert Grid(step).round(values[::97]).tolist() == [exact(value, step) for value in some]
