@@ -12,7 +12,7 @@ import numpy as np
 
 from components.flights.fleet import Fleet
 from components.flights.many_flights import SteeredFleet
-from components.geometry import line_of_sight
+from components.geometry import TrajectoryState, line_of_sight
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5
@@ -124,7 +124,8 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
     while len(target):
         start: FloatArray = piece * length
         half = 0.5 * length
-        range_m = ranges_m(own, targets, run[target], target, start + half)
+        middle = start + half
+        range_m = ranges_m(own.each(run[target], middle), targets.each(target, middle))
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
@@ -147,14 +148,8 @@ def _too_many(run: IntArray, of_run: int) -> BoolArray:
     return too_many[run]
 
 
-def ranges_m(
-    own: Fleet, targets: Fleet, run: IntArray, target: IntArray, time_s: FloatArray
-) -> FloatArray:
-    """Return the range from the ownships of runs to targets (n,), each at a time (n,) of its own.
-
-    The targets of all runs are numbered through.
-    """
-    here, there = own.each(run, time_s), targets.each(target, time_s)
+def ranges_m(here: TrajectoryState, there: TrajectoryState) -> FloatArray:
+    """Return the ranges from some states to others, broadcast, m."""
     _, _, range_m = line_of_sight(
         here.lat_deg, here.lon_deg, here.alt_m, there.lat_deg, there.lon_deg, there.alt_m,
         validate=False,
@@ -235,10 +230,11 @@ class SteeredCulling:
         found = self._range_m[of]
         new = np.flatnonzero(self._last[of] != number)
         if len(new):
-            target = (of[new][:, np.newaxis] * width + np.arange(width)).reshape(-1)
-            start_s = np.repeat(number[new] * self.epoch_s[of[new]], width)
-            ranges = ranges_m(own, self._targets, np.repeat(of[new], width), target, start_s)
-            found[new] = ranges.reshape(len(new), width)
+            begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
+            target = (begun[:, np.newaxis] * width + np.arange(width)).reshape(-1)
+            there = self._targets.each(target, np.repeat(start_s, width))
+            here = own.each(begun, start_s).reshaped((len(new), 1))
+            found[new] = ranges_m(here, there.reshaped((len(new), width)))
         self._last[of], self._range_m[of] = number, found
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M

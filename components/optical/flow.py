@@ -23,7 +23,7 @@ _FOUR = np.array([[0.0, 0.25, 0.0], [0.25, 0.0, 0.25], [0.0, 0.25, 0.0]])
 # Smoothing of the correlation, pixels; rounds of whole pixels; steps, and the least of them.
 _SMOOTH, _ROUNDS, _STEPS, _FINE = 0.7, 3, 12, 1e-4
 #: Flows known to no better than this, pixels, are not told; and less correlation is another thing.
-_WORST, _ALIKE = 0.5, 0.6
+_WORST, _ALIKE = 0.25, 0.6
 #: A flow this near to the whole pixels at which it was cut out stands.
 _SETTLED = 0.75
 #: So many times what is left says was measured in clutter (1 to 2.4, more for larger targets).
@@ -130,7 +130,9 @@ class Flow(NamedTuple):
 
     x: float
     y: float
-    deviation: float  # standard deviation of either, as the pictures themselves tell it
+    # standard deviation of either, as the pictures themselves tell it: of the axis that they say
+    # least along, that of an outline's straight edge
+    deviation: float
 
 
 _NOTHING = Flow(math.nan, math.nan, math.nan)
@@ -274,7 +276,13 @@ def _registered(first: FloatArray, second: FloatArray, noise: float) -> Flow:
         return _NOTHING
     inverse = np.linalg.inv(bend)
     covariance = power * inverse @ _by_axes(square, soft * turned.real) @ inverse
-    return Flow(float(shift[0]), float(shift[1]), math.sqrt(0.5 * float(np.trace(covariance))))
+    return Flow(float(shift[0]), float(shift[1]), math.sqrt(_largest(covariance)))
+
+
+def _largest(covariance: FloatArray) -> float:
+    """Return the variance along the axis on which it is largest, (2, 2)."""
+    (xx, xy), (_, yy) = covariance
+    return float(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy))
 
 
 def _by_axes(square: Any, values: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ from math import sqrt
 from statistics import NormalDist
 
 import numpy as np
+import pyarrow.compute as pc
 import pytest
 
 import dsa_des
@@ -166,6 +167,32 @@ def test_reach_is_by_sector():
     nmi = reach_m(bearing, np.zeros(6, dtype=bool)) / 1852.0
     assert nmi == pytest.approx([20.6, 20.6, 14.3, 14.3, 8.0, 8.0])
     assert reach_m(bearing, np.ones(6, dtype=bool)) / 1852.0 == pytest.approx([15.6] * 6)
+
+
+def test_a_scene_without_a_reach_asks_as_far_as_anybody_answers(scene):
+    """Straight ahead, 33 km away: Mode C answers up to 20.6 nmi there, Mode S up to 15.6."""
+    ahead = (33_000.0 * np.sin(np.radians(217.0)), 33_000.0 * np.cos(np.radians(217.0)))
+    asker = 'replies = "certain"\nfar_every = 1'
+    found = {
+        craft: recorded(scene(f"{craft} = true", asker, ahead, duration_s="5")).num_rows
+        for craft in ("mode_c", "mode_s")
+    }
+    assert found["mode_c"] > 0 and found["mode_s"] == 0
+
+
+def test_who_is_asked_in_turn_is_asked_at_a_scan_of_his_own(scene):
+    """Of thirty who are far some are asked at each scan, and each at one in five."""
+    aircraft = "\n".join(
+        f'[[blocks.traffic.intruders]]\nname = "f{i}"\neast_m = -6000\nnorth_m = -8000\n'
+        "up_m = 300\nheading_deg = 217\nspeed_mps = 90\nmode_s = true"
+        for i in range(30)
+    )
+    found = recorded(
+        scene("mode_s = true\n" + aircraft, 'replies = "certain"', heading=217, speed=90)
+    )
+    late = found.filter(pc.greater(found["time_s"], 20.0))
+    asked = [sum(1 for t in column(late, "time_s") if t == second) for second in range(30, 40)]
+    assert min(asked) >= 1 and max(asked) <= 15
 
 
 def test_pure_functions():

@@ -3,7 +3,7 @@
 import crooked
 import numpy as np
 import pytest
-from wired import chain
+from wired import chain, rows, run
 
 import dsa_des
 from components.surveillance.ads_b import AdsB
@@ -96,3 +96,28 @@ def test_latency_hides_nobody_at_the_start():
     said = np.array([(row["reported_s"], row["reported_lat_deg"]) for row in rows])
     at_start = said[:, 1] - 100.0 * said[:, 0] / degree_m
     assert np.abs(at_start - at_start[-1]).max() * degree_m < 1.5
+
+
+def test_what_is_sent_behind_the_limb_is_not_received():
+    """Thirty climb from the sea 130 km away: at the first scan some have sent nothing in view."""
+    toward, range_m = np.radians(217.0), 130_000.0
+    craft = {
+        "east_m": range_m * np.sin(toward), "north_m": range_m * np.cos(toward),
+        "up_m": -(range_m**2) / 2 / 6.37e6 - 900.0, "heading_deg": 37.0, "speed_mps": 90.0,
+        "climb_mps": 8.5, "ads_b": {},
+    }  # fmt: skip
+    block = {"type": "surveillance.ads_b", "reception": "certain"}
+    scene = chain(
+        {"slow": {**block, "scan_rate_hz": 1}, "fast": {**block, "scan_rate_hz": 50}},
+        ownship={"lat_deg": -41.3, "lon_deg": 3.0, "alt_m": 900.0, "heading_deg": 217.0,
+                 "speed_mps": 60.0},
+        targets=[{**craft, "name": f"t{i}"} for i in range(30)], duration_s=7,
+        terrain={"horizon": True},
+    )  # fmt: skip
+    done = run(scene)
+    free = [row["time_s"] for row in rows(done, "scans", block="fast") if not row["skipped_hidden"]]
+    heard = rows(done, block="slow")
+    first = min(row["time_s"] for row in heard)
+    assert 0.1 < first - free[0] < 0.5
+    assert min(row["reported_s"] for row in heard) > free[0] - 0.03
+    assert 5 < sum(row["time_s"] == first for row in heard) < 28

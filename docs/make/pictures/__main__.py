@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from components.thesis.drawing import BLUE, GREY, PINK
+from docs.make.pictures.bound import bound_table
 from docs.make.pictures.flow import flow_table
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing
@@ -237,26 +238,20 @@ _FLOW = """
 `python -m docs.make.pictures`: six seeds of four targets, from 3 to 150 pixels, straight on and
 then banked at heading 217° in the southern hemisphere, two frames 0.04 s apart; how far the flow is
 from the way of the true pixel. Noise of a pixel and clutter are in the target's contrast.
-`flow_deviation_px` says how good each flow is; the last column is the root of the mean square of
-what it is off over that, 1 where it is honest. Where the stated deviation is below 0.04, 95 % of
-flows are within 0.1 pixel. No flow is told where the spot is not found again, or the deviation is
-above 0.5.
+`flow_deviation_px` says how good each flow is along the axis that pictures say least of. The last
+columns are the root of the mean square of what it is off over that, 1 where it is honest along
+either axis, and the share of flows within 2.45 of it, 95 % or more where it covers. Where the
+stated deviation is below 0.04, 95 % of flows are within 0.1 pixel. No flow is told where the spot
+is not found again, or the deviation is above 0.25.
 
 **What noise allows.** `python -m docs.make.pictures.bound`: no unbiased estimate from two frames
 is better than the Cramér-Rao bound 2 σ² (Σ ∇s ∇sᵀ)⁻¹ of the shift of a spot s in white noise of
 deviation σ in each. At a noise of 0.05 (two seeds) 95 % of flows are within
 
-| pixels | flow | bound | rms over the bound's |
-|---|---|---|---|
-| 3 to 6 | 0.178 | 0.168 | 1.10 |
-| 6 to 12 | 0.157 | 0.144 | 1.22 |
-| 12 to 40 | 0.128 | 0.111 | 1.08 |
-| 40 and more | 0.085 | 0.084 | 1.01 |
-
+{bound}
 So 0.1 pixel at that noise is beyond any method for targets below 40 pixels; the bound grows with
 the noise, and is 0.067 for the smallest at 0.02. Flows that are off by most are those of outlines
-that say little along themselves: one of 0.85 pixel has a bound of 0.63 (95 %) and is told with a
-deviation of 0.23 along either axis.
+that say little along themselves: one of 0.85 pixel has a bound of 0.63 (95 %), and is not told.
 
 """
 
@@ -334,7 +329,7 @@ def _page(folder: Path) -> str:
     )
     for stated, share, error, count in bins:
         text += f"| {stated:.3f} | {share:.3f} | {error:.3f} | {count} |\n"
-    text += _FLOW + flow_table()
+    text += _FLOW.format(bound=bound_table()) + flow_table()
     _draw(folder / FIGURE, rows, bins)
     _draw_patches(folder / SEEN)
     return text

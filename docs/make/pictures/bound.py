@@ -11,7 +11,7 @@ import components.optical.image as image
 from components.optical.picture import union_coverage
 from docs.make.pictures.flow import SIZES, recorded
 from dsa_des.terminal.interruption import plain_ending
-from dsa_des.terminal.terminal import say
+from dsa_des.terminal.terminal import say_lines
 
 _STEP_PX, _DRAWS = 0.05, 200
 _AXES = ("column", "row")
@@ -78,22 +78,27 @@ def errors_and_bounds(noise: float, seeds: Iterable[int]) -> np.ndarray:
     return np.array(found).T
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--noise", type=float, default=0.05)
-    parser.add_argument("--seeds", type=int, default=2)
-    options = parser.parse_args(arguments)
-    pixels, off, *least = errors_and_bounds(options.noise, range(options.seeds))
-    say("| pixels | flow | bound | rms over the bound's |")
-    say("|---|---|---|---|")
+def bound_table(noise: float = 0.05, seeds: Iterable[int] = range(2)) -> str:
+    """Return a table of flows beside the bound, by size."""
+    pixels, off, *least = errors_and_bounds(noise, seeds)
+    text = "| pixels | flow | bound | rms over the bound's |\n|---|---|---|---|\n"
     for low, high in SIZES:
         mine = (pixels >= low) & (pixels < high)
         bound = np.array(least)[:, mine]
         rms = np.sqrt((off[mine] ** 2).mean() / (bound**2).mean())
         size = f"{low} to {high:g}" if np.isfinite(high) else f"{low} and more"
         edges = np.quantile(off[mine], 0.95), np.quantile(bound, 0.95)
-        say(f"| {size} | {edges[0]:.3f} | {edges[1]:.3f} | {rms:.2f} |")
+        text += f"| {size} | {edges[0]:.3f} | {edges[1]:.3f} | {rms:.2f} |\n"
+    return text
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--noise", type=float, default=0.05)
+    parser.add_argument("--seeds", type=int, default=2)
+    options = parser.parse_args(arguments)
+    say_lines(bound_table(options.noise, range(options.seeds)).rstrip())
     return 0
 
 
