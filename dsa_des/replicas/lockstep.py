@@ -124,12 +124,13 @@ class Replicas(Timeline):
         if isinstance(self._scenes, ReplicaScenes):
             return self._scenes.differing(name)
         first = self._scenes[0].blocks[name].parameters
-        names: set[str] = set()
+        names, fields, values = set[str](), type(first).model_fields, vars(first)
         for scene in self._scenes[1:]:
-            other = scene.blocks[name].parameters
-            if other is not first and other != first:
-                fields = type(first).model_fields
-                names.update(n for n in fields if getattr(other, n) != getattr(first, n))
+            other = vars(scene.blocks[name].parameters)
+            if other is not values:  # what a copy shares need not be compared
+                names.update(
+                    n for n in fields if other[n] is not values[n] and other[n] != values[n]
+                )
         return names
 
     def _together(self, name: str, face: Component) -> Component | None:
