@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dsa_des.arrays.column_values import Columns, Schema, Text, is_empty, nothing_in
+from dsa_des.arrays.column_values import Columns, Instants, Schema, Text, is_empty, nothing_in
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
 from dsa_des.record.notes import Notes
@@ -54,6 +54,8 @@ def to_arrow(columns: Columns, schema: Schema) -> pa.RecordBatch:
 def _array(values: Any, kind: str) -> pa.Array:
     if isinstance(values, Text):
         return _dictionary(values.codes, values.names).cast(pa.string())
+    if isinstance(values, Instants):
+        values = values.ticks / values.ticks_per_s
     if kind == "float64":
         if is_empty(values):
             return pa.nulls(len(values), _TYPES[kind])
