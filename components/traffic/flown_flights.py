@@ -61,6 +61,11 @@ class FlownFlights:
         return len(self.targets) // len(self.own)
 
     @property
+    def traffic(self) -> object:
+        """The same for all flights of one traffic: its targets."""
+        return self.targets
+
+    @property
     def manoeuvre_count(self) -> int:
         """How many manoeuvres came so far, in all runs."""
         return int(self.own.manoeuvre_count.sum())

@@ -150,3 +150,19 @@ def test_what_comes_between_scans_waits_for_the_instance(lock, monkeypatch):
     offsets = [{"blocks.alerting.offset_s": Fraction(n, 2)} for n in (0, 11)]
     simulation = lock.same_as_alone(lock.replicas_of(scene, *offsets))
     assert len(simulation.runs.going) > 1 and "alerting" in simulation.timeline.split
+
+
+@pytest.mark.parametrize(
+    ("sets", "changes", "split"),
+    [
+        # In wind each replica has a traffic of its own; each beam asks it between scans.
+        (["weather.wind_mps=12"], [{HEADING: 3.0}, {HEADING: -4.0}], "traffic"),
+        # One traffic of all, seen by each through a line of sight of its own.
+        (["blocks.traffic.ownship.roll_deg=15", "blocks.traffic.ownship.pitch_deg=8"],
+         [{"blocks.transform.attitude": a} for a in ("exact", "small_angle")], "transform"),
+    ],
+)  # fmt: skip
+def test_what_is_asked_between_scans_is_of_its_own_replica(lock, sets, changes, split):
+    scene = near("blocks.radar.beam_sweep=true", "record.truth=true", *sets, duration_s="6")
+    simulation = lock.same_as_alone(lock.replicas_of(scene, *changes))
+    assert split in simulation.timeline.split
