@@ -300,11 +300,17 @@ class Recorder:
         return values.ticks / self._ticks_per_s if isinstance(values, Instants) else values
 
 
+# Pieces of fewer rows, as scan by scan gives them, are joined sooner than they are compared.
+_LEAST_ROWS = 16
+
+
 def _joined(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
     """Return the values of all parts in order; where all are the same, as one of them."""
-    first, kind = parts[0][0], parts[0].dtype
-    if all(same_bits(part, constant(first, len(part), kind)) for part in parts):
-        return constant(first, sum(map(len, parts)) if order is None else len(order), kind)
+    first, kind, rows = parts[0][0], parts[0].dtype, sum(map(len, parts))
+    if rows >= _LEAST_ROWS * len(parts) and all(
+        same_bits(part, constant(first, len(part), kind)) for part in parts
+    ):
+        return constant(first, rows if order is None else len(order), kind)
     values = np.concatenate(parts) if len(parts) > 1 else parts[0]
     return values if order is None else values.take(order)
 
