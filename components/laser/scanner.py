@@ -23,15 +23,13 @@ from components.optical.weather_effects import obscuration
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
-from dsa_des.block.wake import Wake
 
 _PD = Quantity("detection_probability", "Pd")
 # So many standard deviations of noise are no more than any laser's echo.
@@ -145,17 +143,11 @@ def _extinction_per_m(block: Any) -> float:
     return rain_per_m + KOSCHMIEDER / haze_m * share
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of detection at every (scan, target); a boundary sees all within."""
-    sensor: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        if isinstance(sensor, ScanningLaser):
-            return {_PD.name: sensor.detection_probability(cells)}
-        return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
-
-    found: dict[str, AnyArray] = dict(over_cells(sensor, wake, values, out_of_range=0.0))
-    return found
+def _pd(sensor: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return each cell's probability of detection; a boundary sees all within."""
+    if isinstance(sensor, ScanningLaser):
+        return {_PD.name: sensor.detection_probability(cells)}
+    return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
 
 
 def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
@@ -177,7 +169,7 @@ SHOTS = Ladder(
     ),
     "scanned",
     (_PD,),
-    measure,
+    measure_cells(_pd, out_of_range=0.0),
 )
 
 

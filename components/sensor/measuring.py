@@ -10,11 +10,11 @@ from components.sensor.glint import APPARENT_PLACE, Wander
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
 from components.sensor.look import Cells, Look
 from components.sensor.measurement_errors import MEASUREMENT, ErrorModel
-from components.sensor.mounting import AXES, BodyAxes
+from components.sensor.mounting import AXES, SensorAxes
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 
-_BODY_AXES = BodyAxes()
+_BODY_AXES = SensorAxes()
 
 #: Values by quantity, and variances by column, in the sensor's axes.
 Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
@@ -36,7 +36,7 @@ class Measuring(Component):
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
 
     @cached_property
-    def axes(self) -> BodyAxes:
+    def axes(self) -> SensorAxes:
         """The sensor's axes; known once the scene's effects are."""
         return self.built_one(AXES) or _BODY_AXES
 

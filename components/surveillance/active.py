@@ -15,7 +15,7 @@ from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
 from components.messages.reach import Reach
 from components.navigation.errors import navigation_noise
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import rising_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
@@ -46,9 +46,7 @@ from components.surveillance.reports import unreported
 from components.surveillance.stated_errors import ALTIMETER, ROUNDING
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.gauss_markov import GaussMarkov
 
@@ -126,28 +124,18 @@ class ActiveParameters(CooperativeParameters):
         return reach if self.range_km is not None else replace(reach, range_max_m=_FARTHEST_M)
 
 
-def measure_replies(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of an answer at each (scan, target) if it is asked."""
-    active: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"answers": active.answer_probability(cells)}
-
-    return dict(over_cells(active, wake, values))
+def _answers(active: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return the probability of an answer of each cell if it is asked."""
+    return {"answers": active.answer_probability(cells)}
 
 
-def measure_ranges(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return what is measured of each (scan, target): range, and height above the ownship."""
-    active: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        everybody = np.arange(len(cells))
-        return {
-            "range": active.measured_range_m(cells, everybody),
-            "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
-        }
-
-    return dict(over_cells(active, wake, values))
+def _measurements(active: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return each cell's measured range and reported altitude, m."""
+    everybody = np.arange(len(cells))
+    return {
+        "range": active.measured_range_m(cells, everybody),
+        "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
+    }
 
 
 REPLIES = Ladder(
@@ -158,7 +146,7 @@ REPLIES = Ladder(
     ),
     "rounds",
     (Quantity("answers", ""),),
-    measure_replies,
+    measure_cells(_answers),
 )
 MEASUREMENT = Ladder(
     "active measurement",
@@ -168,7 +156,7 @@ MEASUREMENT = Ladder(
     ),
     "do_365",
     (Quantity("range", "m"), Quantity("altitude", "m")),
-    measure_ranges,
+    measure_cells(_measurements),
 )
 
 

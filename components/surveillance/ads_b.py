@@ -13,7 +13,7 @@ from components.geometry import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
@@ -35,7 +35,6 @@ from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import StatedByAircraft, lasting_errors, told_errors
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
@@ -87,29 +86,14 @@ class AdsBParameters(CooperativeParameters):
         return replace(reach, range_max_m=LAWS[self.reception][1])
 
 
-def measure_reception(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability that a squitter sent at each (scan, target) is received."""
-    receiver: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"reception": receiver.law(cells.range_m)}
-
-    return dict(over_cells(receiver, wake, values))
-
-
-def measure_position(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+def _position_errors(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return how far reports lie off what the aircraft are, north and east, m, at every look."""
-    receiver: Any = block
     receiver.law = LAWS["certain"][0]
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        look = receiver.look(cells)
-        here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
-        said = [look.extras[f"reported_{name}"] for name in PLACE]
-        away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
-        return {"north": away[0], "east": away[1]}
-
-    return dict(over_cells(receiver, wake, values))
+    look = receiver.look(cells)
+    here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
+    said = [look.extras[f"reported_{name}"] for name in PLACE]
+    away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
+    return {"north": away[0], "east": away[1]}
 
 
 RECEPTION = Ladder(
@@ -121,7 +105,7 @@ RECEPTION = Ladder(
     ),
     "fitted",
     (Quantity("reception", ""),),
-    measure_reception,
+    measure_cells(lambda receiver, cells: {"reception": receiver.law(cells.range_m)}),
     clears=("range_km",),
 )
 ERRORS = Ladder(
@@ -138,7 +122,7 @@ ERRORS = Ladder(
     ),
     "gauss_markov",
     (Quantity("north", "m"), Quantity("east", "m")),
-    measure_position,
+    measure_cells(_position_errors),
 )  # fmt: skip
 
 
