@@ -116,12 +116,21 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
 EXTINCTION = Hook("extinction", float, "extinction by the air at the laser's wavelength, 1/m")
 
 
+def _extinction_per_m(block: Any) -> float:
+    haze_m, rain_per_m = obscuration(block.context.sections["weather"])
+    if haze_m is None:
+        return rain_per_m
+    share = float(haze_share_at(haze_m, block.p.wavelength_um))
+    return rain_per_m + KOSCHMIEDER / haze_m * share
+
+
 class LaserExtinction(Effect[float]):
     """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
 
     lockstep = True
     name = "laser extinction"
     acts_on = EXTINCTION
+    builds = _extinction_per_m
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
@@ -129,18 +138,6 @@ class LaserExtinction(Effect[float]):
         if not per_m:
             return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
         return Verdict(True, f"[weather] takes {per_m * 1e4 / math.log(10.0):.3g} dB/km")
-
-    def build(self, block: Any) -> float:
-        """Return the extinction, 1/m."""
-        return _extinction_per_m(block)
-
-
-def _extinction_per_m(block: Any) -> float:
-    haze_m, rain_per_m = obscuration(block.context.sections["weather"])
-    if haze_m is None:
-        return rain_per_m
-    share = float(haze_share_at(haze_m, block.p.wavelength_um))
-    return rain_per_m + KOSCHMIEDER / haze_m * share
 
 
 def _pd(sensor: Any, cells: Cells) -> dict[str, FloatArray]:

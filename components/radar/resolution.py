@@ -231,6 +231,7 @@ class OneReportByCell(Effect[Merging]):
     lockstep = True
     name = "resolution cells"
     acts_on = ONE_REPORT
+    builds = Merging
     outside_the_proof = "without it every target has a report of its own"
 
     def verdict(self, block: Any) -> Verdict:
@@ -241,7 +242,3 @@ class OneReportByCell(Effect[Merging]):
                 return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
             return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
         return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
-
-    def build(self, block: Any) -> Merging:
-        """Return what adds up the echoes of each cell."""
-        return Merging(block)

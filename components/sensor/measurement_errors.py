@@ -243,6 +243,7 @@ class MeasurementErrors(Effect[ErrorModel]):
     lockstep = True
     name = "measurement errors"
     acts_on = MEASUREMENT
+    builds = ErrorModel
     outside_the_proof = "without it reports are the truth on a grid"
 
     def verdict(self, block: Any) -> Verdict:
@@ -250,10 +251,6 @@ class MeasurementErrors(Effect[ErrorModel]):
         if block.p.errors == "grid":
             return Verdict(False, "errors is 'grid': values are rounded to the grid")
         return Verdict(True, f"errors is '{block.p.errors}'")
-
-    def build(self, block: Any) -> ErrorModel:
-        """Return what measures with errors."""
-        return ErrorModel(block)
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
