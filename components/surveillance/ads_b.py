@@ -13,11 +13,11 @@ from components.geometry import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
+from components.navigation.errors import displaced_position
 from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
-    carried_on,
     in_body,
     towards,
     variances_in_body,
@@ -308,7 +308,7 @@ class AdsB(CooperativeSensor):
         velocity = velocity_of(cells, which, ahead_s, then, "target")
         place = [then[f"target_{name}"] for name in PLACE]
         if back_s.any():
-            before = carried_on(place, -velocity * back_s)
+            before = displaced_position(*place, *(-velocity * back_s))
             place = [np.where(back_s > 0.0, b, p) for b, p in zip(before, place, strict=True)]
         velocity[2] = -velocity[2]
         lat, lon, alt = place
@@ -335,9 +335,11 @@ class AdsB(CooperativeSensor):
         ])  # fmt: skip
         age_s = cells.state_ns[detected] / NANOSECONDS - said["reported_s"]
         place = [said[f"reported_{name}"] for name in PLACE]
-        ned = towards(own, *carried_on(place, np.nan_to_num(velocity) * age_s))
+        ned = towards(own, *displaced_position(*place, *(np.nan_to_num(velocity) * age_s)))
         # Its velocity is in its own axes, which are turned against ours.
-        ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + STEP_S)))
+        ahead = towards(
+            own, *displaced_position(*place, *(np.nan_to_num(velocity) * (age_s + STEP_S)))
+        )
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = in_body(own, ned)
         stated = StatedByAircraft(

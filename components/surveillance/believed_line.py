@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from components.geometry import body_angles_unchecked, line_of_sight_ned, ned_to_body_unchecked
-from components.navigation.errors import position_with_error
 from dsa_des.arrays.types import FloatArray
 
 # Nearer to the vertical of the body an azimuth says nothing; nearer than this a range is none.
@@ -40,17 +38,6 @@ def towards(
         line_of_sight_ned(
             own.lat_deg, own.lon_deg, own.alt_m, lat_deg, lon_deg, alt_m, validate=False
         )
-    )
-
-
-def carried_on(
-    place: Sequence[FloatArray], north_east_down_m: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places (latitude, longitude, altitude) moved by (3, n) m in their own axes."""
-    north, east, down = north_east_down_m
-    lat, lon, alt = place
-    return position_with_error(
-        lat, lon, alt, sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, down)
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
-from components.navigation.errors import position_with_error
+from components.navigation.errors import displaced_position
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
@@ -161,10 +161,9 @@ class Broadcasts:
         if ahead_s.any():
             moved = velocity() * ahead_s
             north, east, up = north + moved[0], east + moved[1], up + moved[2]
-        lat, lon, _ = position_with_error(
-            sent.lat_deg, sent.lon_deg, sent.alt_m,
-            sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, np.zeros_like(north)),
-        )  # fmt: skip
+        lat, lon, _ = displaced_position(
+            sent.lat_deg, sent.lon_deg, sent.alt_m, north, east, np.zeros_like(north)
+        )
         step_ft = 25.0 if self._quantised else 0.0
         feet = self._altimeters.reported_ft(who, sent.alt_m + up, step_ft, self._errs)
         if not self._quantised:
