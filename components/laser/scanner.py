@@ -22,11 +22,12 @@ from components.optical.detection import detection_probability, deviations_excee
 from components.optical.weather_effects import obscuration
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
-from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.cued_looks import refuse_cues
 from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable

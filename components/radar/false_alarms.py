@@ -19,7 +19,7 @@ from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terr
 from components.radar.measurement import FAINTEST
 from components.radar.rain import RainClutter
 from components.radar.resolution import cell_size, cells_of_radar
-from components.sensor.look import CUE
+from components.sensor.cued_looks import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 

@@ -45,9 +45,10 @@ from components.radar.weather import (
     weather_without_carrier,
 )
 from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
-from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.cued_looks import refuse_cues
 from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 

@@ -46,8 +46,9 @@ from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_
 from components.radar.resolution import OneReportByCell
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
-from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
-from components.sensor.look import CUE, Cells, CellValues, Look
+from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
+from components.sensor.look import Cells, CellValues, Look
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.wake import Wake
