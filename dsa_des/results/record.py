@@ -99,7 +99,8 @@ class Result:
         A number may be NaN (no value in this run), and so may a fraction, which lies between 0 and
         1, as does the interval of its mean; an event is 0 or 1; a share has a second
         column ``NAME.trials``, and is NaN without trials. A class is a text or None, a key a
-        number that names something; neither stands in a summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
+        number that names something; neither stands in a summary. A ratio has no column: it is made
+        of others (`ratio`) over the runs of a cell.
     meaning : str
     cut_off : str, optional
         Name of a further column, a text: where the run's start or end cut this value off (``at the
