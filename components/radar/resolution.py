@@ -44,18 +44,10 @@ class ResolutionCells:
     @classmethod
     def filling(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
         """Return the grid of cells (rad, rad, m) of a reach, or refuse over 1e15 of them."""
-        across_rad, upward_rad = reach.width_rad
-        depth_m = reach.range_max_m - nearest_m
-        widths = (across_rad, upward_rad, depth_m)
+        firsts = reach.azimuth_rad[0], reach.elevation_rad[0], nearest_m
+        widths = *reach.width_rad, reach.range_max_m - nearest_m
         azimuth, elevation, depth = map(steps_across, widths, cell)
-        cells = cls(
-            azimuth,
-            elevation,
-            depth,
-            azimuth_rad=(reach.azimuth_rad[0], across_rad),
-            elevation_rad=(reach.elevation_rad[0], upward_rad),
-            range_m=(nearest_m, depth_m),
-        )
+        cells = cls(azimuth, elevation, depth, *zip(firsts, widths, strict=True))
         if cells.count > MOST_CELLS:
             raise ValueError(
                 f"the field of view has {cells.count:g} resolution cells: it must have at most "
