@@ -25,7 +25,7 @@ _MODELS = {
 }  # fmt: skip
 
 
-def reported_after(
+def tracks_after(
     store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
 ) -> TrackStore:
     """Return the tracks of some replicas (ascending) after their looks.

@@ -28,7 +28,7 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.report import reported_after, state_tracks
+from components.tracking.report import tracks_after, state_tracks
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
@@ -220,7 +220,7 @@ class Tracker(Component):
             if len(store) and len(shown):
                 replicas = records.replica[plan.of[shown]]
                 reported.append(
-                    reported_after(store, replicas, plan.seen_from[shown], plan.row[shown])
+                    tracks_after(store, replicas, plan.seen_from[shown], plan.row[shown])
                 )
         self._records = self._records.after(records.replica, records, wake.first_run)
         self._store = store
