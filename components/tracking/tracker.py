@@ -28,7 +28,7 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.report import tracks_after, state_tracks
+from components.tracking.report import state_tracks, tracks_after
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
