@@ -12,7 +12,7 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
-from components.flights.closest_approach import OwnTimes, SampleTimes, SharedTimes
+from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
@@ -223,10 +223,10 @@ class RecordedTraffic(TrafficSource):
 
     def sample_times(self) -> list[SampleTimes]:
         """Return the sample times of the ownship, and those of each target."""
+        own = KnownTimes(self.content.ownship.sample_times_s)
         if not self.targets:
-            return [SharedTimes(self.content.ownship.sample_times_s)]
-        each = OwnTimes([target.sample_times_s for target in self.content.intruders])
-        return [SharedTimes(self.content.ownship.sample_times_s), each]
+            return [own]
+        return [own, KnownTimes(*(target.sample_times_s for target in self.content.intruders))]
 
     def warnings(self) -> list[str]:
         """Say what no aircraft does, and which error of units it looks like."""
