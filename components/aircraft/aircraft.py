@@ -264,13 +264,9 @@ class Roster:
 
     @cached_property
     def extents_m(self) -> FloatArray:
-        """Length, span and height of each target by its bodies as an EO camera sees them.
-
-        Returns
-        -------
-        (targets, 3) array, m
-            Those of the fuselage, a round body of the front's and the side's area, and of a wing
-            three times as wide as deep.
+        """Length, span and height (targets, 3), m, of each target by its bodies as an EO camera
+        sees them: those of the fuselage, a round body of the front's and the side's area, and of a
+        wing three times as wide as deep.
         """
         front, side, plane = (
             self.column(f"eo.{body}_m2") for body in ("front", "side", "horizontal")
@@ -315,19 +311,8 @@ class Roster:
         return columns[path]
 
     def tables(self, path: str) -> tuple[tuple[Any, ...], IntArray]:
-        """Return the tables that targets name, and which one each target has.
-
-        Parameters
-        ----------
-        path : str
-            ``"rcs_table"``, ``"eo.silhouette_table"`` or ``"ir.silhouette_table"``.
-
-        Returns
-        -------
-        tables : tuple
-            Each once, in the order of the targets.
-        place : (targets,) of int
-            Index into `tables`; -1 for a target without one.
+        """Return the tables that targets name at a path such as ``"eo.silhouette_table"``, each
+        once in the order of the targets, and the index (targets,) of each one's, -1 without.
         """
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:

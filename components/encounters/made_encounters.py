@@ -70,24 +70,11 @@ _TRIES = 200
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a table asks for.
+    """What a table asks for, in SI units.
 
-    Parameters
-    ----------
-    path : Path
-    fixed : list of dict
-        One per swept combination: quantity → value, or (low, high) where it is drawn, SI.
-    geometries : list of str
-        One per combination.
-    count : int
-        Encounters for each combination.
-    seed : int
-    at_deg : (latitude, longitude)
-    duration_s, weight : float
-    sense : str
-    courses : list of int, optional
-        Which of the two courses that lead there each combination takes; the first of its geometry
-        by default.
+    Of each swept combination `fixed` gives every quantity, as a value or as (low, high) where it is
+    drawn, `geometries` the geometry, and `courses` which of the two courses that lead there it
+    takes (None: the first of its geometry). `count` encounters are made of each.
     """
 
     path: Path

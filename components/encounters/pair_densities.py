@@ -11,19 +11,8 @@ _NAUTICAL_MILE_FT = 6076.115485564304
 
 @dataclass(frozen=True, eq=False)
 class StepDensity:
-    """A function that is constant between edges.
-
-    Parameters
-    ----------
-    edges : (n + 1,)
-        Rising.
-    heights : (n,)
-        Above 0.
-
-    Raises
-    ------
-    ValueError
-        Where they do not fit.
+    """A function that is constant between rising edges (n + 1,), with heights (n,) above 0;
+    ValueError where they do not fit.
     """
 
     edges: FloatArray
@@ -99,19 +88,10 @@ def _steps(edges: list[float], heights: list[float]) -> StepDensity:
 class PairingRules:
     """How two independent tracks become an encounter.
 
-    Parameters
-    ----------
-    duration_s, closest_s : int
-        Length of the tracks, and when they are closest.
-    vertical_ft : StepDensity
-        Probability (times any factor) with which a vertical miss distance is accepted; none is
-        outside its edges.
-    horizontal_ft : StepDensity
-        Density (times any factor) from which the signed horizontal miss distance is drawn.
-    start_vertical_ft, start_range_ft : float
-        Pairs that begin nearer than both are rejected.
-    largest_horizontal_error_ft, largest_vertical_error_ft : float
-        Pairs whose tracks miss what was drawn by as much are rejected.
+    They last `duration_s` and are closest at `closest_s`. A vertical miss distance is accepted with
+    a probability in proportion to `vertical_ft`, none outside its edges; the signed horizontal one
+    is drawn from the density `horizontal_ft`. Pairs that begin nearer than both `start_*` are
+    rejected, as are those whose tracks miss what was drawn by a `largest_*_error_ft`.
     """
 
     duration_s: int = 180

@@ -27,14 +27,9 @@ _MOST_PIECES_PER_TARGET = 100
 
 @dataclass(frozen=True, eq=False)
 class NearIntervals:
-    """Intervals of time in which targets may be near; outside them they are surely not.
+    """Intervals (n,) of time in which targets may be near; outside them they are surely not.
 
-    Parameters
-    ----------
-    target : (n,) of int
-        Ascending.
-    start_s, end_s : (n,)
-        Both included; those of one target are in order and apart.
+    Targets ascend; both ends are included, and those of one target are in order and apart.
     """
 
     target: IntArray
@@ -88,17 +83,12 @@ class NearIntervals:
 
 
 def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> NearIntervals:
-    """Find when targets may be within a range of the ownship, between time 0 and an end.
+    """Return when targets may be within a range of the ownship, between time 0 and an end.
 
     Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
     true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
-    few metres of the edge).
-
-    Parameters
-    ----------
-    own, targets : Fleet
-        The ownship of each run, and the targets of all, as many in each run, one run after the
-        other.
+    few metres of the edge). `own` is the ownship of each run; `targets` are as many in each run,
+    one run after the other.
     """
     of_run = max(1, len(targets) // len(own))
     run = np.arange(len(targets)) // of_run
@@ -166,13 +156,7 @@ _OWN_SPEED_MARGIN = 1.05
 class SteeredCulling:
     """The targets near ownships that are steered, one in each run, by epochs of time.
 
-    Parameters
-    ----------
-    own : Fleet
-        The ownship of each run as it flies before it is steered.
-    targets : Fleet
-        The targets of all runs, as many in each, one run after the other.
-    reach_m : float
+    `own` flies as before it is steered; `targets` are as many in each run, one run after the other.
     """
 
     def __init__(self, own: Fleet, targets: Fleet, reach_m: float) -> None:
@@ -198,14 +182,8 @@ class SteeredCulling:
         self._last[run] = -1
 
     def near(self, own: SteeredFleet, run: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may be in reach at each row, (rows, targets).
-
-        Parameters
-        ----------
-        own : SteeredFleet
-            The ownships as they are steered by now.
-        run, time_s : (rows,)
-            Ascending by run.
+        """Return which targets may be in reach at each row, (rows, targets), of ownships as they
+        are steered by now; rows are in order of run.
         """
         width = self._targets_mps.shape[1]
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)

@@ -91,10 +91,8 @@ class SteeredFleet(Fleet):
     """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
-    climb. The flight's own script ends with the first one.
-
-    It never changes: `steered` returns another one, so that a run can go back to the flights it
-    had, and rows of a message keep those that they know.
+    climb. The flight's own script ends with the first one. A fleet never changes: `steered` returns
+    another one, so that a run can go back, and rows of a message keep those that they know.
     """
 
     def __init__(self, flights: Fleet, parts: Sequence[Parts] = ()) -> None:
@@ -129,9 +127,8 @@ class SteeredFleet(Fleet):
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
-        """Return the states of ownships (n,), each at a time (n,) of its own, in s.
-
-        `known` says how many of the ownship's manoeuvres count; all by default.
+        """Return the states of ownships (n,), each at a time (n,) of its own, in s, by the first
+        `known` of their manoeuvres, or all.
         """
         own, after, which = self._part_flown(aircraft, time_s, known)
         if not len(after):
