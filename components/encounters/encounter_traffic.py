@@ -17,11 +17,7 @@ from pydantic import Field, model_validator
 
 from components.encounters.made_encounters import read_made
 from components.encounters.model_file import read_model
-from components.encounters.pair_densities import (
-    PairingRules,
-    horizontal_density,
-    vertical_density,
-)
+from components.encounters.pair_densities import PairingRules, pairing_rules
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
@@ -213,15 +209,10 @@ class ModelParameters(OneEncounter):
 
     def pairing_rules(self) -> PairingRules:
         """Return how tracks become encounters; ValueError where edges or proportions do not fit."""
-        changes: dict[str, Any] = {}
-        for name, make in (("horizontal", horizontal_density), ("vertical", vertical_density)):
-            if (given := getattr(self, name)) is not None:
-                try:
-                    density = make(np.array(given.edges_ft), np.array(given.proportions))
-                except ValueError as error:
-                    raise ValueError(f"{name}: {error}") from None
-                changes[f"{name}_ft"] = density
-        return PairingRules(**changes)
+        return pairing_rules(
+            *(given and (given.edges_ft, given.proportions)
+              for given in (self.horizontal, self.vertical))
+        )  # fmt: skip
 
 
 class _EncounterTraffic(RecordedTraffic):

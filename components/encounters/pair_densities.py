@@ -1,6 +1,8 @@
 """Densities from which miss distances of encounters are drawn, and what weights undo them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -118,6 +120,22 @@ class PairingRules:
                 f"closest_s = {self.closest_s}: must lie between 0 and duration_s = "
                 f"{self.duration_s}"
             )
+
+
+def pairing_rules(*steps: Sequence[Sequence[float]] | None) -> PairingRules:
+    """Return rules with edges (ft) and proportions of horizontal and of vertical distances, if any.
+
+    ValueError begins with which of both does not fit.
+    """
+    changes: dict[str, Any] = {}
+    makers = {"horizontal": horizontal_density, "vertical": vertical_density}
+    for (name, make), given in zip(makers.items(), steps, strict=True):
+        try:
+            if given is not None:
+                changes[f"{name}_ft"] = make(*map(np.array, given))
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    return PairingRules(**changes)
 
 
 #: Half the width of the cylinder over which miss distances are uniform in the airspace: 10 nmi.
