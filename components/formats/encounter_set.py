@@ -28,7 +28,7 @@ class NoSuchEncounter(ValueError):
     """A set holds no encounter of that number."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EncounterSet:
     """Encounters; arrays over encounters (n), over aircraft (rows) and over list entries.
 
