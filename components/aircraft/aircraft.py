@@ -60,7 +60,7 @@ def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
         path = _PATH.validate_python(value)
         name = shortened(str(path), 300)
         try:
-            return _read(path, reader)  # type: ignore[no-any-return]
+            return _read(path, reader)
         except InputFileError as error:
             raise ValueError(f"must be a table that can be read: {name}: {error}") from None
 

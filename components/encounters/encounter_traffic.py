@@ -163,6 +163,11 @@ class MissDistances(Parameters):
         "encounters in it, of vertical ones the chance (at most 1) with which they are accepted."
     )
 
+    @property
+    def steps(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Edges and proportions."""
+        return self.edges_ft, self.proportions
+
 
 class ModelParameters(OneEncounter):
     """Parameters of traffic that an encounter model makes."""
@@ -192,10 +197,8 @@ class ModelParameters(OneEncounter):
 
     def pairing_rules(self) -> PairingRules:
         """Return how tracks become encounters; ValueError where edges or proportions do not fit."""
-        return pairing_rules(
-            *(given and (given.edges_ft, given.proportions)
-              for given in (self.horizontal, self.vertical))
-        )  # fmt: skip
+        both = self.horizontal, self.vertical
+        return pairing_rules(*(None if one is None else one.steps for one in both))
 
 
 class _EncounterTraffic(RecordedTraffic):

@@ -213,8 +213,8 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
             steps.append(given and [[float(word) for word in text.split(",")] for text in given])
         except ValueError:
             raise UsageError(
-                f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
-                "step between two, all with commas between them"
+                f"{option} {' '.join(given or ())}: must be rising edges, ft, and the proportion of "
+                "each step between two, all with commas between them"
             ) from None
     try:
         return pairing_rules(*steps)
@@ -229,9 +229,9 @@ def _write_made(made: str, out: str) -> None:
     path = named(out)
     check_ending(path, [SET])
     check_file(path)
-    made = made_set(recipe)
-    write_set(path, {"made_by": "hand", "seed": recipe.seed}, [made])
-    say(f"{path}: {len(made)} encounters of {recipe.duration_s:g} s")
+    encounters = made_set(recipe)
+    write_set(path, {"made_by": "hand", "seed": recipe.seed}, [encounters])
+    say(f"{path}: {len(encounters)} encounters of {recipe.duration_s:g} s")
 
 
 def check_origin(at: tuple[float, float]) -> None:

@@ -51,19 +51,16 @@ def straight_fleet(
         given = {
             "lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m, "heading_deg": heading_deg,
             "speed_mps": speed_mps, "climb_mps": climb_mps, "start_time_s": start_time_s,
-            "end_time_s": end_time_s,
         }  # fmt: skip
-        given |= zip(("yaw_deg", "pitch_deg", "roll_deg"), fixed_deg, strict=True)
-        rows = zip(*(column.tolist() for column in given.values()), strict=True)
-        return ScriptedFleet(
-            [
-                ScriptedTrajectory(
-                    name, **{k: None if isnan(v) or (k == "end_time_s" and v == inf) else v
-                             for k, v in zip(given, row, strict=True)},
-                )
-                for name, row in zip(names, rows, strict=True)
-            ]
-        )  # fmt: skip
+        ends_s = np.where(end_time_s == inf, np.nan, end_time_s)
+        yaw, pitch, roll = fixed_deg
+        free = {"end_time_s": ends_s, "yaw_deg": yaw, "pitch_deg": pitch, "roll_deg": roll}
+        flights = []
+        for number, name in enumerate(names):
+            one: dict[str, Any] = {key: float(of[number]) for key, of in given.items()}
+            one |= {key: float(of[number]) for key, of in free.items() if not isnan(of[number])}
+            flights.append(ScriptedTrajectory(name, **one))
+        return ScriptedFleet(flights)
     lon = np.where((lon_deg >= -180.0) & (lon_deg < 180.0), lon_deg, wrap_longitude_deg(lon_deg))
     headings = np.array([heading_from_deg(heading) for heading in heading_deg.tolist()])
     table = geodesic_parameters(lat_deg, lon, alt_m, headings, speed_mps, climb_mps)
