@@ -1,6 +1,6 @@
 """The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from operator import attrgetter
@@ -282,6 +282,22 @@ def latest_in_gate(
         & (asked.tick - arrivals.tick[of] <= gate_ticks)
     )
     return np.where(fits, entry, -1)
+
+
+def each_alone(
+    taken: Mapping[str, tuple[IntArray, IntArray]], sensors: Iterable[str]
+) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return rows, and for `Fusion.combine` entries, of fused detections of one entry each.
+
+    `taken` has by sensor the rows and the entries; they follow each other sensor by sensor.
+    """
+    row = np.concatenate([rows for rows, _ in taken.values()])
+    entries = {name: np.full(len(row), -1, dtype=np.int64) for name in sensors}
+    start = 0
+    for name, (_, mine) in taken.items():
+        entries[name][start : start + len(mine)] = mine
+        start += len(mine)
+    return row, entries
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
