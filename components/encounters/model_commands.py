@@ -213,8 +213,8 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
             steps.append(given and [[float(word) for word in text.split(",")] for text in given])
         except ValueError:
             raise UsageError(
-                f"{option} {' '.join(given or ())}: must be rising edges, ft, and the proportion of "
-                "each step between two, all with commas between them"
+                f"{option} {' '.join(given or ())}: must be rising edges, ft, and the proportion "
+                "of each step between two, all with commas between them"
             ) from None
     try:
         return pairing_rules(*steps)
