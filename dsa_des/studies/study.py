@@ -7,19 +7,17 @@ gives never depends on who ran it.
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
 from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
-from dsa_des.errors import Problem
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
-from dsa_des.scene.overrides import set_value, swap_type
+from dsa_des.scene.overrides import SWAP, apply_changes
 from dsa_des.scene.scene import Scene, check_scene
-from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -238,11 +236,7 @@ def changed_scene(
     SceneError
         With every problem found.
     """
-    file = base.copy()
-    problems: list[Problem] = []
-    for block, name in swaps:
-        found, _ = swap_type(file, block, sourced(name, Path(source).parent), COMMAND_LINE)
-        problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
-    for key, value in sets:
-        problems += set_value(file, key, deepcopy(value), source)
+    file, folder = base.copy(), Path(source).parent
+    types = [(SWAP + block, sourced(name, folder)) for block, name in swaps]
+    problems, _ = apply_changes(file, [*types, *sets], source, source, "swap")
     return check_scene(file, problems)
