@@ -101,7 +101,7 @@ class StudyResult:
         table = self._folder.table(name)
         if table is None:
             raise UsageError(f"{self._folder.path / name}: is not there or not of this study")
-        return table.replace_schema_metadata(None)
+        return table
 
     def _repr_html_(self) -> str:
         return html_of(lambda console: show(console, self._tables))

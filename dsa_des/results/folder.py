@@ -191,18 +191,22 @@ class StudyFolder:
 
         Only some `columns` are read of a part that was found good before.
         """
+        table = self._sealed(self.parts / f"{name}.parquet", name, columns)
+        whole = table is None or columns is not None or _fits(table, self.record)
+        return table if whole else None
+
+    def _sealed(self, path: Path, name: str, columns: Sequence[str] | None) -> "pa.Table | None":
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         try:
-            content = read_regular(self.parts / f"{name}.parquet")
+            content = read_regular(path)
             if not is_sealed(content, self._owner(name)):
                 return None
             table = pq.read_table(io.BytesIO(content), columns=columns)
         except (OSError, MemoryError, pa.ArrowException):
             return None
-        table = table.replace_schema_metadata(None)
-        return table if columns is not None or _fits(table, self.record) else None
+        return table.replace_schema_metadata(None)
 
     def write_part(self, name: str, content: bytes) -> None:
         """Write a part as a whole, sealed as one of this study.
@@ -282,16 +286,7 @@ class StudyFolder:
 
     def table(self, name: str) -> "pa.Table | None":
         """Return a table beside the parts; None if it is not there or not of this study."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        try:
-            content = read_regular(self.path / name)
-            if not is_sealed(content, self._owner(name)):
-                return None
-            return pq.read_table(io.BytesIO(content))
-        except (OSError, MemoryError, pa.ArrowException):
-            return None
+        return self._sealed(self.path / name, name, None)
 
 
 #: How many damaged parts a message names.

@@ -8,7 +8,7 @@ Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millihertz: clo
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.scene.keys import flat
 from dsa_des.studies.axes import Axis
 from dsa_des.time.randomness import key_of
 
@@ -87,6 +88,19 @@ def _uniform(seed: int, key: str, replica: int) -> float:
 def _strata(seed: int, key: str, block: int, batch: int) -> IntArray:
     generator = np.random.Generator(np.random.Philox(key_of(seed, "study strata", key, block)))
     return np.asarray(generator.permutation(batch), dtype=np.int64)
+
+
+def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return dotted key → how it is drawn; nested tables are keys of the scene."""
+
+    def is_draw(value: Any) -> bool:
+        return (
+            not isinstance(value, dict)
+            or bool(set(value) & set(KINDS))
+            or not any(isinstance(item, dict) for item in value.values())
+        )
+
+    return flat(tables, is_draw)
 
 
 def parse_draw(key: str, table: Any) -> Draw:
