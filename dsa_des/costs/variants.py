@@ -28,11 +28,6 @@ class Variants:
     """Makes scenes that differ from one scene by the rungs of their blocks.
 
     ``[accuracy]`` is left out of all of them, since it lets the engine choose rungs by itself.
-
-    Raises
-    ------
-    SceneError
-        If the scene itself cannot be run.
     """
 
     def __init__(
@@ -59,11 +54,6 @@ class Variants:
         """Return the scene with these rungs in their blocks.
 
         Of rungs `shared` only the `Rung.shared` parameters are set, after `choices`.
-
-        Raises
-        ------
-        Unavailable
-            If a rung needs what the scene does not give.
         """
         scene_file = self._file.copy()
         for choice in choices:

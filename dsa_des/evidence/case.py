@@ -156,25 +156,16 @@ class CaseTables(Parameters):
 
 @dataclass(frozen=True)
 class EvidenceCase:
-    """A checked case.
+    """A checked case."""
 
-    Parameters
-    ----------
-    file : SceneFile
-        Its tables as read.
-    tables : CaseTables
-    studies : dict
-        By name, in the order in which they run.
-    results : dict
-        What each study gives, by its name and the result's.
-    sensitivity : tuple of (SensitivityKey, object, str)
-        For each value of the axis after the first: key, value, label.
-    """
-
+    #: Its tables as read.
     file: SceneFile
     tables: CaseTables
+    #: By name, in the order in which they run.
     studies: Mapping[str, Study]
+    #: What each study gives, by its name and the result's.
     results: Mapping[str, Mapping[str, Result]]
+    #: For each value of the axis after the first: key, value, label.
     sensitivity: tuple[tuple[SensitivityKey, Any, str], ...] = ()
 
     @property
@@ -188,11 +179,6 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
 
     `replicas` takes the place of those that the system's study states, and of those beside it
     where the case states none.
-
-    Raises
-    ------
-    SceneError
-        With every problem of the case, or of the first study that has any.
     """
     file = read_scene_file(path)
     problems = apply_sets(file, sets)

@@ -34,18 +34,7 @@ PAGE, MACHINE, INPUTS, STUDIES = "evidence.html", "evidence.json", "inputs", "st
 
 
 class Pack:
-    """What a case shows, once its studies have run.
-
-    Parameters
-    ----------
-    case : EvidenceCase
-    folders : mapping
-        Of every study of the case, finished.
-    sets : sequence of str
-        Changes of the case's file from the command line.
-    replicas : int, optional
-        That the command line asked for.
-    """
+    """What a case shows, once its studies have run."""
 
     def __init__(
         self, case: EvidenceCase, folders: Mapping[str, StudyFolder], tables: Mapping[str, Tables],

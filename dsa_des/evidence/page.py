@@ -95,15 +95,7 @@ that matters most stands first.</p>
 
 
 def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None) -> bytes:
-    """Return the page of some evidence and its two pictures.
-
-    Parameters
-    ----------
-    e : mapping
-        As in ``evidence.json``.
-    convergence, sensitivity : bytes
-        PNG; no sensitivity where no parameter was changed.
-    """
+    """Return the page of some evidence and its two pictures."""
     confidence = e["requirements"][0]["confidence"]
     lines = [*e["requirements"], *e["also"]]
     names = list(dict.fromkeys(line["result"] for line in lines if line.get("study") in

@@ -48,13 +48,7 @@ PAGE_HEAD = _part("head.html")
 
 
 def study_report(folder: StudyFolder) -> bytes:
-    """Return the page of a study's folder.
-
-    Raises
-    ------
-    UsageError
-        If the folder holds no results, or damaged ones.
-    """
+    """Return the page of a study's folder."""
     tables = Tables(folder.record, folder)
     record, stored, first = tables.record, tables.rows.stored, tables.rows.stored.first
     explained = read_explained(folder)

@@ -45,11 +45,6 @@ class StoredRows:
     """The rows with a result, in order of cell and replica, and what became of the others.
 
     With `before_round` only those of earlier rounds.
-
-    Raises
-    ------
-    UsageError
-        If there are none, or if a part is damaged or of another study.
     """
 
     def __init__(self, folder: StudyFolder, before_round: int | None = None) -> None:

@@ -37,13 +37,7 @@ def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value as TOML would read it; what is not TOML is text.
-
-    Raises
-    ------
-    TomlError
-        If it is nested too deeply or holds a whole number of too many digits.
-    """
+    """Return a value as TOML would read it; what is not TOML is text."""
     try:
         value = parse_toml(f"value = {text}")
     except NotToml:

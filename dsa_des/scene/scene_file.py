@@ -41,28 +41,18 @@ _VALUES_PER_FILE = 200
 
 @dataclass
 class SceneFile:
-    """The merged tables of a scene and where each key came from.
-
-    Parameters
-    ----------
-    path : Path
-    data : dict
-        Merged tables; every text is a `SourcedText`.
-    sources : dict
-        For each key path that was written, the file (or ``command line``).
-    of_other_type : dict
-        Keys of blocks that were inherited from a table of another type → that type.
-    beside : dict
-        Tables within blocks → the values that stood beside them in the file that wrote them first.
-    replaced : dict
-        Lists that take the place of inherited ones → the named items that are gone with these.
-    """
+    """The merged tables of a scene and where each key came from."""
 
     path: Path
+    #: Merged tables; every text is a `SourcedText`.
     data: dict[str, Any]
+    #: For each key path that was written, the file (or ``command line``).
     sources: dict[Key, str] = field(default_factory=dict)
+    #: Keys of blocks that were inherited from a table of another type → that type.
     of_other_type: dict[Key, str] = field(default_factory=dict)
+    #: Tables within blocks → the values that stood beside them in the file that wrote them first.
     beside: dict[Key, dict[str, Any]] = field(default_factory=dict)
+    #: Lists that take the place of inherited ones → the named items that are gone with these.
     replaced: dict[Key, list[str]] = field(default_factory=dict)
 
     def copy(self) -> "SceneFile":
@@ -84,13 +74,7 @@ class SceneFile:
 
 
 def read_scene_file(path: Path | str) -> SceneFile:
-    """Read a scene with everything it extends.
-
-    Raises
-    ------
-    SceneError
-        If a file is missing, is not TOML, or extends itself.
-    """
+    """Read a scene with everything it extends."""
     path = Path(path)
     reader = _Reader()
     data = reader.file(path, (), ())
@@ -100,13 +84,7 @@ def read_scene_file(path: Path | str) -> SceneFile:
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
-    """Take tables, which messages call `name`, as a scene file of the working directory.
-
-    Raises
-    ------
-    SceneError
-        If a file that they extend is missing, is not TOML, or extends itself.
-    """
+    """Take tables, which messages call `name`, as a scene file of the working directory."""
     here = Path.cwd() / name
     reader = _Reader()
     reader.sources[()] = str(here)

@@ -104,13 +104,7 @@ def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_draw(key: str, table: Any) -> Draw:
-    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``.
-
-    Raises
-    ------
-    ValueError
-        With what is wrong and what is allowed.
-    """
+    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``."""
     form = "must be one of {uniform = [low, high]}, {normal = [mean, standard deviation]}, " \
         "{choice = [...]}, {latin_hypercube = [low, high]}, {sequence = [first, step]}"  # fmt: skip
     if not isinstance(table, dict) or len(table) != 1:
@@ -203,13 +197,7 @@ def identity(axis: Axis, index: int) -> tuple[str, ...]:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's content; a file that stays as it is is read once.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
+    """Return the SHA-256 of a file's content; a file that stays as it is is read once."""
     state = path.stat()
     return _digest(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
 

@@ -60,13 +60,7 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run what is missing of a study into its open folder; `report` is called after every chunk.
-
-    Raises
-    ------
-    Stopped
-        On ctrl-C or when the disk is full; what is finished is kept.
-    """
+    """Run what is missing of a study into its open folder; `report` is called after every chunk."""
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(range(len(study.cells)))
     rounds = -(-study.replicas // study.batch)

@@ -34,13 +34,7 @@ class MetricSpec:
     place: int = 0
 
     def build(self, scene: Scene) -> Metric:
-        """Return the metric for a scene.
-
-        Raises
-        ------
-        ValueError, pydantic.ValidationError
-            If the name or a key is unknown, or the scene lacks what it needs.
-        """
+        """Return the metric for a scene."""
         from dsa_des.studies.metric import check_tables
 
         cls = find_metric(self.name, (scene.path.parent,))
@@ -156,13 +150,7 @@ class Study:
         return swaps, sets
 
     def scene(self, cell: int) -> Scene:
-        """Return the checked scene of a cell.
-
-        Raises
-        ------
-        SceneError
-            With every problem found.
-        """
+        """Return the checked scene of a cell."""
         return changed_scene(self.base, *self.changes(cell), str(self.path))
 
     def member_seed(self, cell: int) -> int:
@@ -229,13 +217,7 @@ def changed_scene(
     sets: Sequence[tuple[str, Any]],
     source: str,
 ) -> Scene:
-    """Return the checked scene that swaps and values make of a scene's tables.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
-    """
+    """Return the checked scene that swaps and values make of a scene's tables."""
     file, folder = base.copy(), Path(source).parent
     types = [(SWAP + block, sourced(name, folder)) for block, name in swaps]
     problems, _ = apply_changes(file, [*types, *sets], source, source, "swap")

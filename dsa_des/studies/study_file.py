@@ -45,11 +45,6 @@ def read_study(
 
     `swaps` are further swap axes; `sets` change the study itself, as ``key=value``; `keys` take the
     place of its own.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
     """
     reader = _StudyReader(read_scene_file(path))
     reader.data.update(keys or {})
@@ -89,11 +84,6 @@ def study_of_tables(
 
     `tables` are as a study file would hold them, without ``scene``, ``set`` and ``swap``; `swaps`
     and `sets` are made in every cell.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
     """
     return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 

@@ -7,14 +7,7 @@ from typing import Any
 
 
 def json_text(content: Any, **options: Any) -> str:
-    """Return content as JSON text; NaN and infinities become null.
-
-    Parameters
-    ----------
-    content : object
-    **options
-        As for `json.dumps`.
-    """
+    """Return content as JSON text; NaN and infinities become null."""
     return json.dumps(_plain(content), allow_nan=False, **options)
 
 
