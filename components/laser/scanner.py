@@ -85,6 +85,17 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
     )
 
     @model_validator(mode="after")
+    def _field_ahead_of_its_edges(self) -> Self:
+        low, high = self.azimuth_deg
+        if math.pi < sector_width_rad(math.radians(low), math.radians(high)) and low > high:
+            raise ValueError(
+                f"azimuth_deg is [{low:g}, {high:g}]: clockwise from the first to the second that "
+                f"is {high - low + 360.0:g} deg wide; allowed: [{high:g}, {low:g}], or "
+                f"[{low:g}, {high + 360.0:g}] where all that is meant"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _one_pulse_in_the_air(self) -> Self:
         rate_hz = float(self.scan_rate_hz) * self.azimuth_shots * self.elevation_shots
         farthest_km = 299_792.458 / (2.0 * rate_hz)
