@@ -6,10 +6,12 @@ gives never depends on who ran it.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
+
+import numpy as np
 
 from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
@@ -57,40 +59,6 @@ class Chunk:
         return sum(end - start for _, start, end in self.runs)
 
 
-class StudyCells(Sequence[tuple[int, ...]]):
-    """The cells of a study, each made when it is asked for; the last axis runs fastest."""
-
-    def __init__(self, sizes: Iterable[int]) -> None:
-        self._sizes = tuple(sizes)
-        self._count = math.prod(self._sizes)
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, number: int) -> tuple[int, ...]: ...
-    @overload
-    def __getitem__(self, number: slice) -> list[tuple[int, ...]]: ...
-    def __getitem__(self, number: int | slice) -> tuple[int, ...] | list[tuple[int, ...]]:
-        """Return the index of each axis's value at a cell."""
-        if isinstance(number, slice):
-            return [self[k] for k in range(*number.indices(self._count))]
-        if not -self._count <= number < self._count:
-            raise IndexError(number)
-        rest, places = number % self._count, []
-        for size in reversed(self._sizes):
-            rest, place = divmod(rest, size)
-            places.append(place)
-        return tuple(reversed(places))
-
-    def number(self, places: Iterable[int]) -> int:
-        """Return which cell has these indices."""
-        found = 0
-        for size, place in zip(self._sizes, places, strict=True):
-            found = found * size + place
-        return found
-
-
 @dataclass
 class Study:
     """A study that can be run."""
@@ -127,9 +95,21 @@ class Study:
     compare_weight: str | None = None
 
     @property
-    def cells(self) -> StudyCells:
-        """Index of each axis's value, cell by cell; the last axis runs fastest."""
-        return StudyCells(len(axis.labels) for axis in self.axes)
+    def _sizes(self) -> tuple[int, ...]:
+        return tuple(len(axis.labels) for axis in self.axes)
+
+    @property
+    def cells(self) -> range:
+        """The numbers of all cells."""
+        return range(math.prod(self._sizes))
+
+    def indices(self, cell: int) -> tuple[int, ...]:
+        """Return the index of each axis's value at a cell; the last axis runs fastest."""
+        return tuple(map(int, np.unravel_index(cell, self._sizes)))
+
+    def cell_at(self, indices: Sequence[int]) -> int:
+        """Return the cell with these indices."""
+        return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
 
     @property
     def batch(self) -> int:
@@ -138,13 +118,13 @@ class Study:
 
     def labels(self, cell: int) -> dict[str, Any]:
         """Return column → value of every axis at a cell."""
-        indices = self.cells[cell]
+        indices = self.indices(cell)
         return {a.column: a.labels[i] for a, i in zip(self.axes, indices, strict=True)}
 
     def changes(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
         """Return the swaps and the values that make a cell's scene of the base scene."""
         swaps, sets = list(self.swaps), list(self.sets)
-        for axis, index in zip(self.axes, self.cells[cell], strict=True):
+        for axis, index in zip(self.axes, self.indices(cell), strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         return swaps, sets
@@ -157,8 +137,8 @@ class Study:
         """Return the seed of a cell's encounter; without a sample the study's."""
         if not self.over:
             return self.seed
-        places = zip(self.axes, self.cells[cell], strict=True)
-        return member_seed(self.seed, ((a, i) for a, i in places if a.column in self.over))
+        members = zip(self.axes, self.indices(cell), strict=True)
+        return member_seed(self.seed, ((a, i) for a, i in members if a.column in self.over))
 
     def replica(self, number: int, cell: int = 0) -> Replica:
         """Return the seed and the drawn values of a replica.
