@@ -88,7 +88,7 @@ def _per_row(mask: BoolArray) -> IntArray:
         return _of_each(0, len(mask))
     if mask.shape[1] > _FEW_COLUMNS:
         return mask.sum(axis=1)
-    total = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
+    total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column
     return total

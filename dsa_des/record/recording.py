@@ -287,7 +287,7 @@ class Recorder:
             text = self._texts.setdefault((table, name), _TextCodes(name))
             codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
             return Text(codes, text.names)
-        given = [columns.get(name) for _, columns in pieces]
+        given: list[Any] = [columns.get(name) for _, columns in pieces]
         if all(isinstance(values, Instants) for values in given):
             ticks = _joined([values.ticks for values in given], order)
             return Instants(ticks, self._ticks_per_s)
