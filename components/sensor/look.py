@@ -9,7 +9,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.column_values import constant, of_one_value, picked
+from dsa_des.arrays.column_values import of_one_value, picked
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
@@ -227,8 +227,6 @@ class Cells:
 
     def of_target(self, column: FloatArray) -> AnyArray:
         """Return a column of the roster (shape (aircraft,)) for each cell."""
-        if len(column) == 1:
-            return constant(column[0], len(self), column.dtype)
         return column[self.craft]
 
     @cached_property
