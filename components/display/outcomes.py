@@ -12,7 +12,7 @@ import numpy as np
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
-from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
+from components.messages.state_tracks import StateTracks, held
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
 from components.metrics.true_states import TargetsInFrame
@@ -31,7 +31,6 @@ NEAR_M = 300.0
 NO_TARGET = "no target"
 #: Instead of a tracker's name, for alerts of what truly is.
 TRUTH = "the truth"
-_HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
 #: Distances of tracks and targets that are worked out at once.
 _MOST_AT_ONCE = 200_000
 
@@ -61,22 +60,17 @@ class TrackSummary:
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``state_tracks``."""
-        status = columns["track_status"]
-        wanted = [code for code, name in enumerate(status.names) if name in _HELD]
-        held = np.isin(status.codes, wanted)
+        confirmed = held(columns["track_status"])
         for name, rows in rows_by_name(columns["block"]):
-            self._entries[name].add(columns, rows[held[rows]])
+            self._entries[name].add(columns, rows[confirmed[rows]])
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``tracks``: tracker → what came of it.
+        """Return the section ``tracks``: tracker → counts, error and first instants.
 
-        ``confirmed`` counts tracks that were ever confirmed. Where truth is recorded: ``false``
-        of them have a range and are never within `NEAR_M` of a target (None where no track has
-        a range), and ``position_error_m`` is the rms distance of the others' states from the
-        nearest target within `NEAR_M`, None without any. ``first_confirmed`` is the first
-        instant with a confirmed track and its range from the ownship as estimated there (of
-        several the nearest, None without a range), None without any; ``targets`` is the same for
-        each target that a track with a range came within `NEAR_M` of.
+        Where truth is recorded: ``false`` tracks have a range and are never within `NEAR_M` of a
+        target, ``position_error_m`` is the rms distance of the others' states from the nearest
+        target. ``first_confirmed`` and, by target, ``targets`` are the first instant and the range
+        estimated there, of several tracks the nearest. None is what there is none of.
         """
         return {"tracks": {name: entry.result() for name, entry in self._entries.items()}}
 

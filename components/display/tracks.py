@@ -12,7 +12,7 @@ import numpy as np
 from components.display.outcomes import NEAR_M, TABLE, distances
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE
+from components.messages.state_tracks import COVARIANCE, HELD
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
@@ -96,11 +96,10 @@ def _read(source: Path) -> dict[str, Any] | None:
     groups = file.metadata.num_row_groups
     step = -(-file.metadata.num_rows // _MOST_ROWS)
     table = file.read_row_groups(list(range(0, groups, max(step, 1))), columns=list(_COLUMNS))
-    held = pa.array(["confirmed", "coasted"])
     status = table["track_status"]
     if pa.types.is_dictionary(status.type):
         status = status.cast(status.type.value_type)
-    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, held)))
+    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, pa.array(HELD))))
     if table.num_rows == 0:
         return None
     return {name: np.asarray(table[name].to_numpy(zero_copy_only=False)) for name in _COLUMNS}

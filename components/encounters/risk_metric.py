@@ -14,7 +14,6 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.flown_flights import read_flights
 from components.metrics.losses import nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
@@ -133,13 +132,13 @@ class RiskRatios(Mitigated):
         found = dict(super().measure(group))
         if self.p.needless:
             told = np.zeros(len(group))
-            told[list(self._steering.of(group))] = 1.0
+            told[list(self.manoeuvres(group))] = 1.0
             kept = 1.0 - found["well_clear_lost_nominal"]
             found |= {_KEPT: kept, _TOLD: told, _NEEDLESS: kept * told}
         if self._weight is not None:
             found |= self._weight.measure(group)
         if self.p.by:
-            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg)
+            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)

@@ -1,10 +1,8 @@
 """What globes show of a run: flights, tracks, alerts and detections, in the colours of the kit."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
@@ -13,9 +11,10 @@ from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
 from components.export.alert_levels import Alert, alerts_of
 from components.export.track_places import POSE, estimated_places, held_places
-from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES
+from components.messages.state_tracks import HELD
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark
+from dsa_des.errors import UsageError
 
 #: A run has no date; its second 0 is put here.
 START = datetime(2000, 1, 1, tzinfo=UTC)
@@ -131,12 +130,9 @@ def when(time_s: float) -> str:
 def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
     """Return how blocks of a run are marked, by the types that its scene gives them."""
     try:
-        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
-        blocks: Any = scene.get("blocks", {})
-        types = {name: str(blocks.get(name, {}).get("type", "")) for name in names}
-    except (OSError, ValueError, AttributeError):
-        types = dict.fromkeys(names, "")
-    return block_marks(types)
+        return block_marks(run.block_types(names))
+    except (UsageError, AttributeError):  # another program's scene
+        return block_marks(dict.fromkeys(names, ""))
 
 
 def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) -> Course | None:
@@ -180,7 +176,7 @@ def _estimated(run: RecordedTables) -> Iterator[Course]:
     blocks = run.texts("state_tracks", "block")
     names = [(blocks[row] or "", f"#{n}") for row, n in zip(rows.tolist(), numbers, strict=True)]
     lives = status != "deleted"
-    sure = np.isin(status, [STATUSES[CONFIRMED], STATUSES[COASTED]])
+    sure = np.isin(status, HELD)
     for name, mine in _grouped(names):
         if sure[mine].any():
             mine = mine[lives[mine]]

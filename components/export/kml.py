@@ -1,6 +1,5 @@
 """A run as KML (OGC 07-147r2, with Google's tracks), whose heights are above sea level."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
@@ -8,6 +7,7 @@ from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK
 from components.export.globe_run import Course, GlobeRun, Seen, globe_run, when
 from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
 from dsa_des.text.safe_text import printable
 
 #: Google's icons, which globes know by their addresses, for markers of figures.
@@ -23,10 +23,9 @@ _DOT, _RING, _PLANE = "shaded_dot", "donut", "airports"
 def undulation_of(run: RecordedTables) -> float | None:
     """Return the geoid's height above the ellipsoid (m) that a run's scene says of its terrain."""
     try:
-        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
-        terrain = scene.get("terrain", {})
+        terrain = run.scene.get("terrain", {})
         return float(terrain["raster_offset_m"]) if "raster" in terrain else None
-    except (OSError, ValueError, LookupError, TypeError):
+    except (UsageError, ValueError, LookupError, TypeError):
         return None
 
 

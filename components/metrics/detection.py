@@ -2,8 +2,7 @@
 (``first_detection``, ``declaration``, ``detection_share``)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -236,8 +235,7 @@ class Declaration(TargetMetric):
         return found
 
 
-@dataclass(frozen=True, eq=False)
-class Declared:
+class Declared(NamedTuple):
     """The first declaration of a target by a sensor, and its first detection, (replicas,) each.
 
     NaN where there is none; ``at_start`` where it is as early as the start of the run lets it.
@@ -245,8 +243,8 @@ class Declared:
 
     time_s: FloatArray
     range_m: FloatArray
-    seen_s: FloatArray
     at_start: BoolArray
+    seen_s: FloatArray
     seen_at_start: BoolArray
 
 
@@ -284,8 +282,8 @@ def _declarations(
         found[name] = Declared(
             time_s,
             taken(columns, "true_range_m", first),
-            seen_s,
             at_start(group, name, time_s, scans),
+            seen_s,
             at_start(group, name, seen_s),
         )
     found[ANY] = _earliest(list(found.values()), count)
@@ -299,20 +297,15 @@ def needed(m: int | None, scene: Scene, name: str) -> int:
 
 def _earliest(each: list[Declared], count: int) -> Declared:
     """Return the first declaration, and the first detection, of any sensor."""
-
-    def joined(name: str) -> AnyArray:
-        return np.array([getattr(one, name) for one in each]).reshape(len(each), count)
+    time_s, range_m, at_start, seen_s, seen_at_start = map(np.array, zip(*each, strict=True))
 
     def first(time_s: AnyArray) -> Any:
-        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0)[np.newaxis]
+        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0), np.arange(count)
 
-    declared, seen = first(joined("time_s")), first(joined("seen_s"))
-    values = [
-        np.take_along_axis(joined(name), which, axis=0)[0]
-        for name, which in (("time_s", declared), ("range_m", declared), ("seen_s", seen),
-                            ("at_start", declared), ("seen_at_start", seen))
-    ]  # fmt: skip
-    return Declared(*values)
+    declared, seen = first(time_s), first(seen_s)
+    return Declared(
+        time_s[declared], range_m[declared], at_start[declared], seen_s[seen], seen_at_start[seen]
+    )
 
 
 def _m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:

@@ -13,11 +13,10 @@ from pydantic import Field
 
 from components.metrics.censored import END, START, in_scan, said
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
-from components.metrics.flown_flights import Read, RecordedManoeuvres, each_alone, read_flights
+from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
     SCANS,
-    TargetMetric,
     TargetParameters,
     is_named,
     of_target,
@@ -100,21 +99,13 @@ class WellClearParameters(EncounterParameters, SizeParameters):
     step_s: float | None = STEP  # type: ignore[assignment]
 
 
-class _Encounter(TargetMetric):
+class _Encounter(FlownMetric):
     Parameters = EncounterParameters
     tables = {**DECLARED, **SCANS}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        traffic_block(scene)
         self.sensors = sensors_of(scene, parameters.sensors)
-        self._steering = RecordedManoeuvres(scene)
-        self.tables = {**self.tables, **self._steering.tables}
-
-    def of_flights(self, group: Group, read: Read) -> FloatArray:
-        """Return what `read` makes of every replica's flights as flown, (values, replicas)."""
-        steering = self._steering.of(group)
-        return read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
 
 
 class ClosestApproach(_Encounter):
@@ -144,7 +135,7 @@ class ClosestApproach(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        distance, time_s, code = self.of_flights(group, each_alone(_closest))
+        distance, time_s, code = self.of_flights(group, each_alone(_closest), to_the_end=True)
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
         found: dict[str, AnyArray] = {
@@ -191,7 +182,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s)
+        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, to_the_end=True)
         lost_at_start = in_scan(lost_s, begun_s)
         found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
@@ -242,7 +233,7 @@ class AlertTimeParameters(TargetParameters, SizeParameters):
     )
 
 
-class AlertTimes(TargetMetric):
+class AlertTimes(FlownMetric):
     """When alerts come before well clear is lost, and which are late, missed or for nothing.
 
     Where the ownship is steered, losses are by default those of what it would have flown: an alert
@@ -258,14 +249,11 @@ class AlertTimes(TargetMetric):
     tables = {"alerts": ("block", "target", "time_s", "level")}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
-        super().__init__(parameters, scene)
+        super().__init__(parameters, scene, steered=parameters.steered)
         traffic = traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = recorded_by(scene, "alerts")
-        if parameters.steered:
-            self._steering = RecordedManoeuvres(scene)
-            self.tables = {**self.tables, **self._steering.tables}
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
@@ -286,11 +274,7 @@ class AlertTimes(TargetMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        steering = self._steering.of(group) if self.p.steered else None
-        lost_s, nmac_s, _ = read_flights(
-            group, self.p.step_s, self.p.target, self.p.losses_s, steering,
-            to_the_end=self._as_flown,
-        )  # fmt: skip
+        lost_s, nmac_s, _ = self.of_flights(group, self.p.losses_s, to_the_end=self._as_flown)
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

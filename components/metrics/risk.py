@@ -12,15 +12,15 @@ import numpy as np
 from pydantic import Field
 
 from components.metrics.encounter import STEP, SizeParameters, size
-from components.metrics.flown_flights import RecordedManoeuvres, each_alone, read_flights
-from components.metrics.rows import TargetMetric, TargetParameters
+from components.metrics.flown_flights import FlownMetric, each_alone
+from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Result
 
 __all__ = [
     "METHODS", "Mitigated", "RiskParameters", "RiskRatio", "Severity", "risk_ratio",
@@ -41,18 +41,16 @@ class RiskParameters(SizeParameters):
     step_s: float | None = STEP
 
 
-class Mitigated(Metric):
+class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
     Parameters = RiskParameters
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self._steering = RecordedManoeuvres(scene)
-        if not self._steering:
+        if not self.delays_s:
             name = traffic_block(scene).name
             raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
-        self.tables = {**self.tables, **self._steering.tables}
 
     def results(self) -> list[Result]:
         """Return both events, nominal and mitigated."""
@@ -66,13 +64,11 @@ class Mitigated(Metric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         read = self.p.losses_s
-        nominal = read_flights(group, self.p.step_s, None, read)[:2]
-        steering = self._steering.of(group)
-        mitigated = read_flights(group, self.p.step_s, None, read, steering)[:2]
         found: dict[str, AnyArray] = {}
-        for k, name in enumerate(("well_clear_lost", "nmac")):
-            found[f"{name}_nominal"] = (~np.isnan(nominal[k])).astype(float)
-            found[f"{name}_mitigated"] = (~np.isnan(mitigated[k])).astype(float)
+        for which, steered in (("nominal", False), ("mitigated", True)):
+            lost_s, collision_s, _ = self.of_flights(group, read, steered=steered)
+            found[f"well_clear_lost_{which}"] = (~np.isnan(lost_s)).astype(float)
+            found[f"nmac_{which}"] = (~np.isnan(collision_s)).astype(float)
         return found
 
 
@@ -100,20 +96,13 @@ class SeverityParameters(TargetParameters):
     )
 
 
-class Severity(TargetMetric):
+class Severity(FlownMetric):
     """Largest severity of a loss of well clear, and probability of a near mid-air collision.
 
     Of several targets the most severe counts, for each of the two by itself.
     """
 
     Parameters = SeverityParameters
-    tables: Any = {}
-
-    def __init__(self, parameters: Any, scene: Scene) -> None:
-        super().__init__(parameters, scene)
-        traffic_block(scene)
-        self._steering = RecordedManoeuvres(scene)
-        self.tables = self._steering.tables
 
     def results(self) -> list[Result]:
         """Return both."""
@@ -130,8 +119,7 @@ class Severity(TargetMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
-        read, steering = each_alone(self._severities), self._steering.of(group)
-        found = read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
+        found = self.of_flights(group, each_alone(self._severities), to_the_end=True)
         return {"slowc_percent": found[0], "pnmac": found[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:

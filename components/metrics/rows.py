@@ -37,15 +37,15 @@ class SensorMetricParameters(TargetParameters):
 
 
 class TargetMetric(Metric):
-    """A metric of one target, or of any."""
+    """A metric of one target, where its parameters name one, or of any."""
 
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Refuse a target that the traffic does not have."""
         sources = [block for block in blocks.values() if isinstance(block, TrafficSource)]
         names = [target.name for source in sources for target in source.targets]
-        if sources and self.p.target is not None and self.p.target not in names:
-            hint = did_you_mean(self.p.target, names)
-            raise ValueError(f"target: there is no {self.p.target!r}{hint}")
+        target = getattr(self.p, "target", None)
+        if sources and target is not None and target not in names:
+            raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")
 
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import STATUSES
+from components.messages.state_tracks import held
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -87,10 +87,9 @@ class ErrorsByRange(Metric):
         """Return the sample of every replica at every range."""
         found = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
-        held = np.isin(columns["track_status"].codes, _confirmed(columns["track_status"].names))
-        held &= np.asarray(columns["has_range"], dtype=bool)
-        replica = np.asarray(columns["replica"])[held]
-        rows = np.flatnonzero(held)
+        kept = held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
+        replica = np.asarray(columns["replica"])[kept]
+        rows = np.flatnonzero(kept)
         starts = np.searchsorted(replica, np.arange(len(group) + 1))
         for number, scene in enumerate(group.scenes):
             mine = rows[starts[number] : starts[number + 1]]
@@ -160,7 +159,3 @@ def _nearest(range_m: FloatArray, wanted_m: float, seen: BoolArray) -> int:
     apart = np.where(seen, np.abs(range_m - wanted_m), np.inf)
     k = int(np.argmin(apart))
     return k if apart[k] <= 0.5 * MILE_M else -1
-
-
-def _confirmed(names: tuple[str, ...]) -> list[int]:
-    return [code for code, name in enumerate(names) if name in STATUSES[1:3]]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.display.map_view import outline_of
-from components.display.symbols import styles_of
+from components.display.symbols import gridded, styles_of
 from components.sensor import marks
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -49,8 +49,7 @@ def panels(
         figure.set_layout_engine("constrained")
         axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
         for one in axes:
-            one.grid(color="#DDDDDD", linewidth=0.5)
-            one.set_axisbelow(True)
+            gridded(one)
         yield axes
 
 
