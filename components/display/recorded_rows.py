@@ -4,7 +4,7 @@ Detections are thinned where they are many; of scans each sensor's count, times 
 kept, and single scans of a part of the run.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -75,23 +75,26 @@ class Detected:
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
         """Read the table ``detections`` of a run folder, if there is one."""
-        rows = ThinnedStream(MOST_ROWS, 2)
         known: dict[str, int] = {}
         series: dict[tuple[str, int], int] = {}
-        for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
-            code, names = group["target"]
-            # Codes of a row group speak of that row group's names only.
-            lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
-            index = np.flatnonzero(code >= 0)  # a false alarm has no place to be marked at
-            block, blocks = group["block"]
-            pair, which = np.unique(block[index] * len(lookup) + code[index], return_inverse=True)
-            ids = [
-                series.setdefault((blocks[a], int(lookup[b])), len(series))
-                for a, b in zip(*(part.tolist() for part in divmod(pair, len(lookup))), strict=True)
-            ]
-            number = np.array(ids, dtype=np.int64)[which]
-            rows.add(number, group["time_s"][index], group["true_range_m"][index])
-        number, (time_s, range_m) = rows.rows()
+
+        def pieces() -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+            for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
+                code, names = group["target"]
+                # Codes of a row group speak of that row group's names only.
+                lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
+                index = np.flatnonzero(code >= 0)  # a false alarm is marked nowhere
+                block, blocks = group["block"]
+                pair = block[index] * len(lookup) + code[index]
+                pair, which = np.unique(pair, return_inverse=True)
+                ids = [
+                    series.setdefault((blocks[a], int(lookup[b])), len(series))
+                    for a, b in zip(*(p.tolist() for p in divmod(pair, len(lookup))), strict=True)
+                ]
+                number = np.array(ids, dtype=np.int64)[which]
+                yield number, group["time_s"][index], group["true_range_m"][index]
+
+        number, (time_s, range_m) = thinned(pieces, MOST_ROWS, 2)
         all_sensors = sorted({*sensors, *(name for name, _ in series)})
         sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
         target = np.array([target for _, target in series], dtype=np.int64)[number]
@@ -105,41 +108,29 @@ class Detected:
         )
 
 
-class ThinnedStream:
-    """Rows of many series that come piece by piece, of which no more are kept than fit.
+def thinned(
+    pieces: Callable[[], Iterable[tuple[Any, ...]]], most: int, columns: int
+) -> tuple[IntArray, list[FloatArray]]:
+    """Return the rows that are kept of many series: their series and columns, in order.
 
-    Every series keeps its first row and every n-th from there on, with n a power of two that
-    follows from how many rows each series has. So what is kept rests on the rows, not on the
-    pieces they came in, and a series with few rows keeps them beside one with millions. More rows
-    than `most` are never kept, unless there are more series: each keeps one.
+    Pieces are read twice, first to count; each is the rows' series 0, 1, 2, ... and columns. Every
+    series keeps its first row and every n-th from there on (`strides`), so a series with few rows
+    keeps them beside one with millions, whatever the pieces.
     """
-
-    def __init__(self, most: int, columns: int) -> None:
-        self._most = most
-        self._series: IntArray = np.empty(0, dtype=np.int64)
-        #: How many rows of its series came before each row that is kept.
-        self._number: IntArray = np.empty(0, dtype=np.int64)
-        self._columns: list[FloatArray] = [np.empty(0) for _ in range(columns)]
-        self._seen: IntArray = np.empty(0, dtype=np.int64)
-
-    def add(self, series: IntArray, *columns: FloatArray) -> None:
-        """Take rows, `most` or fewer at a time, of series 0, 1, 2, ... with none left out."""
-        new = int(series.max(initial=-1)) + 1 - len(self._seen)
-        self._seen = np.concatenate((self._seen, np.zeros(max(0, new), dtype=np.int64)))
-        number = self._seen[series] + places_in_groups(series)
-        self._seen += np.bincount(series, minlength=len(self._seen))
-        every = strides(self._seen, self._most)
-        old, more = self._number % every[self._series] == 0, number % every[series] == 0
-        self._series = np.concatenate((self._series[old], series[more]))
-        self._number = np.concatenate((self._number[old], number[more]))
-        self._columns = [
-            np.concatenate((kept[old], column[more]))
-            for kept, column in zip(self._columns, columns, strict=True)
-        ]
-
-    def rows(self) -> tuple[IntArray, list[FloatArray]]:
-        """Return the series and the columns of the rows that are kept, in the order they came."""
-        return self._series, self._columns
+    counts: IntArray = np.empty(0, dtype=np.int64)
+    for series, *_ in pieces():
+        counts = np.bincount(series, minlength=len(counts)) + np.pad(
+            counts, (0, max(0, int(series.max(initial=-1)) + 1 - len(counts)))
+        )
+    every, before = strides(counts, most), np.zeros_like(counts)
+    found: list[list[Any]] = [[np.empty(0, np.int64)], *([np.empty(0)] for _ in range(columns))]
+    for series, *values in pieces():
+        kept = (before[series] + places_in_groups(series)) % every[series] == 0
+        before += np.bincount(series, minlength=len(before))
+        for parts, column in zip(found, (series, *values), strict=True):
+            parts.append(column[kept])
+    series, *values = map(np.concatenate, found)
+    return series, values
 
 
 def strides(counts: IntArray, most: int) -> IntArray:

@@ -287,24 +287,23 @@ class Lookout(Sensor):
         For who was not found before. A search that comes round finds it with the share of a round
         for which it showed, over all phases.
         """
-        which = np.arange(len(cells))
-        total = np.zeros(len(cells))
+        expected = self._expected(cells, np.arange(len(cells)))
+        return np.minimum(expected, 1.0) if self.p.search == "round" else -np.expm1(-expected)
+
+    def _expected(self, cells: Cells, which: IntArray) -> FloatArray:
+        """Return the expected number of acquisitions of some cells since the last scan."""
+        total = np.zeros(len(which))
         for seat in self._seats:
-            share = self._share(seat, cells, which)
-            total += share * self._searched(seat, cells, which)
-        if self.p.search == "round":
-            return np.minimum(total, 1.0)
-        return -np.expm1(-total)
+            total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+        return total
 
     def _found(self, cells: Cells, which: IntArray) -> BoolArray:
         """Return which of some cells' aircraft are found since the last scan."""
         if self.p.search == "random":
-            total = np.zeros(len(which))
-            for seat in self._seats:
-                total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+            expected = self._expected(cells, which)
             keys = cells.roster.keys_of(cells.target[which])
             drawn = self._finds.of_runs(cells.run[which]).uniform(keys, cells.scan[which])
-            return np.asarray(drawn < -np.expm1(-total))
+            return np.asarray(drawn < -np.expm1(-expected))
         found = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
             found |= self._meets(seat, cells, which)
@@ -344,13 +343,11 @@ class Lookout(Sensor):
         ahead_s = -np.remainder(now_s - phase_s, round_s)
         in_time = np.flatnonzero(-ahead_s < self._before_s(cells, mine))
         met = np.zeros(len(which), dtype=bool)
-        if len(in_time):
-            there: Any = cells
-            if self.p.between_scans == "integral":
-                there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
-                met[looks[in_time]] = self._shows(seat, there)
-            else:
-                met[looks[in_time]] = self._shows(seat, there)[mine[in_time]]
+        if len(in_time) and self.p.between_scans == "integral":
+            there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
+            met[looks[in_time]] = self._shows(seat, there)
+        elif len(in_time):
+            met[looks[in_time]] = self._shows(seat, cells)[mine[in_time]]
         return met
 
     def _before_s(self, cells: Cells, which: IntArray) -> FloatArray:
