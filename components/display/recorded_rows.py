@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from components.display.summary import rows_by_name
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark
+from dsa_des.block.message import Text
 
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
@@ -26,7 +28,7 @@ _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Give columns of each row group that has rows, in order; a table that is not there has none.
 
-    They are arrays, text is codes (-1 is null) and names.
+    They are arrays, texts a `Text`.
     """
     if not path.is_file():
         return
@@ -47,14 +49,13 @@ def _array(column: Any, text: bool) -> Any:
         column = column.unify_dictionaries()
     chunks = column.chunks
     codes = [chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False) for chunk in chunks]
-    return np.concatenate(codes).astype(np.int64), chunks[0].dictionary.to_pylist()
+    return Text(np.concatenate(codes).astype(np.int64), tuple(chunks[0].dictionary.to_pylist()))
 
 
-def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, list[str]]]:
+def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
     """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
     for rows in each_row_group(folder / "fused.parquet", ("time_s", "sensors")):
-        code, names = rows["sensors"]
-        yield rows["time_s"], code, names
+        yield rows["time_s"], rows["sensors"].codes, rows["sensors"].names
 
 
 @dataclass
@@ -80,11 +81,11 @@ class Detected:
 
         def pieces() -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
             for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
-                code, names = group["target"]
+                code, names = group["target"].codes, group["target"].names
                 # Codes of a row group speak of that row group's names only.
                 lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
                 index = np.flatnonzero(code >= 0)  # a false alarm is marked nowhere
-                block, blocks = group["block"]
+                block, blocks = group["block"].codes, group["block"].names
                 pair = block[index] * len(lookup) + code[index]
                 pair, which = np.unique(pair, return_inverse=True)
                 ids = [
@@ -235,11 +236,7 @@ def scans_between(
 
 def _by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return for each sensor of a row group its times, and those of scans with a detection."""
-    code, names = rows["block"]
-    found = {}
-    for number, name in enumerate(names):
-        mine = code == number
-        if mine.any():
-            time_s = rows["time_s"][mine]
-            found[name] = time_s, time_s[rows["detected"][mine] > 0]
-    return found
+    return {
+        name: (rows["time_s"][mine], rows["time_s"][mine[rows["detected"][mine] > 0]])
+        for name, mine in rows_by_name(rows["block"])
+    }

@@ -25,28 +25,16 @@ _PLACE = ("lon_deg", "lat_deg", "alt_m")
 
 @dataclass(frozen=True)
 class Course:
-    """Where something was: a flight, a track, or what an alert was about while it lasted.
-
-    Parameters
-    ----------
-    name : str
-    colour : str
-        ``#rrggbb``.
-    time_s : (n,)
-        Ascending.
-    place : (n, 3)
-        Longitude, latitude (deg) and height above the ellipsoid (m).
-    group : str
-        The tracker or the alerting block; empty of a flight.
-    level : int
-        Of an alert, else 0.
-    """
+    """A flight, a track, or what an alert was about while it lasted, in ascending time."""
 
     name: str
     colour: str
     time_s: FloatArray
+    #: Longitude, latitude (deg) and height above the ellipsoid (m), (n, 3).
     place: FloatArray
+    #: The tracker or the alerting block; empty of a flight.
     group: str = ""
+    #: Of an alert, else 0.
     level: int = 0
 
     def between(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:

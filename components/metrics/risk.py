@@ -72,18 +72,12 @@ class Mitigated(FlownMetric):
         return found
 
 
-class SeverityParameters(TargetParameters):
+class SeverityParameters(TargetParameters, SizeParameters):
     """Sizes of the boundary, and whose altimeters are which."""
 
     horizontal_m: float = size(4000 * FOOT_M, "Horizontal size of well clear, m.")
     vertical_m: float = size(450 * FOOT_M, "Vertical size of well clear, m.")
     tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
-    nmac_horizontal_m: float = size(
-        500 * FOOT_M, "Horizontal distance of a near mid-air collision, m."
-    )
-    nmac_vertical_m: float = size(
-        100 * FOOT_M, "Difference in height of a near mid-air collision, m."
-    )
     mode_c_own: bool = Field(
         default=False,
         description="The ownship's altimeter is that of Mode C, or of no transponder.",
