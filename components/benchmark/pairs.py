@@ -53,8 +53,8 @@ def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
 
 
 def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
-    (found,) = chosen([case])
-    return scene_of(found, quick=quick, sets=_SHARED), scene_of(found, quick=quick)
+    (result,) = chosen([case])
+    return scene_of(result, quick=quick, sets=_SHARED), scene_of(result, quick=quick)
 
 
 def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:

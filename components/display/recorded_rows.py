@@ -124,13 +124,13 @@ def thinned(
             counts, (0, max(0, int(series.max(initial=-1)) + 1 - len(counts)))
         )
     every, before = strides(counts, most), np.zeros_like(counts)
-    found: list[list[Any]] = [[np.empty(0, np.int64)], *([np.empty(0)] for _ in range(columns))]
+    result: list[list[Any]] = [[np.empty(0, np.int64)], *([np.empty(0)] for _ in range(columns))]
     for series, *values in pieces():
-        kept = (before[series] + places_in_groups(series)) % every[series] == 0
+        kept = (before[series] + index_in_groups(series)) % every[series] == 0
         before += np.bincount(series, minlength=len(before))
-        for parts, column in zip(found, (series, *values), strict=True):
+        for parts, column in zip(result, (series, *values), strict=True):
             parts.append(column[kept])
-    series, *values = map(np.concatenate, found)
+    series, *values = map(np.concatenate, result)
     return series, values
 
 
@@ -153,14 +153,14 @@ def strides(counts: IntArray, most: int) -> IntArray:
     return every
 
 
-def places_in_groups(group: IntArray) -> IntArray:
+def index_in_groups(group: IntArray) -> IntArray:
     """Return how many rows of its own group come before each row, shape (rows,)."""
     order = np.argsort(group, kind="stable")
     starts = np.flatnonzero(np.diff(group[order], prepend=-1))
     lengths = np.diff(starts, append=len(group))
-    places = np.empty(len(group), dtype=np.int64)
-    places[order] = np.arange(len(group)) - np.repeat(starts, lengths)
-    return places
+    indices = np.empty(len(group), dtype=np.int64)
+    indices[order] = np.arange(len(group)) - np.repeat(starts, lengths)
+    return indices
 
 
 @dataclass
@@ -197,16 +197,16 @@ class ScansShown:
 
 def read_scans(folder: Path) -> dict[str, SensorScans]:
     """Return what the table ``scans`` of a run folder says of each sensor, by name."""
-    found: dict[str, SensorScans] = {}
+    result: dict[str, SensorScans] = {}
     for rows in each_row_group(folder / "scans.parquet", _SCANS):
         for name, (time_s, hit_s) in _by_sensor(rows).items():
             first, last = float(time_s[0]), float(time_s[-1])
-            scans = found.setdefault(name, SensorScans(0, first, last, None))
+            scans = result.setdefault(name, SensorScans(0, first, last, None))
             scans.count += len(time_s)
             scans.last_s = last
             if scans.first_hit_s is None and len(hit_s):
                 scans.first_hit_s = float(hit_s[0])
-    return dict(sorted(found.items()))
+    return dict(sorted(result.items()))
 
 
 def scans_between(

@@ -74,7 +74,7 @@ class RecordedTables:
         names = self.texts("truth", "target")
         if OWNSHIP in names:
             raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
-        found: dict[str, dict[str, FloatArray]] = {}
+        result: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
         self.refuse_large("truth", columns)
         aircraft = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
@@ -83,8 +83,8 @@ class RecordedTables:
             mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
             time_s, first = np.unique(columns["time_s"][mine], return_index=True)
             if len(time_s):
-                found[name] = {key: values[mine][first] for key, values in columns.items()}
-        return found
+                result[name] = {key: values[mine][first] for key, values in columns.items()}
+        return result
 
     def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
         """Refuse what is no number, or greater than any of a run, by name and row."""
@@ -107,12 +107,12 @@ class RecordedTables:
 
     def texts(self, table: str, name: str) -> list[str | None]:
         """Return a column of texts, as `numbers` does one of numbers."""
-        found = self._column(table, name).to_pylist()
-        if not all(text is None or isinstance(text, str) for text in found):
+        result = self._column(table, name).to_pylist()
+        if not all(text is None or isinstance(text, str) for text in result):
             raise UsageError(
                 f"{self.folder}: {table}.parquet: {name} holds something else than text"
             )
-        return found
+        return result
 
     def values(self, table: str, name: str) -> Any:
         """Return a column of texts as a list, any other as an array of its own type."""
@@ -121,8 +121,8 @@ class RecordedTables:
         if (table, name) not in self._kept:
             column = self._column(table, name)
             text = pa.types.is_string(column.type) or pa.types.is_dictionary(column.type)
-            found = column.to_pylist() if text else column.to_numpy(zero_copy_only=False)
-            self._kept[table, name] = found
+            result = column.to_pylist() if text else column.to_numpy(zero_copy_only=False)
+            self._kept[table, name] = result
         return self._kept[table, name]
 
     def _column(self, table: str, name: str) -> Any:

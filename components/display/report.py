@@ -147,11 +147,11 @@ def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float,
 def _firsts(
     detections: Mapping[tuple[str, int], tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
-    found: dict[str, tuple[float, float]] = {}
+    result: dict[str, tuple[float, float]] = {}
     for (name, _), seen in detections.items():
-        if name not in found or seen[0] < found[name][0]:
-            found[name] = seen
-    return found
+        if name not in result or seen[0] < result[name][0]:
+            result[name] = seen
+    return result
 
 
 def _fused_share(tables: Mapping[str, Any]) -> float | None:

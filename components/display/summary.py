@@ -140,10 +140,10 @@ class _Sensor:
         """Return a sighting, and whether the sensor's first or last scan censors it."""
         if seen is None:
             return None
-        found = seen.result()
+        result = seen.result()
         if self.span is not None and in_scan(seen.tick, self.span[end]):
-            found["at"] = (START, END)[end]
-        return found
+            result["at"] = (START, END)[end]
+        return result
 
 
 class _Sighting(NamedTuple):

@@ -70,14 +70,14 @@ def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
         name: next((mark for start, mark in _KINDS if kind.startswith(start)), None)
         for name, kind in types.items()
     }
-    found = told_apart(kinds)
+    result = told_apart(kinds)
     before: dict[Mark, int] = {}
     for name, kind in sorted(kinds.items()):
         if kind is not None:
             again = before.get(kind, 0)
             before[kind] = again + 1
-            found[name] = replace(found[name], colour=_shade(kind.colour, again))
-    return found
+            result[name] = replace(result[name], colour=_shade(kind.colour, again))
+    return result
 
 
 def _shade(colour: str, again: int) -> str:
@@ -150,11 +150,11 @@ def name_lines(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
             ends.append((float(y[seen[-1]]), float(x[seen[-1]]), name))
     height_pt = axes.get_window_extent().height * 72 / axes.figure.dpi
     step = 1.25 * _NAME_PT / height_pt * (high - low)
-    places: list[float] = []
+    heights: list[float] = []
     for y, _, _ in sorted(ends):
-        places.append(max(y, places[-1] + step) if places else y)
-    over = max(0.0, places[-1] - high) if places else 0.0
-    for (y, x, name), at in zip(sorted(ends), places, strict=True):
+        heights.append(max(y, heights[-1] + step) if heights else y)
+    over = max(0.0, heights[-1] - high) if heights else 0.0
+    for (y, x, name), at in zip(sorted(ends), heights, strict=True):
         axes.annotate(
             figure_text(name, 14), (x, y), xytext=(4.0, (at - over - y) * height_pt / (high - low)),
             textcoords="offset points", fontsize=_NAME_PT, color=colour, va="center",

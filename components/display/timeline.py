@@ -124,15 +124,15 @@ def _first_joined(folder: Path, sensors: int) -> tuple[float, int] | None:
 
 
 def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
-    found: set[tuple[float, str]] = set()
+    result: set[tuple[float, str]] = set()
     for time_s, code, names in read_fused(folder):
         low, high = np.searchsorted(time_s, [start_s, end_s])
         for row in range(int(low), int(high)):
             if "+" in names[code[row]]:
-                found.add((float(time_s[row]), names[code[row]]))
+                result.add((float(time_s[row]), names[code[row]]))
         if len(time_s) and time_s[-1] > end_s:
             break
-    return [(time_s, name.split("+")) for time_s, name in sorted(found)]
+    return [(time_s, name.split("+")) for time_s, name in sorted(result)]
 
 
 def _draw_scans(

@@ -66,8 +66,8 @@ class DrawnTracks:
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
         several = len(self.blocks) > 1
-        for place, block in enumerate(self.blocks):
-            turn = place
+        for index, block in enumerate(self.blocks):
+            turn = index
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -195,11 +195,11 @@ def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
             Line2D(
                 [],
                 [],
-                color=COLOURS[place % len(COLOURS)],
+                color=COLOURS[index % len(COLOURS)],
                 linewidth=1.4,
                 label=figure_text(block, 16) if blocks[1:] else alone,
             )
-            for place, block in enumerate(blocks)
+            for index, block in enumerate(blocks)
         ),
     ]
     if many <= MOST_SPREADS:

@@ -50,7 +50,7 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
     if "alerts" not in run.tables:
         return []
     on: dict[Any, Alert] = {}
-    found = []
+    result = []
     rows = sorted(run.tables["alerts"].to_pylist(), key=_look)
     for (time_s, block), look in groupby(rows, key=_look):
         now = {(block, _about(row)): row for row in look}
@@ -64,10 +64,10 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
                     on.pop(about).end_s = time_s
             elif about not in on:
                 on[about] = Alert(block, row["target"], row.get("track"), [(time_s, level)])
-                found.append(on[about])
+                result.append(on[about])
             elif on[about].levels[-1][1] != level:
                 on[about].levels.append((time_s, level))
-    return found
+    return result
 
 
 def _look(row: dict[str, Any]) -> tuple[float, str]:

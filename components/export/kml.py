@@ -59,7 +59,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
 
 def _look_at(shown: GlobeRun, geoid_m: float) -> list[str]:
     """Return where a globe looks when it opens the file: at where the ownship begins."""
-    lon, lat, alt = shown.flights[0].place[0].tolist()
+    lon, lat, alt = shown.flights[0].position[0].tolist()
     return [
         "<LookAt>",
         f"<longitude>{lon}</longitude><latitude>{lat}</latitude>",
@@ -127,21 +127,21 @@ def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]
             f"<styleUrl>#{_id(of_one)}</styleUrl><gx:Track>",
             "<altitudeMode>absolute</altitudeMode>",
             *(f"<when>{when(t)}</when>" for t in one.time_s.tolist()),
-            *_coordinates(one.place, geoid_m),
+            *_coordinates(one.position, geoid_m),
             "</gx:Track></Placemark>",
         ]
     return lines
 
 
-def _coordinates(place: FloatArray, geoid_m: float) -> Iterator[str]:
-    for lon, lat, alt in place.tolist():
+def _coordinates(position: FloatArray, geoid_m: float) -> Iterator[str]:
+    for lon, lat, alt in position.tolist():
         yield f"<gx:coord>{lon} {lat} {alt - geoid_m}</gx:coord>"
 
 
 def _points(seen: Sequence[Seen], geoid_m: float) -> list[str]:
     lines = []
     for one in seen:
-        lon, lat, alt = one.place
+        lon, lat, alt = one.position
         lines += [
             f"<Placemark><name>{_xml(one.name)}</name>",
             f"<TimeStamp><when>{when(one.time_s)}</when></TimeStamp>",

@@ -116,13 +116,13 @@ class ClosestApproach(_Encounter):
 
     def results(self) -> list[Result]:
         """Return distance, time, and times from detection and declaration."""
-        found = [
+        results = [
             Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF, least=0.0),
             Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF, least=0.0),
         ]
         for name in [*self.sensors, ANY]:
             seen, declared = (f"{what}_to_closest_cut_off.{name}" for what in _BEFORE)
-            found += [
+            results += [
                 Result(
                     f"detection_to_closest_s.{name}", NUMBER, "from first detection to it, s", seen
                 ),
@@ -131,14 +131,14 @@ class ClosestApproach(_Encounter):
                     declared,
                 ),
             ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         distance, time_s, code = self.of_flights(group, each_alone(_closest), to_the_end=True)
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
-        found: dict[str, AnyArray] = {
+        values: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,
             _CUT_OFF: said(at, distance),
@@ -147,9 +147,9 @@ class ClosestApproach(_Encounter):
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
                 value = time_s - when_s
-                found[f"{what}_to_closest_s.{name}"] = value
-                found[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
-        return found
+                values[f"{what}_to_closest_s.{name}"] = value
+                values[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
+        return values
 
 
 class WellClear(_Encounter):
@@ -160,7 +160,7 @@ class WellClear(_Encounter):
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
-        found = [
+        results = [
             Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
             Result("nmac", EVENT, _cylinder_text(self.p.sizes_m[1], _NMAC)),
             Result(
@@ -171,20 +171,20 @@ class WellClear(_Encounter):
                 least=0.0,
             ),
         ]
-        found += [
+        results += [
             Result(
                 f"warning_time_s.{name}", NUMBER, "from declaration to the loss, s",
                 f"warning_cut_off.{name}",
             )
             for name in [*self.sensors, ANY]
         ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, to_the_end=True)
         lost_at_start = in_scan(lost_s, begun_s)
-        found: dict[str, AnyArray] = {
+        values: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
             "nmac": (~np.isnan(collision_s)).astype(float),
             "well_clear_loss_time_s": lost_s,
@@ -192,10 +192,10 @@ class WellClear(_Encounter):
         }
         for name, first in declarations(group, self.p, self.sensors).items():
             warning_s = lost_s - first.time_s
-            found[f"warning_time_s.{name}"] = warning_s
+            values[f"warning_time_s.{name}"] = warning_s
             cut = (first.at_start | lost_at_start) & ~np.isnan(warning_s)
-            found[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
-        return found
+            values[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
+        return values
 
 
 def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
@@ -257,9 +257,9 @@ class AlertTimes(FlownMetric):
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
-        found = []
+        results = []
         for name in self._blocks:
-            found += [
+            results += [
                 Result(
                     f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s", least=0.0
                 ),
@@ -270,14 +270,14 @@ class AlertTimes(FlownMetric):
                 Result(f"alert_nuisance.{name}", EVENT, "alert, and well clear is never lost"),
                 Result(f"alert_surprise.{name}", EVENT, "alert hardly after the level below it"),
             ]
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         lost_s, nmac_s, _ = self.of_flights(group, self.p.losses_s, to_the_end=self._as_flown)
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
-        found: dict[str, AnyArray] = {}
+        values: dict[str, AnyArray] = {}
         for name in self._blocks:
             mine = counts & is_named(columns["block"], name)
             first_s = _first_s(columns, mine & (columns["level"] >= self.p.level), len(group))
@@ -286,9 +286,9 @@ class AlertTimes(FlownMetric):
             before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
-            found[f"first_alert_time_s.{name}"] = first_s
-            found[f"alert_to_loss_s.{name}"] = lead_s
-            found[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
+            values[f"first_alert_time_s.{name}"] = first_s
+            values[f"alert_to_loss_s.{name}"] = lead_s
+            values[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
             for what, event in {
                 "missed": missed,
@@ -296,8 +296,8 @@ class AlertTimes(FlownMetric):
                 "nuisance": alerted & ~lost,
                 "surprise": sudden,
             }.items():
-                found[f"alert_{what}.{name}"] = event.astype(float)
-        return found
+                values[f"alert_{what}.{name}"] = event.astype(float)
+        return values
 
 
 def _first_s(columns: Mapping[str, Any], rows: BoolArray, replicas: int) -> FloatArray:

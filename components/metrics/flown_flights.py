@@ -58,9 +58,9 @@ class FlownMetric(TargetMetric):
 
     def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
         """Return the manoeuvres of every replica of a group that has any."""
-        found: dict[int, list[tuple[float, Manoeuvre]]] = {}
+        result: dict[int, list[tuple[float, Manoeuvre]]] = {}
         if not self.delays_s:
-            return found
+            return result
         table: Any = group.tables["manoeuvres"]
         names = table["block"].names
         rows = zip(
@@ -72,8 +72,8 @@ class FlownMetric(TargetMetric):
                 continue
             came_s = time_s + self.delays_s[names[block]]
             if came_s < group.duration_s[replica]:
-                found.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
-        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in found.items()}
+                result.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
+        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in result.items()}
 
     def of_flights(
         self, group: Group, read: "Read", *, steered: bool = True, to_the_end: bool = False

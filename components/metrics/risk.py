@@ -64,12 +64,12 @@ class Mitigated(FlownMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         read = self.p.losses_s
-        found: dict[str, AnyArray] = {}
+        values: dict[str, AnyArray] = {}
         for which, steered in (("nominal", False), ("mitigated", True)):
             lost_s, collision_s, _ = self.of_flights(group, read, steered=steered)
-            found[f"well_clear_lost_{which}"] = (~np.isnan(lost_s)).astype(float)
-            found[f"nmac_{which}"] = (~np.isnan(collision_s)).astype(float)
-        return found
+            values[f"well_clear_lost_{which}"] = (~np.isnan(lost_s)).astype(float)
+            values[f"nmac_{which}"] = (~np.isnan(collision_s)).astype(float)
+        return values
 
 
 class SeverityParameters(TargetParameters, SizeParameters):
@@ -113,8 +113,8 @@ class Severity(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
-        found = self.of_flights(group, each_alone(self._severities), to_the_end=True)
-        return {"slowc_percent": found[0], "pnmac": found[1]}
+        values = self.of_flights(group, each_alone(self._severities), to_the_end=True)
+        return {"slowc_percent": values[0], "pnmac": values[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
         each = [(self._severity(flight), self._collision(flight)) for flight in flights]
@@ -135,10 +135,10 @@ class Severity(FlownMetric):
         for piece in flight.pieces():
             time_s = piece.time_s[np.isfinite(piece.range_m)]
             if len(time_s):
-                found = at(time_s)
-                place = int(np.argmax(found))
-                if not found[place] <= best:
-                    best, best_s = float(found[place]), float(time_s[place])
+                result = at(time_s)
+                index = int(np.argmax(result))
+                if not result[index] <= best:
+                    best, best_s = float(result[index]), float(time_s[index])
         if not best > 0.0:
             return best
         return max(best, float(at(self._about(flight, best_s)).max()))
@@ -147,25 +147,25 @@ class Severity(FlownMetric):
         """Return the probability at the horizontal closest approach."""
         best, best_s = float("inf"), float("nan")
         for piece in flight.pieces():
-            place = int(np.argmin(piece.horizontal_m))
-            if piece.horizontal_m[place] < best:
-                best, best_s = float(piece.horizontal_m[place]), float(piece.time_s[place])
+            index = int(np.argmin(piece.horizontal_m))
+            if piece.horizontal_m[index] < best:
+                best, best_s = float(piece.horizontal_m[index]), float(piece.time_s[index])
         if not np.isfinite(best):
             return float("nan")
         time_s = self._about(flight, best_s)
         across_m = flight.at(time_s).horizontal_m
-        place = int(np.argmin(across_m))
-        own, other = flight.states(time_s[place : place + 1])
+        index = int(np.argmin(across_m))
+        own, other = flight.states(time_s[index : index + 1])
         own_m, other_m = (np.asarray(state.alt_m, dtype=np.float64) for state in (own, other))
-        found = collision_probability(
-            across_m[place],
+        result = collision_probability(
+            across_m[index],
             own_m - other_m,
             (own_m, other_m),
             (self.p.mode_c_own, self.p.mode_c_target),
             self.p.nmac_horizontal_m,
             self.p.nmac_vertical_m,
         )
-        return float(found[0])
+        return float(result[0])
 
     def _about(self, flight: RelativeFlight, time_s: float) -> FloatArray:
         """Return finer times about one, within the time at which both are there."""

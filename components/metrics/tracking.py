@@ -144,7 +144,7 @@ class Tracking(Metric):
         """Return all of every replica."""
         columns: Any = group.tables[_TABLE]
         of = "" if self.p.block is None else f".{self.p.block}"
-        found = {result.name: np.full(len(group), np.nan) for result in self.results()}
+        outcome = {result.name: np.full(len(group), np.nan) for result in self.results()}
         confirmed = held(columns["track_status"])
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
@@ -158,10 +158,10 @@ class Tracking(Metric):
             values = tally.results(names, first, entered, float(group.duration_s[number]))
             values |= innovation_results(*self._innovations(columns, mine[confirmed[mine]]))
             for name, value in values.items():
-                found[name + of][number] = value
+                outcome[name + of][number] = value
             for end in self._ends_s:
-                found[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
-        return found
+                outcome[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
+        return outcome
 
     def _tally(
         self, columns: Any, rows: IntArray, confirmed: BoolArray, scene: Scene, duration_s: float
@@ -243,9 +243,9 @@ def _first_of_each(columns: Any, rows: IntArray) -> dict[int, float]:
 
 def _first_detections(columns: Any, replica: int) -> dict[str, float]:
     mine = np.asarray(columns["replica"]) == replica
-    found = {}
+    result = {}
     for name in columns["target"].names:
         rows = mine & is_named(columns["target"], name)
         if rows.any():
-            found[name] = float(columns["time_s"][rows].min())
-    return found
+            result[name] = float(columns["time_s"][rows].min())
+    return result

@@ -66,8 +66,8 @@ def run_picture(folder: Path) -> RunPicture:
         return {name: run.values(table, name) for name in measured}
 
     def about(table: str) -> dict[str, AnyArray]:
-        found = {"target": _codes(run.values(table, "target"), targets)}
-        return found | _sources(run, table)
+        result = {"target": _codes(run.values(table, "target"), targets)}
+        return result | _sources(run, table)
 
     tables = picture.tables
     tables["own"] = _own_columns(own, plane)
@@ -117,12 +117,12 @@ def run_picture(folder: Path) -> RunPicture:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"{path.parent}: holds no run: run.json: {error.strerror}") from error
     except ValueError as error:
         raise UsageError(f"{path}: is not JSON ({error})") from error
-    return found
+    return result
 
 
 def _texts(run: RecordedTables, table: str, name: str) -> set[str]:
@@ -166,19 +166,19 @@ def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
 
 def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     """Return how a sensor is shown, and its field of view as far as the scene says it."""
-    found: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
+    result: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
     limits = block.get("azimuth_deg")
     if isinstance(limits, list) and len(limits) == 2:
         turned = float(block.get("mount_azimuth_deg", 0.0))
-        found["azimuth_deg"] = [float(edge) + turned for edge in limits]
-    if block.get("beam_sweep") is True and "azimuth_deg" in found:
+        result["azimuth_deg"] = [float(edge) + turned for edge in limits]
+    if block.get("beam_sweep") is True and "azimuth_deg" in result:
         rate = Fraction(str(block["scan_rate_hz"])) * (
             1 + Fraction(str(block.get("rate_error_ppm", 0))) / 10**6
         )
-        found["sweep_s"] = float(1 / rate)
+        result["sweep_s"] = float(1 / rate)
     if isinstance(block.get("range_km"), int | float):
-        found["range_m"] = 1000.0 * block["range_km"]
-    return found
+        result["range_m"] = 1000.0 * block["range_km"]
+    return result
 
 
 def _own(run: RecordedTables) -> dict[str, FloatArray]:
@@ -187,10 +187,10 @@ def _own(run: RecordedTables) -> dict[str, FloatArray]:
     if run.has("truth", *names):
         mine = np.array([name is None for name in run.values("truth", "target")], dtype=bool)
         if mine.any():
-            found = {f"own_{name}": run.values("truth", name)[mine] for name in names}
-            return _in_order(run.values("truth", "time_s")[mine], found)
-    found = {name: np.asarray(run.values("detections", name), dtype=float) for name in _OWN}
-    return _in_order(run.values("detections", "time_s"), found)
+            result = {f"own_{name}": run.values("truth", name)[mine] for name in names}
+            return _in_order(run.values("truth", "time_s")[mine], result)
+    result = {name: np.asarray(run.values("detections", name), dtype=float) for name in _OWN}
+    return _in_order(run.values("detections", "time_s"), result)
 
 
 def _in_order(time_s: FloatArray, own: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -269,11 +269,11 @@ def _estimates(
 def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, FloatArray]:
     """Return the ownship's latest pose at some times, NaN before the first."""
     row = np.searchsorted(own["time_s"], time_s, side="right") - 1
-    found = {}
+    result = {}
     for name in _OWN:
         values = np.append(own[name], np.nan)
-        found[name] = values[row]
-    return found
+        result[name] = values[row]
+    return result
 
 
 def _seen(

@@ -156,8 +156,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     def values(cells: Cells) -> dict[str, FloatArray]:
         return {_PROBABILITY.name: observer.acquisition_probability(cells)}
 
-    found: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
-    return found
+    result: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
+    return result
 
 
 BETWEEN_SCANS = Ladder(
@@ -274,9 +274,9 @@ class Lookout(Sensor):
         if self._says_looks:
             extras["detection_probability"] = self.acquisition_probability(cells)
         searched = np.flatnonzero(self._first_seen[who] > cells.scan)
-        found = searched[self._found(cells, searched)]
+        result = searched[self._found(cells, searched)]
         first = self._first_seen.copy()
-        np.minimum.at(first, who[found], cells.scan[found])
+        np.minimum.at(first, who[result], cells.scan[result])
         self._first_seen = first
         seen = (first[who] <= cells.scan) & (size >= self._smallest_rad)
         return Look(seen, confidence, extras)
@@ -304,10 +304,10 @@ class Lookout(Sensor):
             keys = cells.roster.keys_of(cells.target[which])
             drawn = self._finds.of_runs(cells.run[which]).uniform(keys, cells.scan[which])
             return np.asarray(drawn < -np.expm1(-expected))
-        found = np.zeros(len(which), dtype=bool)
+        result = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
-            found |= self._meets(seat, cells, which)
-        return found
+            result |= self._meets(seat, cells, which)
+        return result
 
     def _searched(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
         """Return the integral of the rate since the last scan, or how many rounds it showed."""

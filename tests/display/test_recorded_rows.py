@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from components.display import recorded_rows
 from components.display.recorded_rows import (
     Detected,
-    places_in_groups,
+    index_in_groups,
     read_scans,
     scans_between,
     strides,
@@ -66,7 +66,7 @@ def test_strides_never_shrink_and_short_series_are_spared(counts, most, data):
 @given(series)
 def test_places_in_groups(rows):
     wanted = [rows[:i].count(one) for i, one in enumerate(rows)]
-    assert places_in_groups(np.array(rows, dtype=np.int64)).tolist() == wanted
+    assert index_in_groups(np.array(rows, dtype=np.int64)).tolist() == wanted
 
 
 def write(folder, name, columns, group=64):
