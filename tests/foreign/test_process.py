@@ -18,6 +18,7 @@ from components.foreign.process_link import ProcessError, ProcessLink, frame
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.running.simulation import Simulation
+from tests import warm_process
 
 CANNED = str(Path(__file__).with_name("canned.py"))
 EYE = {"type": "optical.range_boundary", "range_km": 20.0, "scan_rate_hz": 5}
@@ -215,10 +216,8 @@ def test_nothing_is_left_when_we_are_interrupted_or_killed(folder, number):
         'wires = ["part -> fusion"]\n[blocks.fusion]\ntype = "fusion.pass_through"\n'
         f"[blocks.part]\ntype = 'foreign.process'\nscan_rate_hz = 5\ncommand = {command}\n"
     )
-    ours = subprocess.Popen(
-        [sys.executable, "-m", "dsa_des", "run", str(file), "--out", str(folder / "out")],
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    words = ["-m", "dsa_des", "run", file, "--out", folder / "out"]
+    ours = warm_process.start(words, stdout=subprocess.DEVNULL)
     for _ in range(500):
         if (folder / "child").exists() and (folder / "child").read_text():
             break
