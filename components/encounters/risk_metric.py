@@ -20,7 +20,7 @@ from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, EVENT, NUMBER, RATIO, Group, Metric, RatioOf, Result
+from dsa_des.studies.metric import CLASS, EVENT, KEY, NUMBER, RATIO, Group, Metric, RatioOf, Result
 
 
 def has_weights(scene: Scene) -> bool:
@@ -43,9 +43,9 @@ class EncounterWeight(Metric):
     def results(self) -> list[Result]:
         """Return number, weight and family."""
         return [
-            Result("encounter", NUMBER, "number of the encounter"),
+            Result("encounter", KEY, "number of the encounter"),
             Result("encounter_weight", NUMBER, "how often it happens in the airspace"),
-            Result("encounter_family", NUMBER, "encounter of which it is a copy, or itself"),
+            Result("encounter_family", KEY, "encounter of which it is a copy, or itself"),
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:

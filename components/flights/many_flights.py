@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
 
@@ -270,42 +269,76 @@ class SteeredFlight:
         return state.reshaped(times.shape)
 
 
+class _Alone(Fleet):
+    """A flight of a kind that no fleet is made for."""
+
+    def __init__(self, flight: Any) -> None:
+        self._flight = flight
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        return (self._flight,)[index]
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return its states at times (n,), in s."""
+        state: TrajectoryState = self._flight.at(time_s)
+        return state
+
+
 class MixedFleet(Fleet):
-    """Flights of several kinds; those of a kind that no fleet is made for are asked one by one."""
+    """Flights of several kinds, a fleet of each."""
 
     def __init__(self, flights: Sequence[Any]) -> None:
         self._flights = list(flights)
-        self._ask: list[Callable[[IntArray, FloatArray], TrajectoryState]] = []
-        self._part, self._place = np.zeros((2, len(flights)), dtype=np.int64)
+        self._fleets: list[Fleet] = []
+        #: Of each flight its fleet, and its index there.
+        self._fleet, self._index = np.zeros((2, len(flights)), dtype=np.int64)
         kinds = [type(flight) for flight in flights]
         for kind in dict.fromkeys(kinds):
             numbers = [number for number, one in enumerate(kinds) if one is kind]
-            if kind in _FLEETS:
-                self._part[numbers] = len(self._ask)
-                self._place[numbers] = np.arange(len(numbers))
-                self._ask.append(_FLEETS[kind]([flights[number] for number in numbers]).each)
-                continue
-            self._part[numbers] = len(self._ask) + np.arange(len(numbers))
-            self._ask += [partial(_alone, flights[number]) for number in numbers]
+            of_kind = [flights[number] for number in numbers]
+            made = [_FLEETS[kind](of_kind)] if kind in _FLEETS else [_Alone(f) for f in of_kind]
+            self._fleet[numbers] = len(self._fleets) + np.arange(len(numbers)) % len(made)
+            self._index[numbers] = np.arange(len(numbers)) // len(made)
+            self._fleets += made
 
     def __len__(self) -> int:
         return len(self._flights)
 
-    def __getitem__(self, place: int) -> Any:  # type: ignore[override]
-        return self._flights[place]
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        return self._flights[index]
+
+    def _parts(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
+        """Return each fleet that is asked, in which rows, and for which of its flights."""
+        fleet = self._fleet[aircraft]
+        asked = np.flatnonzero(np.bincount(fleet, minlength=1)).tolist()
+        rows = [np.flatnonzero(fleet == number) for number in asked]
+        return [
+            (self._fleets[number], row, self._index[aircraft[row]])
+            for number, row in zip(asked, rows, strict=True)
+        ]
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states of flights (n,), each at a time (n,) of its own, in s."""
-        part, place = self._part[aircraft], self._place[aircraft]
-        asked = np.flatnonzero(np.bincount(part, minlength=1)).tolist()
-        rows = [np.flatnonzero(part == number) for number in asked]
-        states = [self._ask[k](place[r], time_s[r]) for k, r in zip(asked, rows, strict=True)]
-        return in_rows(rows, states)
+        parts = self._parts(aircraft)
+        states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
+        return in_rows([row for _, row, _ in parts], states)
 
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        speed_mps = super().ground_speeds_mps(aircraft, time_s)
+        for fleet, row, index in self._parts(aircraft):
+            speed_mps[row] = fleet.ground_speeds_mps(index, time_s[row])
+        return speed_mps
 
-def _alone(flight: Any, _: IntArray, time_s: FloatArray) -> TrajectoryState:
-    found: TrajectoryState = flight.at(time_s)
-    return found
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        fixed_rad = super().fixed_attitudes_rad(aircraft, time_s)
+        for fleet, row, index in self._parts(aircraft):
+            fixed_rad[:, row] = fleet.fixed_attitudes_rad(index, time_s[row])
+        return fixed_rad
 
 
 def _steered(flights: Sequence[SteeredFlight]) -> SteeredFleet:

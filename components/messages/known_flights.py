@@ -8,12 +8,13 @@ these whatever the other rows of its message know.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from components.geometry import TrajectoryState
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.replicas.split_block import NotInLockStep
 
 
 class AllFlights(Protocol):
@@ -51,40 +52,26 @@ class AllFlights(Protocol):
         """
 
 
-class _Source(NamedTuple):
-    """The flights of one traffic, and what makes of their states what is given, in turn."""
-
-    flights: AllFlights
-    seen: tuple[Callable[..., Any], ...] = ()
-
-    @property
-    def key(self) -> Any:
-        """The same for sources that differ by the manoeuvres alone that came so far."""
-        return id(self.flights.traffic), self.seen
-
-    def at(self, *asked: Any) -> Any:
-        found: Any = self.flights.states(*asked)
-        for seen in self.seen:
-            found = seen(*found)
-        return found
-
-
 class KnownFlights:
-    """The flights known at each row of a message.
-
-    Rows of runs that are split have flights of one traffic each.
+    """The flights known at each row of a message, all of one traffic.
 
     Parameters
     ----------
     flights : AllFlights
     run, known : (rows,) of int
         Of each row its run, and how many manoeuvres of the ownship it knows.
+    seen : callables
+        What makes of states what is seen of them, in turn.
     """
 
-    def __init__(self, flights: AllFlights, run: IntArray, known: IntArray) -> None:
-        self.run, self.known = run, known
-        self._sources: tuple[_Source, ...] = (_Source(flights),)
-        self._of_row: IntArray = np.zeros(len(run), dtype=np.int64)
+    def __init__(
+        self,
+        flights: AllFlights,
+        run: IntArray,
+        known: IntArray,
+        seen: tuple[Callable[..., Any], ...] = (),
+    ) -> None:
+        self.flights, self.run, self.known, self._seen = flights, run, known, seen
 
     def __len__(self) -> int:
         return len(self.run)
@@ -95,91 +82,46 @@ class KnownFlights:
         The states of the ownship, of the times' shape, and of the targets (rows, columns); or what
         `seen_by` makes of them, arrays by name.
         """
-
-        def of(source: _Source, here: Any) -> Any:
-            run, known = self.run[here][:, np.newaxis], self.known[here][:, np.newaxis]
-            return source.at(run, known, columns, time_s[here], 0.0)
-
-        return self._by_source(self._of_row, of)
+        run, known = self.run[:, np.newaxis], self.known[:, np.newaxis]
+        return self._states(run, known, columns, time_s, 0.0)
 
     def each(
         self, row: IntArray, column: IntArray, time_s: FloatArray, ahead_s: FloatArray
     ) -> Mapping[str, AnyArray]:
-        """Return what is seen of single targets, each as its own row knows it.
+        """Return what is seen of single targets, each as its own row knows it, arrays (n,) by name.
 
-        Parameters
-        ----------
-        row, column : (n,) of int
-            Row of the message, and index of the target in the roster.
-        time_s, ahead_s : (n,)
-            See `AllFlights.states`.
-
-        Returns
-        -------
-        dict of (n,) arrays
+        Row of the message, index of the target in the roster and times are (n,), too; see
+        `AllFlights.states`.
         """
+        run, known = self.run[row][np.newaxis], self.known[row][np.newaxis]
+        return _flat(self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis]))
 
-        def of(source: _Source, here: Any) -> Any:
-            run, known = self.run[row[here]][np.newaxis], self.known[row[here]][np.newaxis]
-            times, ahead = time_s[here][np.newaxis], ahead_s[here][np.newaxis]
-            return _flat(source.at(run, known, column[here], times, ahead))
-
-        found: Mapping[str, AnyArray] = self._by_source(self._of_row[row], of)
-        return found
-
-    def _by_source(self, which: IntArray, of: Callable[[_Source, Any], Any]) -> Any:
-        if len(self._sources) == 1:
-            return of(self._sources[0], slice(None))
-        numbers = np.flatnonzero(np.bincount(which)).tolist()
-        rows = [np.flatnonzero(which == number) for number in numbers]
-        parts = [of(self._sources[n], here) for n, here in zip(numbers, rows, strict=True)]
-        return _joined(parts, np.argsort(np.concatenate(rows), kind="stable"))
-
-    def _with(
-        self, sources: tuple[_Source, ...], of_row: IntArray, run: IntArray, known: IntArray
-    ) -> KnownFlights:
-        found = KnownFlights(sources[0].flights, run, known)
-        found._sources, found._of_row = sources, of_row
-        return found
+    def _states(self, *asked: Any) -> Any:
+        states: Any = self.flights.states(*asked)
+        for seen in self._seen:
+            states = seen(*states)
+        return states
 
     def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
         """Return the same for who looks at the states through `seen`, which takes both."""
-        sources = tuple(one._replace(seen=(*one.seen, seen)) for one in self._sources)
-        return self._with(sources, self._of_row, self.run, self.known)
+        return KnownFlights(self.flights, self.run, self.known, (*self._seen, seen))
 
     def take_rows(self, rows: slice | IntArray) -> KnownFlights:
         """Return the flights of some rows."""
-        return self._with(self._sources, self._of_row[rows], self.run[rows], self.known[rows])
+        return KnownFlights(self.flights, self.run[rows], self.known[rows], self._seen)
 
     @classmethod
     def join_rows(cls, parts: Sequence[KnownFlights]) -> KnownFlights:
         """Return the flights of the rows of all parts, in the order given."""
-        newest: dict[Any, _Source] = {}  # of each traffic and who sees it, as they first appear
-        for one in (source for part in parts for source in part._sources):
-            other = newest.setdefault(one.key, one)
-            if one.flights.manoeuvre_count > other.flights.manoeuvre_count:
-                newest[one.key] = one
-        place = {key: number for number, key in enumerate(newest)}
-        of_row = [
-            np.array([place[one.key] for one in part._sources])[part._of_row] for part in parts
-        ]
+        newest = max(parts, key=lambda part: part.flights.manoeuvre_count)
+        for part in parts:
+            one = part.flights.traffic is newest.flights.traffic and part._seen == newest._seen
+            if not one:
+                raise NotInLockStep("rows know flights of one traffic, seen by one line of sight")
         run, known = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("run", "known")
         )
-        return parts[0]._with(tuple(newest.values()), np.concatenate(of_row), run, known)
-
-
-def _joined(parts: Sequence[Any], order: IntArray) -> Any:
-    """Join what several traffics gave for rows of their own, and put the rows in order."""
-    first = parts[0]
-    if isinstance(first, Mapping):
-        return {name: _joined([part[name] for part in parts], order) for name in first}
-    if isinstance(first, TrajectoryState):
-        columns = zip(*(state.arrays() for state in parts), strict=True)
-        return TrajectoryState(*(_joined(arrays, order) for arrays in columns))
-    if isinstance(first, tuple):
-        return tuple(_joined(states, order) for states in zip(*parts, strict=True))
-    return np.concatenate(parts)[order]
+        return KnownFlights(newest.flights, run, known, newest._seen)
 
 
 def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:

@@ -126,8 +126,6 @@ class ScriptedTraffic(TrafficSource):
 
     def flown_of(self, parameters: Sequence[Any]) -> FlightsOfRuns | None:
         """Return the flights of replicas with these parameters, where all only fly straight on."""
-        if self.wind is not None:
-            return None
         own = [p.ownship for p in parameters]
         crafts = [craft for p in parameters for craft in p.targets]
         width = len(self.roster)
@@ -139,7 +137,7 @@ class ScriptedTraffic(TrafficSource):
         places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         starts = _start_positions(crafts, references)
-        ownships, targets = _starts(own, places, None), _starts(crafts, starts, None)
+        ownships, targets = _starts(own, places, self.wind), _starts(crafts, starts, self.wind)
         return FlightsOfRuns(ownships.fleet(), targets.fleet(), roster)
 
     def sample_times(self) -> list[SampleTimes]:

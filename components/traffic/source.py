@@ -209,7 +209,7 @@ class TrafficSource(Component):
         """Return what flies the flights of all runs."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
         asked = self._offered is not None and self._offered.asked
-        if asked or self.built(ATTITUDE):
+        if asked:
             return None
         flights = flights_of_runs(self, parameters, make)
         # What [accuracy] leaves out may rest on what the targets are.

@@ -13,7 +13,7 @@ from dsa_des.files.output_names import claim_folder, named
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
-from dsa_des.results.record import CLASS, Result, StudyRecord
+from dsa_des.results.record import Result, StudyRecord
 from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.overrides import parse_assignment
@@ -302,7 +302,7 @@ def result_names(results: Sequence[Result], only: Sequence[str]) -> list[str]:
     UsageError
         If one of `only` is none of them.
     """
-    every = [result.name for result in results if result.kind != CLASS]
+    every = [result.name for result in results if result.summed_up]
     for name in only:
         if name not in every:
             raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.results.record import CLASS, Result, as_text
+from dsa_des.results.record import Result, as_text
 from dsa_des.scene.keys import key_in
 from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain
@@ -301,7 +301,7 @@ def _unknown_results(case: EvidenceCase) -> list[Any]:
             message = f"the case has no such study{did_you_mean(study, known)}"
             found.append(case.file.problem((*at, "study"), message, study))
             continue
-        known = [r.name for r in case.results[study].values() if r.kind != CLASS]
+        known = [r.name for r in case.results[study].values() if r.summed_up]
         if name not in known:
             message = f"the study gives no such result{did_you_mean(name, known)}"
             found.append(case.file.problem((*at, "result") if inside else at, message, name))

@@ -8,7 +8,6 @@ replica as an additional column.
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from functools import partial
 from typing import Any
 
 from dsa_des.block.component import ClockedParameters, Component, Context
@@ -135,10 +134,14 @@ class Replicas(Timeline):
 
     def _together(self, name: str, face: Component) -> Component | None:
         """Return what runs a block for all replicas though they differ, if it offers that."""
-        if self.scene.duration_s is None and face.natural_duration_s() is not None:
-            return None
+
+        def make(number: int) -> Component:
+            component = self._made(name, number)
+            self._check_same_length(face, component)
+            return component
+
         try:
-            return face.together(self._parameters_of(name), partial(self._made, name))
+            return face.together(self._parameters_of(name), make)
         except BaseException as error:
             if must_pass(error):
                 raise

@@ -9,8 +9,8 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.drawing import drawing, figure_text, tight
-from dsa_des.results.labels import axis_label, readable, unit_of, value_label
-from dsa_des.results.maps import Target, digits
+from dsa_des.results.labels import axis_label, readable, signed, unit_of, value_label
+from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
 
@@ -185,19 +185,14 @@ def _differences(
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
-                width = "" if np.isnan(e.half_width) else f" ± {digits(e.half_width)}"
                 text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
-                axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
+                axes.annotate(signed(e.value, e.half_width), (px, e.value), **text_at)
     unit = unit_of(shown[0].result.name)
     axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
     known = any(np.isfinite(item.difference.paired.half_width) for item in shown)
     intervals = f", {100 * confidence:g} % intervals" if known else ""
     axes.set_title(f"Paired differences on the same units{intervals}", loc="left")
     axes.margins(x=0.12, y=0.2)
-
-
-def _signed(value: float) -> str:
-    return ("+" if value > 0 else "") + digits(value)
 
 
 def draw_polar(

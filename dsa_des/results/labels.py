@@ -1,5 +1,6 @@
 """Labels of a study's figures: ``Radar scan rate (Hz)`` for ``blocks.radar.scan_rate_hz``."""
 
+import math
 import re
 
 from dsa_des.record.drawing import figure_text
@@ -70,6 +71,20 @@ def short(value: object) -> str:
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
     return shortened(value)
+
+
+def rounded_to(half: float, *numbers: float) -> list[str]:
+    """Return numbers as texts, rounded to two digits of half an interval."""
+    places = 1 - math.floor(math.log10(half))
+    return [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in numbers]
+
+
+def signed(value: float, half: float) -> str:
+    """Return ``+1.24 ± 0.13``; three digits of a difference without an interval."""
+    sign = "+" if value > 0 else ""
+    if not 0.0 < half < math.inf:
+        return sign + (f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}")
+    return sign + " ± ".join(rounded_to(half, value, half))
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from dsa_des.results.labels import short
+from dsa_des.results.labels import rounded_to, short
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Answer, Compared, Line, one_sided
 from dsa_des.results.tables import Tables, cut_off_text
@@ -227,8 +227,7 @@ def rounded(estimate: Estimate) -> tuple[str, str]:
     half = (high - low) / 2
     if not _NOTHING < half < math.inf:
         return short(value), interval_text(replace(estimate, low=low, high=high))
-    places = 1 - math.floor(math.log10(half))
-    shown = [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in (value, low, high)]
+    shown = rounded_to(half, value, low, high)
     return shown[0], f"{shown[1]} to {shown[2]}" + (" *" if estimate.few else "")
 
 

@@ -29,9 +29,9 @@ class StrictRecord(BaseModel):
 
 #: Kinds of results: a number with a mean; a number from 0 to 1 with a mean, such as a share of the
 #: time; an event that happens or not; a share of trials; the ratio of two events over all units of
-#: a cell; the name of a class.
+#: a cell; the name of a class; a number that is a name, such as that of an encounter.
 NUMBER, FRACTION, EVENT, SHARE = "number", "fraction", "event", "share"
-RATIO, CLASS = "ratio", "class"
+RATIO, CLASS, KEY = "ratio", "class", "key"
 #: What is put behind the name of a share for the column of its trials.
 TRIALS = ".trials"
 
@@ -95,11 +95,12 @@ class Result:
     ----------
     name : str
         With its unit, for example ``declaration_time_s.radar``.
-    kind : {"number", "fraction", "event", "share", "ratio", "class"}
+    kind : {"number", "fraction", "event", "share", "ratio", "class", "key"}
         A number may be NaN (no value in this run), and so may a fraction, which lies between 0 and
         1, as does the interval of its mean; an event is 0 or 1; a share has a second
-        column ``NAME.trials``, and is NaN without trials. A class is a text or None, and stands in
-        no summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
+        column ``NAME.trials``, and is NaN without trials. A class is a text or None, a key a
+        number that names something; neither stands in a summary. A ratio has no column: it is made
+        of others (`ratio`) over the runs of a cell.
     meaning : str
     cut_off : str, optional
         Name of a further column, a text: where the run's start or end cut this value off (``at the
@@ -118,7 +119,7 @@ class Result:
     """
 
     name: str
-    kind: Annotated[str, Field(pattern="^(number|fraction|event|share|ratio|class)$")]
+    kind: Annotated[str, Field(pattern="^(number|fraction|event|share|ratio|class|key)$")]
     meaning: str
     cut_off: str | None = None
     told: Told | None = None
@@ -135,6 +136,11 @@ class Result:
         low = 0.0 if self.kind in (FRACTION, EVENT, SHARE, RATIO) else self.least
         high = 1.0 if self.kind in (FRACTION, EVENT, SHARE) else self.most
         return -math.inf if low is None else low, math.inf if high is None else high
+
+    @property
+    def summed_up(self) -> bool:
+        """Whether a summary has a mean, a share or a ratio of it; names have none."""
+        return self.kind not in (CLASS, KEY)
 
     @property
     def is_number(self) -> bool:

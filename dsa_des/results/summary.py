@@ -6,7 +6,6 @@ from typing import Any
 
 from dsa_des.results.ratio import PairedRatio
 from dsa_des.results.record import (
-    CLASS,
     EVENT,
     RATIO,
     Requirement,
@@ -49,7 +48,7 @@ def summarise(
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
-            if result.kind == CLASS:
+            if not result.summed_up:
                 continue
             ratio = other = None
             if result.kind == RATIO:
@@ -101,7 +100,7 @@ def compare_axis(
         if at[place] == baseline or base not in by_place:
             continue
         for result in results:
-            if result.kind == CLASS or result.quantile is not None:
+            if not result.summed_up or result.quantile is not None:
                 continue  # paired differences are of means
             others = (*at[:place], *at[place + 1 :])
             if result.kind == RATIO:

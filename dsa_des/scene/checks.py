@@ -6,10 +6,9 @@ wires that would hold a message where no block looks for it.
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from types import UnionType
-from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from dsa_des.block.component import Parameters
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
@@ -34,24 +33,27 @@ _A_DAY = Fraction(86400)
 
 
 def check_lookalikes(
-    scene: SceneFile, key: Key, given: Mapping[str, Any], model: Any, problems: list[Problem]
+    scene: SceneFile, key: Key, given: Any, parsed: Any, problems: list[Problem]
 ) -> None:
-    """Add values that pydantic would quietly convert: ``true`` or ``"5"`` for a number."""
-    for name, value in given.items():
-        declared = model.model_fields.get(name)
-        if declared is None:
-            continue
-        union = get_origin(declared.annotation) in (Union, UnionType)
-        options = get_args(declared.annotation) if union else (declared.annotation,)
-        kinds = set(options) - {type(None)}
-        message = ""
-        if kinds <= {int, float} and isinstance(value, bool | str):
-            message = "must be a number"
-        elif kinds == {bool} and not isinstance(value, bool):
-            message = "must be true or false"
-        if message:
-            shown = str(value) if isinstance(value, str) else value
-            problems.append(scene.problem((*key, name), message, shown))
+    """Add values that pydantic quietly converted: ``true`` or ``"5"`` for a number, 1 for true."""
+    if isinstance(given, Mapping):
+        fields = vars(parsed) if isinstance(parsed, BaseModel) else parsed
+        for name, value in given.items():
+            if isinstance(fields, Mapping) and name in fields:
+                check_lookalikes(scene, (*key, name), value, fields[name], problems)
+    elif isinstance(given, list) and isinstance(parsed, list | tuple):
+        for index, pair in enumerate(zip(given, parsed, strict=False)):
+            check_lookalikes(scene, (*key, index), *pair, problems)
+    elif isinstance(parsed, bool) != isinstance(given, bool):
+        if isinstance(parsed, bool | int | float):
+            needed = "true or false" if isinstance(parsed, bool) else "a number"
+            problems.append(scene.problem(key, f"must be {needed}", _plain(given)))
+    elif isinstance(given, str) and isinstance(parsed, int | float):
+        problems.append(scene.problem(key, "must be a number", _plain(given)))
+
+
+def _plain(value: Any) -> Any:
+    return str(value) if isinstance(value, str) else value
 
 
 def check_times(
@@ -253,6 +255,8 @@ def read_sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, P
             sections[name] = model.model_validate(table)
         except ValidationError as error:
             problems += explain(scene_file, (name,), f"[{name}]", model, error)
+            continue
+        check_lookalikes(scene_file, (name,), table, sections[name], problems)
     return sections
 
 
@@ -311,7 +315,8 @@ def read_blocks(
             message = f"{cls.path()} cannot take its parameters: {error}"
             problems.append(scene_file.problem(key, message))
             continue
-        check_lookalikes(scene_file, key, given, cls.Parameters, problems)
+        check_lookalikes(scene_file, key, given, parameters, problems)
+        check_lookalikes(scene_file, key, extra, options, problems)
         blocks[name] = Block(name, str(absolute(type_name)), cls, parameters, options)
     return classes, blocks
 
@@ -346,6 +351,8 @@ def read_processors(
             found[name] = ProcessorParameters.model_validate(tables[name])
         except ValidationError as error:
             problems += explain(scene_file, key, f"[{dotted(key)}]", ProcessorParameters, error)
+            continue
+        check_lookalikes(scene_file, key, tables[name], found[name], problems)
     for name, block in blocks.items():
         wanted = block.options.processor
         if wanted is not None and wanted not in tables:

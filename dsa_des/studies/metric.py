@@ -26,6 +26,7 @@ from dsa_des.results.record import (
     CLASS,
     EVENT,
     FRACTION,
+    KEY,
     NUMBER,
     RATIO,
     SHARE,
@@ -38,7 +39,7 @@ from dsa_des.scene.scene import Scene
 
 #: What authors of metrics import from here.
 __all__ = [
-    "CLASS", "EVENT", "FRACTION", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
+    "CLASS", "EVENT", "FRACTION", "KEY", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
     "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "find_metric",
     "recorded_by", "wanted_by",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.results.record import CLASS, FRACTION, NUMBER, SHARE, TRIALS, Result
+from dsa_des.results.record import FRACTION, NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.summary import of_series
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, key_in
@@ -144,7 +144,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
 
 def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
-    names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.kind != CLASS]
+    names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.summed_up]
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)

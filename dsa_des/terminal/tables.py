@@ -192,7 +192,10 @@ def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
     ]
     least = [max(one, other) for one, other in zip(of_cells, of_words, strict=True)]
     narrow = [max(min(one, _LEAST), other) for one, other in zip(of_cells, of_words, strict=True)]
-    for floors, gap in ((least, _GAP), (least, 1), (narrow, 1)):
+    # The first column names the row: its words are cut last, where all others are not enough.
+    words = [_length(word) for row in cells if row for word in row[0].split()]
+    named = [max([of_words[0], *words]), *narrow[1:]] if narrow else []
+    for floors, gap in ((least, _GAP), (least, 1), (named, 1), (narrow, 1)):
         while _total(widths, gap) > most:
             spare = [width - floor for width, floor in zip(widths, floors, strict=True)]
             if max(spare, default=0) <= 0:

@@ -66,6 +66,16 @@ def test_a_long_word_is_cut_into_lines_and_a_short_one_stays() -> None:
     assert fold("飛行機飛行機", 5) == ["飛行", "機飛", "行機"]
 
 
+def test_what_names_a_row_is_cut_last() -> None:
+    out = io.StringIO()
+    rows = [["great_circle (scene)", "0.0523 ± 0.02", "1.23e-05", "2.34e-05"]]
+    console = SafeConsole(file=out, width=40)
+    print_table(console, "rungs", ["rung", "us", "mean", "p95"], rows, right=[1, 2, 3])
+    assert [line[:12].rstrip() for line in out.getvalue().splitlines()] == [
+        "rungs", "rung", "great_circle", "(scene)",
+    ]  # fmt: skip
+
+
 def test_remarks_stand_below_their_rows_where_there_is_no_room_beside_them() -> None:
     out = io.StringIO()
     rows = [["exact", "1.5", "nothing is cheaper " * 3], ["table", "22.25", ""]]

@@ -65,6 +65,10 @@ def test_every_replica_flies_its_encounter_and_says_its_weight(tmp_path: Path) -
     found = read_set(file)
     assert table["encounter"] == [1, 2, 3, 4, 5, 6]
     assert table["encounter_weight"] == pytest.approx(found.weights[1:7])
+    # Numbers that are names have no mean.
+    summed = pq.read_table(tmp_path / "out" / "summary.parquet")["result"].to_pylist()
+    assert "encounter_weight" in summed
+    assert not {"encounter", "encounter_family"} & {*summed}
     # Closest approaches are those of the set: its own geometry, by straight paths between seconds.
     for k, (number, closest) in enumerate(
         zip(range(1, 7), table["closest_approach_m"], strict=True)

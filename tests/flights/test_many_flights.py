@@ -79,3 +79,23 @@ def test_flights_of_all_kinds_are_asked_together():
     for k, flight in enumerate(flights):
         rows = which == k
         same(type(found)(*(part[rows] for part in found.arrays())), flight.at(time_s[rows]))
+
+
+def test_a_fleet_of_all_kinds_says_what_scripts_fix():
+    """Ground speeds and fixed angles, NaN where no script says them."""
+    lat, lon, alt = paths(1, np.random.default_rng(8))
+    (sampled,) = SampledTrajectory.together(["a"], TIMES, lat, lon, alt)
+    start = {"lat_deg": -66.0, "lon_deg": 179.9, "alt_m": 900.0, "heading_deg": 217.0}
+    slow = ScriptedTrajectory("slow", **start, speed_mps=40.0, roll_deg=9.0)
+    fast = ScriptedTrajectory("fast", **start, speed_mps=70.0)
+    up = Manoeuvre(climb_m=90.0, climb_rate_mps=5.0)
+    steered = SteeredFlight(slow).steered(3.0, up)
+    found = MixedFleet([fast, Still(fast), steered, sampled, slow])
+    which, time_s = np.array([2, 4, 0, 3, 1, 2]), np.array([2.0, 9.0, 9.0, 9.0, 9.0, 5.0])
+    nan = np.nan
+    np.testing.assert_allclose(
+        found.ground_speeds_mps(which, time_s), [40.0, 40.0, 70.0, nan, nan, 40.0], rtol=1e-6
+    )
+    np.testing.assert_array_equal(
+        found.fixed_attitudes_rad(which, time_s)[2], np.radians([9.0, 9.0, nan, nan, nan, nan])
+    )

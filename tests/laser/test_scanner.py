@@ -119,6 +119,8 @@ def test_impossible_lasers_are_refused_with_what_is_allowed():
     for sets, words in (
         (["blocks.laser.range_km=5"], "unambiguous to 2.63 km"),
         (["blocks.laser.divergence_mrad=0"], "divergence_mrad"),
+        (["blocks.laser.azimuth_deg=[10,-10]"],
+         r"azimuth_deg is \[10, -10\]: .* is 340 deg wide; allowed: \[-10, 10\], or \[10, 350\]"),
         (["blocks.traffic.intruders=[{name='a',east_m=1,north_m=9,laser={wire_diameter_mm=3}}]"],
          "belong together"),
     ):  # fmt: skip

@@ -152,17 +152,42 @@ def test_what_comes_between_scans_waits_for_the_instance(lock, monkeypatch):
     assert len(simulation.runs.going) > 1 and "alerting" in simulation.timeline.split
 
 
-@pytest.mark.parametrize(
-    ("sets", "changes", "split"),
-    [
-        # In wind each replica has a traffic of its own; each beam asks it between scans.
-        (["weather.wind_mps=12"], [{HEADING: 3.0}, {HEADING: -4.0}], "traffic"),
-        # One traffic of all, seen by each through a line of sight of its own.
-        (["blocks.traffic.ownship.roll_deg=15", "blocks.traffic.ownship.pitch_deg=8"],
-         [{"blocks.transform.attitude": a} for a in ("exact", "small_angle")], "transform"),
-    ],
-)  # fmt: skip
-def test_what_is_asked_between_scans_is_of_its_own_replica(lock, sets, changes, split):
-    scene = near("blocks.radar.beam_sweep=true", "record.truth=true", *sets, duration_s="6")
+def test_in_wind_all_flights_are_flown_together(lock):
+    """Each beam asks for those of its own replica between scans; noses point into the wind."""
+    swept = ["weather.wind_mps=12", "blocks.radar.beam_sweep=true", "record.truth=true"]
+    turn = {"kind": "turn", "rate_deg_s": 2.0}
+    changes = [{HEADING: 3.0}, {HEADING: -4.0}, {"blocks.traffic.ownship.legs": [turn]}]
+    simulation = lock.same_as_alone(lock.replicas_of(near(*swept, duration_s="6"), *changes))
+    assert list(simulation.timeline.together) == ["traffic"]
+
+
+def test_beams_that_ask_through_several_lines_of_sight_run_one_by_one(lock):
+    """One traffic of all, seen by each through a line of sight of its own."""
+    sets = ["blocks.radar.beam_sweep=true", "blocks.traffic.ownship.roll_deg=15"]
+    scene = near(*sets, duration_s="6")
+    replicas = [Replica(3, {"blocks.transform.attitude": a}) for a in ("exact", "small_angle")]
+    scenes = [scene_of(scene, one) for one in replicas]
+    with pytest.raises(NotInLockStep, match="one line of sight"):
+        lock_step(scenes).run()
+    for one, ran in zip(scenes, run_replicas(scene, replicas), strict=True):
+        alone = lock.tables_of(Simulation, one)[1]["detections"]["azimuth_rad"].to_pylist()
+        assert len(alone) > 3 and ran.tables["detections"]["azimuth_rad"].tolist() == alone
+
+
+def test_recorded_flights_are_flown_together_where_they_last_as_long(lock, tmp_path):
+    """A scene without a duration lasts as long as its file."""
+    header = "name time lat lon alt heading\nunitless s deg deg m deg\n"
+    for name, last_s, heading_deg in (("one", 9, 40), ("other", 9, 80), ("longer", 10, 80)):
+        rows = [
+            f"{who} {t} {-41.3 + north - 1e-4 * t} 179.99 {1000 + up} {heading_deg}"
+            for who, north, up in (("own", 0.0, 0), ("far", -0.02, 40))
+            for t in (0, 4, last_s)
+        ]
+        (tmp_path / f"{name}.daa").write_text(header + "\n".join(rows), encoding="utf-8")
+    scene = load_scene("configs/replay_daa.toml", sets=[f"blocks.traffic.file={tmp_path}/one.daa"])
+    changes = [{"blocks.traffic.file": tmp_path / f"{name}.daa"} for name in ("one", "other")]
     simulation = lock.same_as_alone(lock.replicas_of(scene, *changes))
-    assert split in simulation.timeline.split
+    assert list(simulation.timeline.together) == ["traffic"]
+    changes[1] = {"blocks.traffic.file": tmp_path / "longer.daa"}
+    with pytest.raises(NotInLockStep, match="another duration"):
+        lock_step(lock.replicas_of(scene, *changes)).run()

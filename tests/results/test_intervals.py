@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsa_des.results import statistics
-from dsa_des.results.labels import AxisName, axis_label, readable, unit_of, value_label
+from dsa_des.results.labels import AxisName, axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.printing import rounded
 
 
@@ -122,6 +122,19 @@ def test_values_are_rounded_to_what_is_known(
     assert rounded(statistics.Estimate(value, low, high, 20, False)) == shown
     starred = (shown[0], f"{shown[1]} *" if shown[1] else "")
     assert rounded(statistics.Estimate(value, low, high, 3, True)) == starred
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "shown"),
+    [
+        (1.23456, 0.12345, "+1.23 ± 0.12"), (-1234.5, 67.8, "-1,234 ± 68"),
+        (0.00123456, 0.1, "+0.00 ± 0.10"), (-1.23456, math.nan, "-1.23"), (1234.5, 0.0, "+1234"),
+    ],
+)  # fmt: skip
+def test_differences_are_written_to_two_digits_of_half_their_interval(
+    value: float, half: float, shown: str
+) -> None:
+    assert signed(value, half) == shown
 
 
 def test_axes_of_figures_carry_units() -> None:

@@ -39,3 +39,17 @@ def test_what_rests_on_a_wrong_key_is_not_said(tmp_path, configs):
     assert wrong.startswith("blocks.radar.declare_n = 'x': must be")
     (unknown,) = problems(tmp_path, configs, "declare_m = 5\ndeclare_nn = 5")
     assert unknown.startswith("blocks.radar.declare_nn: unknown parameter")
+
+
+def test_truth_and_text_stand_for_no_number_in_any_table(tmp_path, configs):
+    radar = "pulses = true\ncalibrate.swerling = true\ndeclare_m = 1\ndeclare_n = '3'"
+    tables = "[weather]\nrain_rate_mm_h = true\nvisibility_km = '5'\n[terrain]\nheight_m = false"
+    found = problems(tmp_path, configs, f"{radar}\n{tables}")
+    assert sorted(found) == [
+        "blocks.radar.calibrate.swerling = True: must be a number",
+        "blocks.radar.declare_n = '3': must be a number",
+        "blocks.radar.pulses = True: must be a number",
+        "terrain.height_m = False: must be a number",
+        "weather.rain_rate_mm_h = True: must be a number",
+        "weather.visibility_km = '5': must be a number",
+    ]

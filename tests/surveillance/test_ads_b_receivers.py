@@ -186,6 +186,11 @@ def test_the_tracker_follows_and_two_runs_are_the_same(scene):
         ("ether", 'reception = "certian"', "did you mean 'certain'?"),
         ("kea", "ads_b = { nacpp = 3 }", "nacp"),
         ("kea", "mode_s = 1", "mode_s = 1: must be true or false"),
+        ("kea", "ads_b = { nacp = true }", "ads_b.nacp = True: must be a number"),
+        ("kea", 'ads_b = { nacp = "8" }', "ads_b.nacp = '8': must be a number"),
+        ("kea", "ads_b = { latency_s = false }", "ads_b.latency_s = False: must be a number"),
+        ("ether", "range_km = true", "blocks.ether.range_km = True: must be a number"),
+        ("ether", "elevation_deg = [false, 20]", "elevation_deg[0] = False: must be a number"),
         ("kea", 'mode_c = "yes"', "mode_c = 'yes': must be true or false"),
     ],
 )

@@ -95,6 +95,13 @@ def test_it_plays_at_a_speed_and_pauses(page):
     assert page.evaluate("App.state().t") == stopped
 
 
+def test_on_a_narrow_screen_the_buttons_cover_no_aircraft(page):
+    page.set_viewport_size({"width": 390, "height": 844})
+    tools, plan = (page.locator(name).bounding_box() for name in ("#plan-tools", "#plan"))
+    assert tools["y"] + tools["height"] <= plan["y"]
+    assert plan["height"] > 200
+
+
 def test_a_link_opens_at_its_instant(page, recorded, browser):
     page.evaluate("App.seek(96.1)")
     page.locator("#up").click()
