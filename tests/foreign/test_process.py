@@ -271,19 +271,26 @@ def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
         assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
 
 
-@pytest.mark.parametrize("call", [1, 4, 17, 38])
-def test_one_that_is_killed_and_started_again_goes_on_from_its_state(tmp_path, call):
+def counting(**arguments):
+    """Run a program that may be killed and started again."""
     command = [sys.executable, str(Path(__file__).with_name("counts.py"))]
     found = scene(command, duration_s=8, snapshots=True, on_failure="restart")
     found["wires"].remove("eye -> part -> fusion")
     found["wires"] += [
         "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
     ]  # fmt: skip
-    part = found["blocks"]["part"]
-    part["arguments"] = {"every": 5}
-    undisturbed = dsa_des.run(found)
-    part["arguments"] |= {"dies_at": call, "marker": str(tmp_path / "died")}
-    killed = dsa_des.run(found)
+    found["blocks"]["part"]["arguments"] = {"every": 5, **arguments}
+    return dsa_des.run(found)
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return counting()
+
+
+@pytest.mark.parametrize("call", [1, 4, 17, 38])
+def test_one_that_is_killed_and_started_again_goes_on_from_its_state(tmp_path, call, undisturbed):
+    killed = counting(dies_at=call, marker=str(tmp_path / "died"))
     assert (tmp_path / "died").exists()
     assert killed.info["summary"]["restarts"] == {"part": 1}
     assert killed.manoeuvres.to_pylist() == undisturbed.manoeuvres.to_pylist()
