@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.aircraft.known_targets import KnownTraffic
 from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
@@ -42,7 +42,6 @@ from components.traffic.flown_flights import (
     FlownFlights,
     arrived_manoeuvres,
     due_manoeuvres,
-    flights_of_runs,
     steered,
 )
 from components.traffic.wind_effect import ATTITUDE
@@ -211,7 +210,8 @@ class TrafficSource(Component):
         asked = self._offered is not None and self._offered.asked
         if asked:
             return None
-        flights = flights_of_runs(self, parameters, make)
+        self.prepare(parameters)
+        flights = self.flights_of_runs(parameters, make)
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
@@ -220,9 +220,22 @@ class TrafficSource(Component):
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
             self._check_terrain(partial(_one_of, flights.own, number))
-        found = copy(self)
-        found._fly(flights, [p.update_rate_hz for p in parameters])
-        return found
+        of_all = copy(self)
+        of_all._fly(flights, [p.update_rate_hz for p in parameters])
+        return of_all
+
+    def flights_of_runs(
+        self, parameters: Sequence[Any], make: Callable[[int], Any]
+    ) -> FlightsOfRuns | None:
+        """Return the flights of runs with these parameters; None where their rosters do not fit."""
+        own, targets = [], []
+        aircraft: list[tuple[str, Aircraft]] = []
+        for source in map(make, range(len(parameters))):
+            own.append(source.own)
+            targets += list(source.targets)
+            aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
+        roster = joint_roster(self.roster, aircraft)
+        return None if roster is None else FlightsOfRuns(fleet_of(own), fleet_of(targets), roster)
 
     @property
     def width(self) -> int:
