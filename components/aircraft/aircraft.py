@@ -316,18 +316,18 @@ class Roster:
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:
             tables: list[Any] = []
-            place = np.full(len(self.aircraft), -1, dtype=np.int64)
+            index = np.full(len(self.aircraft), -1, dtype=np.int64)
             for target, craft in enumerate(self.aircraft):
                 file = attrgetter(path)(craft)
                 if file is None:
                     continue
                 same = [i for i, table in enumerate(tables) if table is file.table]
-                place[target] = same[0] if same else len(tables)
+                index[target] = same[0] if same else len(tables)
                 if not same:
                     tables.append(file.table)
-            cache[path] = tuple(tables), place
-        found: tuple[tuple[Any, ...], IntArray] = cache[path]
-        return found
+            cache[path] = tuple(tables), index
+        result: tuple[tuple[Any, ...], IntArray] = cache[path]
+        return result
 
 
 #: What other aircraft of replicas may have of their own; see `joint_roster`.
@@ -347,10 +347,10 @@ def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Ros
         return None
     same = True
     for number, (name, craft) in enumerate(aircraft):
-        place = number % width
-        if name != first.names[place]:
+        index = number % width
+        if name != first.names[index]:
             return None
-        other = first.aircraft[place]
+        other = first.aircraft[index]
         if _alike(craft, other):
             continue
         same = False

@@ -1,4 +1,4 @@
-"""The flights of all runs of a traffic source as they are known: ownships fly what they are told.
+"""The flights of all runs of a traffic source as they are known, with manoeuvres commanded so far.
 
 What each row holds is what a run alone would give, to the bit; a single run is run 0.
 """
@@ -171,6 +171,6 @@ def _instants(coming: list[Coming]) -> RunTicks:
 def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
     """Return 1 for the rows of some ownships at or after what came for each of them."""
     order = np.argsort(ownship)
-    place = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
-    mine = order[place]
+    index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
+    mine = order[index]
     return ((ownship[mine] == run) & (ticks >= came[mine])).astype(np.int64)

@@ -136,10 +136,13 @@ class ScriptedTraffic(TrafficSource):
         roster = joint_roster(self.roster, [(craft.name, craft) for craft in crafts])
         if roster is None:
             return None
-        places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
-        references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
+        positions = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
+        references = np.repeat(np.array(positions, dtype=np.float64), width, axis=0)
         starts = _start_positions(crafts, references)
-        ownships, targets = _straight(own, places, self.wind), _straight(crafts, starts, self.wind)
+        ownships, targets = (
+            _straight(own, positions, self.wind),
+            _straight(crafts, starts, self.wind),
+        )
         return FlightsOfRuns(ownships, targets, roster)
 
     def sample_times(self) -> list[SampleTimes]:

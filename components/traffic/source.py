@@ -136,7 +136,7 @@ class TrafficSource(Component):
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be.
 
-        It is the same word for all who ask: whether a block went by where the targets can be
+        All blocks get the same offer: whether a block went by where the targets can be
         must show when replicas compare what their traffic says.
         """
         if self._offered is None:
@@ -185,8 +185,8 @@ class TrafficSource(Component):
             return
         if not self.context.producers:
             end_s = float(self.context.duration_s) + lasts_s
-            found = near_intervals(flights.own, flights.targets, reach_m, end_s)
-            self._flown = replace(self._flown, intervals=found)
+            intervals = near_intervals(flights.own, flights.targets, reach_m, end_s)
+            self._flown = replace(self._flown, intervals=intervals)
         elif lasts_s == 0.0:
             self._epochs = SteeredCulling(flights.own, flights.targets, reach_m)
 
@@ -308,8 +308,8 @@ class TrafficSource(Component):
             return columns, flown.intervals.near(columns, time_s, lasts_s)
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
         times = np.repeat(time_s, len(columns))
-        found = flown.intervals.holds(each, times, times + lasts_s)
-        return columns, found.reshape(len(time_s), len(columns))
+        near = flown.intervals.holds(each, times, times + lasts_s)
+        return columns, near.reshape(len(time_s), len(columns))
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""
@@ -350,7 +350,7 @@ class TrafficSource(Component):
         names = self.roster.names
         best = self._closest_approaches(end_s)
         where = censored_approaches(self, best.time_s, end_s)
-        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
+        closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         return {
             "targets": {
                 name: {
@@ -362,7 +362,7 @@ class TrafficSource(Component):
                     if math.isfinite(range_m)
                     else None
                 }
-                for name, time_s, range_m, at in found
+                for name, time_s, range_m, at in closest
             }
         }
 
