@@ -190,10 +190,10 @@ def alert_levels(
                 whole[cells[0], cells[1], :count] = part
     level = np.full(shape, -1, dtype=np.int64)
     early_level = np.zeros(shape, dtype=np.int64)
-    memory = AlertMemory(memory_rule(configuration), shape[1])
+    rule, targets = memory_rule(configuration), np.arange(shape[1])
+    memory = AlertMemory.new(rule, 0 * targets, targets)
     for row, now_s in enumerate(np.asarray(time_s).tolist()):
-        level[row] = np.where(
-            present[row], memory.step(now_s, present[row], due[row], early[row]), -1
-        )
-        early_level[row] = memory.early_levels(now_s, present[row])
+        memory, now = memory.step(rule, now_s, present[row], due[row], early[row])
+        level[row] = np.where(present[row], now, -1)
+        early_level[row] = memory.early_levels(rule, now_s, present[row])
     return Alerts(level, violation_s, early_level)
