@@ -238,18 +238,29 @@ class _Entries:
             if len(rows):
                 self.found[sensors.index(name)] = rows, entries[name].take(rows) + start
             start += len(new.message.target)
+        self._entries = start
 
-    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray]:
-        """Return the sensor and the entry that each row takes, -1 for none; the last one counts."""
+    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
+        """Return the sensor and the entry that each row takes, -1 for none; the last one counts.
+
+        The entries are None where they are those of the only message, one after the other.
+        """
+        taking = [index for index in ranked if index in self.found]
+        if len(self._messages) == 1 and taking:
+            (mine,) = taking
+            entry = self.found[mine][1]
+            if len(entry) == self._rows == self._entries and bool((entry[1:] > entry[:-1]).all()):
+                return np.full(self._rows, mine, dtype=np.int64), None
         sensor, entry = np.full((2, self._rows), -1, dtype=np.int64)
-        for index in ranked:
-            if index in self.found:
-                rows, mine = self.found[index]
-                sensor[rows], entry[rows] = index, mine
+        for index in taking:
+            rows, those = self.found[index]
+            sensor[rows], entry[rows] = index, those
         return sensor, entry
 
-    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray) -> Any:
+    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray | None) -> Any:
         """Return what rows take of a message's entries, (..., rows); NaN or 0 for none."""
+        if entry is None:
+            return of(self._messages[0])
         parts = [of(message) for message in self._messages]
         none = np.nan if parts[0].dtype.kind == "f" else 0
         parts.append(np.full((*parts[0].shape[:-1], 1), none, dtype=parts[0].dtype))
