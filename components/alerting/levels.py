@@ -158,20 +158,9 @@ def alert_levels(
 ) -> Alerts:
     """Return the alert levels of targets over time, memory included.
 
-    Parameters
-    ----------
-    configuration : Configuration
-    time_s : (times,)
-        The ownship's.
-    present : (times, targets) of bool
-    pairs : AlertPairs of (times, targets)
-        Finite also where a target is absent.
-    alerter : (times, targets) of int, optional
-        Place of each one's alerter in the configuration, from 0; the first for all by default.
-
-    Returns
-    -------
-    Alerts
+    `time_s` (times,) is the ownship's; `pairs` (times, targets) are finite also where a target is
+    not `present`. `alerter` (times, targets) is the index of each one's in the configuration, by
+    default the first for all.
     """
     shape = present.shape
     most = configuration.most_levels

@@ -25,13 +25,15 @@ class LocalTracks(KeyedTable):
     ``covariance`` (6, 6, n) of a track without a range are 0 and the identity. ``azimuth_rad`` and
     ``elevation_rad`` are the direction along the tracker's own axes, ``own_m`` (3, n) is where the
     ownship believed to be, and ``turn`` (3, 3, n) turns the axes into those of the frame; all this
-    speaks of ``time_s``. ``contributors`` and ``updated_by`` are masks over all sensors.
+    speaks of ``time_s``. ``contributors`` and ``updated_by`` are masks over all sensors;
+    ``row`` is that of the wake with which it came.
     """
 
     @classmethod
     def none(cls) -> Self:
         """Return no tracks."""
-        whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by")
+        whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by",
+                 "row")  # fmt: skip
         numbers = (
             "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
             "elevation_variance_rad2", "time_s", "updated_s",
