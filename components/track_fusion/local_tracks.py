@@ -8,6 +8,7 @@ import numpy as np
 from components.estimation.batched import times
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
+from components.geometry import unit_vector_unchecked
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from dsa_des.arrays.keyed_table import KeyedTable
@@ -67,11 +68,7 @@ class LocalTracks(KeyedTable):
 
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Return azimuth and elevation along the frame's axes."""
-        level = np.cos(self.elevation_rad)
-        unit = np.stack(
-            [level * np.cos(self.azimuth_rad), level * np.sin(self.azimuth_rad),
-             -np.sin(self.elevation_rad)]
-        )  # fmt: skip
+        unit = np.stack(unit_vector_unchecked(self.azimuth_rad, self.elevation_rad))
         north, east, down = times(self.turn, unit)
         return np.arctan2(east, north), np.arctan2(-down, np.hypot(north, east))
 
