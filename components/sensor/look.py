@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
+from dsa_des.arrays.column_values import of_one_value, picked
+from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
-from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 
@@ -107,24 +107,21 @@ class Cells:
         self.run_of_scan = targets.run[rows] if runs is None else runs
         self.message_rows = rows
         self.roster = targets.roster
-        place = wanted.ravel().nonzero()[0]
-        width = max(1, wanted.shape[1])
-        #: Index of each cell's scan within this look, and of its target in the roster.
-        if len(rows) == 1:
-            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
-        elif width == 1:
-            self.row, self.target = place, np.zeros(len(place), dtype=np.int64)
-        else:
-            self.row, self.target = np.divmod(place, width)
+        #: Index of each cell's scan within this look.
+        self.row, self._column = cells_of(wanted)
+        width = wanted.shape[1]
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
         # Rows that only rise and are as many as there are, are all of them.
-        self._everything = len(place) == targets.range_m.size and (
+        self._everything = len(self.row) == targets.range_m.size and (
             len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
         )
-        self._flat = place if self._everything else rows[self.row] * width + self.target
-        self.target = targets.columns[self.target]
+        self._flat = rows.take(self.row)
+        if width > 1:
+            self._flat = self._flat * width + self._column
+        #: And of its target in the roster.
+        self.target = targets.columns[self._column]
         #: Which lie in a cone of a cue; None where none does.
         self.cued: BoolArray | None = None
 
@@ -140,8 +137,12 @@ class Cells:
     def __getattr__(self, name: str) -> Any:
         if name[0] == "_":
             raise AttributeError(name)
-        flat = getattr(self._targets, name).reshape(-1)
-        gathered = flat if self._everything else flat.take(self._flat)
+        values = getattr(self._targets, name)
+        if self._width > 1 and of_one_value(values):  # of each target
+            gathered = values[0].take(self._column)
+        else:
+            flat = values.reshape(-1)
+            gathered = flat if self._everything else picked(flat, self._flat)
         self.__dict__[name] = gathered  # the next time it is a plain attribute
         return gathered
 
@@ -260,21 +261,6 @@ class CellValues(Protocol):
         """Return them, (cells,)."""
 
 
-class Cueing(Protocol):
-    """Finds what lies in the cones of cues."""
-
-    def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake, /) -> BoolArray | None:
-        """Return which targets do at each scan, (scans, targets), or None for none."""
-
-    def in_cones(
-        self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
-    ) -> BoolArray:
-        """Return which directions in body axes do at their row in the last call."""
-
-    def with_noise(self, detections: Detections) -> Detections:
-        """Return a report of the same scans whose false alarms say, too, if they do."""
-
-
 class Strengthening(Protocol):
     """Says how strong detections came out."""
 
@@ -289,6 +275,5 @@ class Judging(Protocol):
         """Return the look with a column ``declared``."""
 
 
-CUE = Hook("cue", Cueing, "which targets lie in a cue cone at each scan")
 STRENGTH = Hook("strength", Strengthening, "look: as strong as its detections came out")
 DECLARATION = Hook("declaration", Judging, "look: which detections declare their target")

@@ -13,25 +13,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages.columns import POSE
+from components.messages.cues import CueCones
 from components.messages.detections import REPORT, Detections, LastingError, Reporting, SensorOffer
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
+from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_pose
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from components.sensor.glint import APPARENT_PLACE, Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
-from components.sensor.look import (
-    CUE,
-    DECLARATION,
-    STRENGTH,
-    Cells,
-    Cueing,
-    Judging,
-    Look,
-    Strengthening,
-)
+from components.sensor.look import DECLARATION, STRENGTH, Cells, Judging, Look, Strengthening
 from components.sensor.measurement_errors import (
     MEASUREMENT,
     MeasurementErrors,
@@ -42,7 +34,7 @@ from components.sensor.measurement_errors import (
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
 from components.sensor.parameters import SensorParameters
-from dsa_des.arrays.column_values import constant, picked
+from dsa_des.arrays.column_values import constant
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
@@ -88,7 +80,7 @@ def _per_row(mask: BoolArray) -> IntArray:
         return _of_each(0, len(mask))
     if mask.shape[1] > _FEW_COLUMNS:
         return mask.sum(axis=1)
-    total = mask[:, 0].astype(np.int64)
+    total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column
     return total
@@ -96,19 +88,6 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 def _of_each(count: int, rows: int) -> IntArray:
     return constant(count, rows, np.int64)
-
-
-_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
-
-
-def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
-    """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
-    believed = targets.believed
-    if believed is None:
-        return {}
-    return {
-        field: picked(believed[name], rows) for name, field in zip(_BELIEVED, POSE, strict=True)
-    }
 
 
 #: Effects that every sensor has, after its own.
@@ -233,7 +212,7 @@ class Sensor(Measuring):
         return self.built(DECLARATION)
 
     @cached_property
-    def _cueing(self) -> Cueing | None:
+    def _cueing(self) -> ConesAhead | None:
         return self.built_one(CUE)
 
     @cached_property
@@ -352,7 +331,7 @@ class Sensor(Measuring):
             Message row of each scan.
         wake : Wake
         """
-        rows, reason = self._decide(targets, rows)
+        reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
@@ -365,24 +344,24 @@ class Sensor(Measuring):
             return {}
         return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
 
-    def _decide(self, targets: RelativeTargets, rows: IntArray) -> tuple[IntArray, ReasonArray]:
-        """Return message rows and reasons for each scan, from the gate's decision if it has one."""
+    def _decide(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
+        """Return the reasons of each scan, from the gate's decision if it has one."""
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
-            decision = targets.decisions[self.name]
-            place = decision.place[rows]
-            if len(place) == 1 == len(decision.reason) and place[0] == 0:
-                return rows, decision.reason
-            if place.min(initial=0) >= 0:
-                # All in order need no copy; where messages were lost, others stand for them.
-                if len(place) == len(decision.reason) and bool((place[1:] > place[:-1]).all()):
-                    return rows, decision.reason
-                return rows, decision.reason[place]
+            reason = targets.decisions[self.name].at(rows)
+            if reason is not None:
+                return reason
         part = targets.take(rows)
-        reason = self._reach_from_body.decide(
+        return self._reach_from_body.decide(
             part.body_azimuth_rad,
             part.body_elevation_rad,
             part.range_m,
             part.present,
             part.hidden,
         )
-        return rows, reason
+
+
+#: Inputs of a sensor that can be cued.
+CUED_INPUTS = {
+    **Sensor.inputs,
+    PORT: Input(CueCones, "sampled", "Where to look more closely.", required=False),
+}
