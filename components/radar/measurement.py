@@ -165,7 +165,7 @@ class Strength:
         else:
             tail = look.tail[detected]
         # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
-        # noise hears it as signal.
+        # noise takes it for signal.
         mean = look.signal["snr"][detected]
         with np.errstate(divide="ignore", invalid="ignore"):
             floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][detected]) / mean, 1.0)
@@ -222,7 +222,7 @@ def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
 
 
 def noise_at_targets(parameters: Any) -> list[str]:
-    """Say that looks which noise decides are reported at the target's own place, where they are."""
+    """Say that looks which noise decides are reported exactly at the target, where they are."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
     if parameters.errors != "grid" or not exact:
@@ -236,7 +236,7 @@ def noise_at_targets(parameters: Any) -> list[str]:
 class OwnVelocity(Effect[Reporting]):
     """The ownship's velocity over ground beside every detection; navigation has no error of it.
 
-    A range rate is of two aircraft: who estimates the other one's velocity from it must know ours.
+    A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
 
     lockstep = True

@@ -41,13 +41,7 @@ class Look:
     tail: FloatArray | None = None
 
     def check(self, cells: int) -> None:
-        """Refuse arrays without one value for each cell, and those of another kind than theirs.
-
-        Raises
-        ------
-        TypeError, ValueError
-            With the field, its length and that which it must have.
-        """
+        """Raise ValueError or TypeError unless arrays have a value of their kind by cell."""
         truths = {"detected": self.detected, "noise": self.noise}
         numbers = {**self.signal, "tail": self.tail}
         for table in (truths, {"confidence": self.confidence}, self.extras, numbers):
@@ -105,23 +99,23 @@ class Cells:
         self.run_of_scan = targets.run[rows] if runs is None else runs
         self.message_rows = rows
         self.roster = targets.roster
-        place = wanted.ravel().nonzero()[0]
+        index = wanted.ravel().nonzero()[0]
         width = max(1, wanted.shape[1])
         #: Index of each cell's scan within this look, and of its target in the roster.
         if len(rows) == 1:
-            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
+            self.row, self.target = np.zeros(len(index), dtype=np.int64), index
         elif width == 1:
-            self.row, self.target = place, np.zeros(len(place), dtype=np.int64)
+            self.row, self.target = index, np.zeros(len(index), dtype=np.int64)
         else:
-            self.row, self.target = np.divmod(place, width)
+            self.row, self.target = np.divmod(index, width)
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
         # Rows that only rise and are as many as there are, are all of them.
-        self._everything = len(place) == targets.range_m.size and (
+        self._everything = len(index) == targets.range_m.size and (
             len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
         )
-        self._flat = place if self._everything else rows[self.row] * width + self.target
+        self._flat = index if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
         #: Which lie in a cone of a cue; None where none does.
         self.cued: BoolArray | None = None
@@ -167,25 +161,11 @@ class Cells:
         return nanosecond_of(self.of_row("state_tick"), self._ticks_per_s)
 
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
-        """Return what is seen of some cells a little before or after they are looked at.
+        """Return fields of `RelativeTargets` of some cells, each by itself so many seconds later.
 
-        Parameters
-        ----------
-        cells : (n,) of int
-        ahead_s : (n,)
-            How much later, s; each cell by itself.
-
-        Returns
-        -------
-        dict of (n,) arrays
-            Fields of `RelativeTargets` by name, the ownship's pose as ``own_lat_deg`` and so on,
-            and the target's place as ``target_lat_deg`` and so on. ``present`` says whether both
-            aircraft are there then.
-
-        Raises
-        ------
-        ValueError
-            If the targets can be known only at the instants of the rows.
+        The ownship's pose is ``own_lat_deg`` and so on, the target's position ``target_lat_deg``
+        and so on; ``present`` says whether both aircraft are there then. ValueError if the targets
+        can be known only at the instants of the rows.
         """
         targets = self._targets
         if targets.revisit is None:
@@ -216,8 +196,8 @@ class Cells:
         """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not known."""
         attitude = self._targets.own_attitude
         if attitude is None:
-            nothing = np.zeros(len(self))
-            return nothing, nothing, nothing
+            zero = np.zeros(len(self))
+            return zero, zero, zero
         row = self._flat // self._width
         yaw, pitch, roll = (attitude[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
         return yaw, pitch, roll

@@ -26,7 +26,7 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
 
-_NOBODY = np.uint64(0)
+_NO_TARGET = np.uint64(0)
 _OWN, _OF_SIGNAL = 0, 1
 
 
@@ -67,10 +67,10 @@ class QuantityError:
     def _bias_of(self, run: IntArray) -> FloatArray:
         if not self._drawn:
             return np.full(len(run), self._bias)
-        runs, place = np.unique(run, return_inverse=True)
-        who, scan = np.full(len(runs), _NOBODY), np.zeros(len(runs), dtype=np.int64)
-        drawn = self._biases.of_runs(runs).uniform(who, scan)
-        return (self._bias * (2.0 * drawn - 1.0))[place]
+        runs, index = np.unique(run, return_inverse=True)
+        keys, scan = np.full(len(runs), _NO_TARGET), np.zeros(len(runs), dtype=np.int64)
+        drawn = self._biases.of_runs(runs).uniform(keys, scan)
+        return (self._bias * (2.0 * drawn - 1.0))[index]
 
 
 # A range that comes out below this, a millimetre, is no range.
@@ -79,7 +79,7 @@ _QUARTER = 0.5 * math.pi
 
 
 class ErrorModel:
-    """Measures with errors; called in place of the sensor's grid."""
+    """Measures with errors; called instead of the sensor's grid."""
 
     def __init__(self, block: Any) -> None:
         p = block.p
