@@ -39,40 +39,17 @@ _STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
 
 
 class ScriptedTrajectory:
-    """An aircraft that flies a script; every position is computed from its leg's start.
+    """An aircraft that flies a script from `start_time_s` to `end_time_s`, both included.
 
     Nothing is integrated, so there is no drift. Straight legs follow the geodesic of the WGS-84
-    ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed
-    is measured at the flight's own altitude. Turns are circles (see `turn_parameters`).
+    ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed is
+    measured at the flight's own altitude. Turns are circles (see `turn_parameters`). Without legs
+    it flies straight on; the last leg goes on for ever.
 
-    Parameters
-    ----------
-    name : str
-        The aircraft's name.
-    lat_deg, lon_deg, alt_m : float
-        Where it is at `start_time_s`.
-    heading_deg : float
-        Clockwise from true north.
-    speed_mps : float
-        Ground speed; 0 stands still.
-    climb_mps : float
-        Rate of climb of every leg that does not give its own.
-    legs : sequence of legs
-        `Straight`, `Turn`, `Climb`, `Stationary`, `Waypoints`. None means straight on. The last
-        leg goes on for ever: a turn keeps turning, a climb without `to_alt_m` keeps climbing.
-    yaw_deg, pitch_deg, roll_deg : float, optional
-        Fixed attitude. What is not given follows the path: yaw is the track, pitch the
-        flight-path angle, roll the bank of a coordinated turn, atan(V·rate/g).
-    reference : tuple of three float, optional
-        Latitude, longitude and altitude from which waypoints given as offsets are measured:
-        the ownship's start. Left out: this aircraft's own start.
-    start_time_s, end_time_s : float
-        The aircraft is there from the one to the other, both included.
-
-    Raises
-    ------
-    ValueError
-        A value that is not allowed, naming it.
+    Attitude that is not given follows the path: yaw is the track, pitch the flight-path angle, roll
+    the bank of a coordinated turn, atan(V·rate/g). Waypoints given as offsets count from
+    `reference` (latitude, longitude, altitude), by default the aircraft's own start. ValueError
+    names the value that is not allowed.
     """
 
     def __init__(
@@ -284,16 +261,19 @@ class ScriptedFleet(Fleet):
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times."""
         times = checked_times(time_s)
-        state = empty_state(len(times), len(self))
         groups, others = self._parts
-        for group in groups:
-            group.fill(state, times)
+        parts = [(group.columns, group.at(times)) for group in groups]
         if len(others):
             shape = len(times), len(others)
             aircraft = np.broadcast_to(others, shape).reshape(-1)
             several = self.each(aircraft, np.repeat(times, len(others))).reshaped(shape)
-            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
-                out[:, others] = columns
+            parts.append((others, several))
+        if len(parts) == 1:
+            return parts[0][1]
+        state = empty_state(len(times), len(self))
+        for members, part in parts:
+            for out, columns in zip(state.arrays(), part.arrays(), strict=True):
+                out[:, members] = columns
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
@@ -358,7 +338,7 @@ class ScriptedFleet(Fleet):
             groups.append(
                 _Group(
                     FORMULAS[KINDS[kind]],
-                    slice(None) if len(members) == len(flights) else members,
+                    members,
                     self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
                     np.where(np.isnan(fixed), derived, fixed),
@@ -373,26 +353,29 @@ class _Group:
     """Flights of one leg each that share a formula: one array expression."""
 
     formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
-    columns: slice | IntArray
+    columns: IntArray
     table: FloatArray
     times_s: tuple[FloatArray, FloatArray, FloatArray]
     attitude: FloatArray
     yaw_is_fixed: BoolArray
 
-    def fill(self, state: TrajectoryState, times: FloatArray) -> None:
-        """Write the group's columns of the state."""
+    def at(self, times: FloatArray) -> TrajectoryState:
+        """Return the group's states, (times, flights); angles that never change, once for all."""
         start_s, end_s, until_s = self.times_s
+        shape = len(times), len(start_s)
+        moving = lat, lon, alt, yaw = tuple(np.empty(shape) for _ in range(4))
+        present = np.empty(shape, dtype=bool)
         rows = max(1, CELLS_AT_ONCE // len(start_s))
-        fixed_yaw, pitch, roll = self.attitude
         for first in range(0, len(times), rows):
             block = slice(first, first + rows)
             t = times[block, np.newaxis]
             inside = np.maximum(t, start_s)
             np.minimum(inside, until_s, out=inside)
             inside -= start_s
-            lat, lon, alt, yaw = self.formula(self.table, inside)
-            if self.yaw_is_fixed.any():
-                yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
-            values = (lat, lon, alt, yaw, pitch, roll, (t >= start_s) & (t <= end_s))
-            for out, value in zip(state.arrays(), values, strict=True):
-                out[block, self.columns] = value
+            for out, values in zip(moving, self.formula(self.table, inside), strict=True):
+                out[block] = values
+            np.logical_and(t >= start_s, t <= end_s, out=present[block])
+        fixed_yaw, pitch, roll = (np.broadcast_to(angle, shape) for angle in self.attitude)
+        if self.yaw_is_fixed.any():
+            yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

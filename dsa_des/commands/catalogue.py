@@ -202,15 +202,7 @@ def _line(example: Example, width: int) -> str:
 
 
 def _copy(target: Path) -> None:
-    """Copy the folders of all packages; several each into a folder of the package's name.
-
-    Raises
-    ------
-    UsageError
-        If the target is there already and not empty, or is no place for a folder.
-    OutputError
-        If it cannot be written.
-    """
+    """Copy the folders of all packages; several each into a folder of the package's name."""
     sources = folders()
     if not sources:
         raise UsageError("no installed package ships scenes or studies")

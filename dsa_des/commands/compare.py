@@ -160,18 +160,11 @@ def _compare_swap(
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
-    axis = f"swap.{chosen[0][0]}"
-    place = tables.rows.axes.index(axis)
-    by_place = dict(tables.rows.each_place())
-    metrics = tables.notable_results(results)
-    for at, rows in by_place.items():
-        base = (*at[:place], chosen[0][1][0], *at[place + 1 :])
-        if at[place] == chosen[0][1][0] or base not in by_place:
-            continue
-        names = (chosen[0][1][0], str(at[place]))
-        for metric in metrics:
-            units = Units(tables, by_place[base]), Units(tables, rows)
-            _farthest_apart(metric, units, names)
+    block, (own, _) = chosen[0]
+    for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
+        for metric in tables.notable_results(results):
+            units = Units(tables, base), Units(tables, rows)
+            _farthest_apart(metric, units, (own, str(value)))
     return [tables]
 
 

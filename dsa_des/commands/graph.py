@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import networkx as nx
 
-from dsa_des.commands.scene import load
+from dsa_des.commands.scene import SceneOptions, load
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import named
@@ -19,20 +19,11 @@ from dsa_des.terminal.terminal import console, say, say_lines
 from dsa_des.text.safe_text import printable, shortened
 
 
-def show_graph(
-    scene: str,
-    sets: tuple[str, ...],
-    swaps: tuple[str, ...],
-    seed: int | None,
-    duration: str | None,
-    dot: bool,
-    png: bool,
-    out: str | None,
-) -> None:
+def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOptions]) -> None:
     """Print or draw the graph of a scene."""
     if dot and png:
         raise UsageError("give --dot or --png, not both")
-    loaded = load(scene, sets, swaps, seed, duration)
+    loaded = load(**options)
     if dot:
         say_lines(to_dot(loaded))
     elif png:

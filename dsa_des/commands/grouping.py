@@ -27,15 +27,7 @@ class _NotBack(Exception):
 
 
 def check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
-    """Run a few scans one by one and all at once: a stranger's block must not see which it is.
-
-    Raises
-    ------
-    SceneError
-        If results differ.
-    BlockFailure
-        If a block fails, or the scans take longer than a minute: it names the block that ran then.
-    """
+    """Run a few scans one by one and all at once: a stranger's block must not see which it is."""
     strangers = [
         name
         for name, block in loaded.blocks.items()

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from dsa_des.block.foreign import Foreign, Imports, imports
 from dsa_des.commands.grouping import check_grouping
@@ -28,6 +28,16 @@ from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import say, say_json
 from dsa_des.text.safe_text import shell_line, shortened
+
+
+class SceneOptions(TypedDict):
+    """What `scene_options` adds to a command."""
+
+    scene: str
+    sets: tuple[str, ...]
+    swaps: tuple[str, ...]
+    seed: int | None
+    duration: str | None
 
 
 def load(
@@ -64,28 +74,24 @@ def check_command(
 
 
 def run_scene(
-    scene: str,
-    sets: tuple[str, ...],
-    swaps: tuple[str, ...],
-    seed: int | None,
-    duration: str | None,
     out: str | None,
     quiet: bool,
     as_json: bool,
     simulate_everything: bool,
     realtime: str | None,
     no_figures: bool,
+    **options: Unpack[SceneOptions],
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
-    loaded = load(scene, sets, swaps, seed, duration, noted=True)
+    loaded = load(**options, noted=True)
     target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
         simulate_everything=simulate_everything,
         silent=quiet or as_json,
-        notes_command=None if quiet else check_command(scene, sets, swaps, seed, duration),
+        notes_command=None if quiet else check_command(**options),
         pacer=pacer,
         draw=not no_figures,
     )
@@ -111,14 +117,7 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def check_scene_file(
-    scene: str,
-    sets: tuple[str, ...],
-    swaps: tuple[str, ...],
-    seed: int | None,
-    duration: str | None,
-    no_import: bool,
-) -> None:
+def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
     """Load a scene, prepare its blocks (files are read), and say what was found.
 
     Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its
@@ -131,7 +130,8 @@ def check_scene_file(
         say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
 
     with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
-        loaded = load(scene, sets, swaps, seed, duration, noted=True)
+        loaded = load(**options, noted=True)
+        scene = options["scene"]
         if no_import and policy.seen:
             say(
                 f"{scene}: nothing wrong as far as it was checked. {len(loaded.blocks)} blocks; "
@@ -140,7 +140,7 @@ def check_scene_file(
             )
             return
         simulation = Simulation(loaded)
-        check_grouping(loaded, partial(load, scene, sets, swaps, seed, noted=True))
+        check_grouping(loaded, partial(load, **options, noted=True))
     say_if_long(simulation)
     say_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
@@ -161,16 +161,10 @@ _WIDE = 300
 
 
 def explain_scene(
-    scene: str,
-    sets: tuple[str, ...],
-    swaps: tuple[str, ...],
-    seed: int | None,
-    duration: str | None,
-    measure: bool,
-    simulate_everything: bool,
+    measure: bool, simulate_everything: bool, **options: Unpack[SceneOptions]
 ) -> None:
     """Print a table of every block's effects; with `measure`, run the scene to time them."""
-    loaded = load(scene, sets, swaps, seed, duration)
+    loaded = load(**options)
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line

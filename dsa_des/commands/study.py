@@ -295,13 +295,7 @@ def report_command(folder: str, out: str | None, no_figures: bool, measure: bool
 
 
 def result_names(results: Sequence[Result], only: Sequence[str]) -> list[str]:
-    """Return the names of results.
-
-    Raises
-    ------
-    UsageError
-        If one of `only` is none of them.
-    """
+    """Return the names of results."""
     every = [result.name for result in results if result.summed_up]
     for name in only:
         if name not in every:

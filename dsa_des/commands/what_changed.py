@@ -157,20 +157,12 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
     if tables.baseline is None:
         return
     axis, baseline = tables.baseline
-    place = tables.rows.axes.index(axis)
-    by_place = dict(tables.rows.each_place())
+    names_of = [shortened(name) for name in tables.rows.axes if name != axis]
     found: dict[Any, list[tuple[str, Pair]]] = {}
-    for at, rows in by_place.items():
-        base = (*at[:place], baseline, *at[place + 1 :])
-        if at[place] == baseline or base not in by_place:
-            continue
-        others = [
-            f"{shortened(name)} = {short(at[k])}"
-            for k, name in enumerate(tables.rows.axes)
-            if k != place
-        ]
-        pair = Units(tables, by_place[base]), Units(tables, rows)
-        found.setdefault(at[place], []).append((", ".join(others), pair))
+    for value, others, base, rows in tables.rows.against(axis, baseline):
+        where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
+        pair = Units(tables, base), Units(tables, rows)
+        found.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")
     for value, places in found.items():

@@ -41,13 +41,7 @@ def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
-    """Return largest allowed errors by unit from texts such as ``0.5mrad``.
-
-    Raises
-    ------
-    UsageError
-        If one is no number with a unit of these ladders.
-    """
+    """Return largest allowed errors by unit from texts such as ``0.5mrad``."""
     units = sorted({q.unit for ladder in ladders for q in ladder.quantities})
     found: dict[str, float] = {}
     for text in texts:
@@ -228,11 +222,6 @@ def climb(
 
     `budgets` are largest allowed errors by unit, else the scene's ``[accuracy]``; `against` is
     another reference than the ladder's own; `compare` says what changed in what the run found.
-
-    Raises
-    ------
-    Unavailable
-        If the reference cannot be had in this scene.
     """
     reference = against or ladder.reference
     best = Choice(block, ladder, ladder.rung(reference))

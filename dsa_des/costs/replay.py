@@ -92,15 +92,7 @@ class RungRun:
 
 
 def run_rung(scene: Scene, block: str) -> RungRun:
-    """Run a scene, recording what it records and the wakes of one block.
-
-    Raises
-    ------
-    BlockFailure
-        If a block failed.
-    SceneError
-        If a block cannot be set up.
-    """
+    """Run a scene, recording what it records and the wakes of one block."""
     sink = MemorySink()
     simulation = Simulation(scene, recorder=Recorder([sink]))
     component = simulation.components[block]

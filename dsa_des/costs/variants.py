@@ -1,6 +1,5 @@
 """A scene with another rung in one of its blocks, everything else as it was."""
 
-import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +7,9 @@ from typing import Any
 
 from dsa_des.block.ladder import Ladder, Rung, Unavailable
 from dsa_des.errors import SceneError
-from dsa_des.scene.overrides import apply_swap
-from dsa_des.scene.scene import Scene, check_scene, open_scene
-from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
+from dsa_des.scene.overrides import apply_changes, read_changes, swap_type
+from dsa_des.scene.scene import Scene, check_scene
+from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
 
 #: Lets the engine replace models by itself; a rung must be what it says.
 _CHOOSES_BY_ITSELF = "accuracy"
@@ -29,11 +28,6 @@ class Variants:
     """Makes scenes that differ from one scene by the rungs of their blocks.
 
     ``[accuracy]`` is left out of all of them, since it lets the engine choose rungs by itself.
-
-    Raises
-    ------
-    SceneError
-        If the scene itself cannot be run.
     """
 
     def __init__(
@@ -45,13 +39,12 @@ class Variants:
         seed: int | None = None,
         duration_s: object = None,
     ) -> None:
-        scene_file, problems, dropped = open_scene(
-            path, sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
-        )
-        stated = check_scene(copy.deepcopy(scene_file), problems)
+        scene_file = read_scene_file(path)
+        changes, problems = read_changes(sets, swaps, seed, duration_s)
+        wrong, self.dropped = apply_changes(scene_file, changes)
+        stated = check_scene(scene_file.copy(), problems + wrong)
         #: What ``[accuracy]`` of the scene allows.
         self.tolerance: Mapping[str, float] = stated.tolerance
-        self.dropped = dropped
         scene_file.data.pop(_CHOOSES_BY_ITSELF, None)
         self._file = scene_file
         self.scene = self.with_rungs(())
@@ -61,13 +54,8 @@ class Variants:
         """Return the scene with these rungs in their blocks.
 
         Of rungs `shared` only the `Rung.shared` parameters are set, after `choices`.
-
-        Raises
-        ------
-        Unavailable
-            If a rung needs what the scene does not give.
         """
-        scene_file: SceneFile = copy.deepcopy(self._file)
+        scene_file = self._file.copy()
         for choice in choices:
             self._apply(scene_file, choice)
         for choice in shared:
@@ -83,7 +71,7 @@ class Variants:
             block.pop(key, None)
         values = choice.rung.changes(self._blocks[choice.block])
         if choice.rung.type_name:
-            problems, _ = apply_swap(scene_file, f"{choice.block}={choice.rung.type_name}")
+            problems, _ = swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
             if problems:
                 raise Unavailable("; ".join(_brief(problem) for problem in problems))
         _set(scene_file, choice.block, values)

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.results.record import Result, as_text
-from dsa_des.scene.keys import key_in
+from dsa_des.scene.keys import flat, key_in
 from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
@@ -23,7 +23,6 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_file import read_study
-from dsa_des.studies.study_tables import flat_values
 
 #: The name of the study of the system itself, and of the one that changes a parameter at a time.
 ASSESSED, SENSITIVITY = "assessed", "sensitivity"
@@ -157,25 +156,16 @@ class CaseTables(Parameters):
 
 @dataclass(frozen=True)
 class EvidenceCase:
-    """A checked case.
+    """A checked case."""
 
-    Parameters
-    ----------
-    file : SceneFile
-        Its tables as read.
-    tables : CaseTables
-    studies : dict
-        By name, in the order in which they run.
-    results : dict
-        What each study gives, by its name and the result's.
-    sensitivity : tuple of (SensitivityKey, object, str)
-        For each value of the axis after the first: key, value, label.
-    """
-
+    #: Its tables as read.
     file: SceneFile
     tables: CaseTables
+    #: By name, in the order in which they run.
     studies: Mapping[str, Study]
+    #: What each study gives, by its name and the result's.
     results: Mapping[str, Mapping[str, Result]]
+    #: For each value of the axis after the first: key, value, label.
     sensitivity: tuple[tuple[SensitivityKey, Any, str], ...] = ()
 
     @property
@@ -189,11 +179,6 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
 
     `replicas` takes the place of those that the system's study states, and of those beside it
     where the case states none.
-
-    Raises
-    ------
-    SceneError
-        With every problem of the case, or of the first study that has any.
     """
     file = read_scene_file(path)
     problems = apply_sets(file, sets)
@@ -234,7 +219,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
 
 
 def _set_of_system(tables: CaseTables) -> list[str]:
-    return [f"set.{key}={set_text(value)}" for key, value in flat_values(tables.set).items()]
+    return [f"set.{key}={set_text(value)}" for key, value in flat(tables.set).items()]
 
 
 def _assessed(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
@@ -331,7 +316,7 @@ def _without_source(case: EvidenceCase) -> list[Any]:
     """Return a problem for every block whose scene states a value that no source covers."""
     found = []
     sources, scene = case.tables.sources, case.assessed.scene(0)
-    for key in flat_values(sources):
+    for key in flat(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:
             hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
@@ -359,5 +344,5 @@ def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
     """Return where a parameter's value is from: what is said of the key, or else of its block."""
-    known = {name.removeprefix("blocks."): str(text) for name, text in flat_values(sources).items()}
+    known = {name.removeprefix("blocks."): str(text) for name, text in flat(sources).items()}
     return known.get(f"{block}.{key}", known.get(block))

@@ -30,22 +30,14 @@ _ON_THE_WAY, _AT_THE_END = 16, 25
 
 @dataclass(frozen=True)
 class Convergence:
-    """A running estimate over the number of units.
-
-    Parameters
-    ----------
-    counts : list of int
-    estimates : list of Estimate
-        With as many units.
-    last_from : int
-        Units from which on the rule counts.
-    moved, allowed : float
-        Largest distance from the final estimate since, and what the rule allows.
-    """
+    """A running estimate over the number of units."""
 
     counts: list[int]
+    #: With as many units.
     estimates: list[Estimate]
+    #: Units from which on the rule counts.
     last_from: int
+    #: Largest distance from the final estimate since, and what the rule allows.
     moved: float
     allowed: float
 

@@ -22,20 +22,13 @@ DEFAULT = "default"
 
 @dataclass(frozen=True)
 class CaseFiles:
-    """The files of a case.
+    """The files of a case."""
 
-    Parameters
-    ----------
-    root : Path
-        What relative names count from.
-    names : dict
-        File → its name below the root; a shipped one's place among those.
-    case : str
-        Name of the case's own file.
-    """
-
+    #: What relative names count from.
     root: Path
+    #: File → its name below the root; a shipped one's place among those.
     names: Mapping[Path, str]
+    #: Name of the case's own file.
     case: str
 
     def shown(self, text: str) -> str:
@@ -60,13 +53,7 @@ class CaseFiles:
 
 
 def files_of_case(case: EvidenceCase) -> CaseFiles:
-    """Return the files that a case and its studies read.
-
-    Raises
-    ------
-    OSError
-        If one of them cannot be read.
-    """
+    """Return the files that a case and its studies read."""
     own = Path(os.path.abspath(case.file.path))
     found = {own, *_paths(case.file.sources.values())}
     for study in case.studies.values():

@@ -1,7 +1,5 @@
 """The pack of a case: one folder with what was asked, what was found, and all that repeats it."""
 
-import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -27,6 +25,7 @@ from dsa_des.evidence.inputs import (
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.models import read_explained, versions
 from dsa_des.results.tables import Tables
+from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import shell_line
 
 #: The parts of a pack: what is read by people, and by programs; inputs; the studies' own folders.
@@ -34,18 +33,7 @@ PAGE, MACHINE, INPUTS, STUDIES = "evidence.html", "evidence.json", "inputs", "st
 
 
 class Pack:
-    """What a case shows, once its studies have run.
-
-    Parameters
-    ----------
-    case : EvidenceCase
-    folders : mapping
-        Of every study of the case, finished.
-    sets : sequence of str
-        Changes of the case's file from the command line.
-    replicas : int, optional
-        That the command line asked for.
-    """
+    """What a case shows, once its studies have run."""
 
     def __init__(
         self, case: EvidenceCase, folders: Mapping[str, StudyFolder], tables: Mapping[str, Tables],
@@ -100,7 +88,7 @@ class Pack:
 
     def machine_readable(self) -> bytes:
         """Return the content of ``evidence.json``."""
-        text = json.dumps(_finite(self.evidence()), indent=1, allow_nan=False, ensure_ascii=False)
+        text = json_text(self.evidence(), digits=12, indent=1, ensure_ascii=False)
         return f"{text}\n".encode()
 
     def _lines(self, name: str, study: str = ASSESSED) -> list[Any]:
@@ -165,14 +153,3 @@ def _changed(one: ParameterChange) -> dict[str, Any]:
         "value": one.value, "result": one.result, "difference": d.value, "low": d.low,
         "high": d.high, "in_limits": one.in_limits,
     }  # fmt: skip
-
-
-def _finite(value: Any) -> Any:
-    """Return plain values in which what is no number is null, floats rounded."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float):
-        return float(f"{value:.12g}") if math.isfinite(value) else None
-    return value

@@ -11,99 +11,14 @@ from markupsafe import Markup
 
 from dsa_des.evidence.inputs import DEFAULT
 from dsa_des.results.labels import readable, short
-from dsa_des.results.report import PAGE_HEAD, page_environment
+from dsa_des.results.report import PAGE_HEAD, page_environment, page_part
 from dsa_des.text.safe_text import printable
 
-_PAGE = (
-    PAGE_HEAD
-    + """<style>table{width:auto}td{min-width:4em}</style>
-<header><h1>{{ title }}</h1>
-<p class="verdict"><strong>{{ verdict }}</strong></p>
-<p>{{ e.case.description }}</p>
-<p class="note">Assessed: {{ e.system.name }}, version {{ e.system.version }}. Made by dsa_des \
-{{ e.versions.dsa_des }}. The same in numbers: <code>evidence.json</code>.</p>\
-</header>
-<nav><a href="#requirements">Requirements</a> <a href="#beside">Beside it</a> \
-<a href="#encounters">Encounters</a> <a href="#convergence">Convergence</a> \
-<a href="#sensitivity">Sensitivity</a> <a href="#parameters">Parameters</a> \
-<a href="#models">Models</a> <a href="#left_out">Left out</a> \
-<a href="#repeat">To repeat it</a></nav><main>
-<h2 id="system">The system</h2><p>{{ e.system.description }}</p>
-<h2 id="requirements">Requirements and evidence</h2>
-{{ table(("requirement", "asked", "found", level + " interval", "verdict"), requirements) }}
-{{ table(("requirement", "in words", "as asked by"), asked) }}
-<p class="note">met: the whole interval lies within the limit. not met: the whole interval lies \
-beyond it. not shown: the interval holds the limit. not converged: no verdict is given.</p>
-{% if ratios %}
-<h3>Parts of the ratios</h3>
-{{ table(("result", "ratio", "unresolved", "induced", "events without, with, induced", \
-"effective size"), ratios) }}
-<p class="note">Unresolved: what happens without the system and with it. Induced: what happens \
-with it alone. They add up to the ratio.</p>
-{% endif %}
-{% if also %}
-<h3>Further results</h3>{{ table(("result", "found", level + " interval", "meaning"), also) }}
-{% endif %}
-<h2 id="beside">Beside it</h2>
-{% if beside %}
-{{ table(beside_heads, beside) }}
-{% for one in e.beside %}<p class="note">{{ one.name }}: {{ one.about }} \
-({{ one.encounters }} encounters)</p>{% endfor %}
-{% else %}<p>The case names nothing to stand beside the system.</p>{% endif %}
-<h2 id="encounters">The encounters</h2>
-{{ table(("", ""), sample) }}
-<h2 id="convergence">Convergence</h2><p>The rule: {{ e.convergence.rule }}.</p>
-{{ table(("requirement", "moved by up to", "may move", "over encounters", ""), settled) }}
-<figure><img alt="running estimates" src="data:image/png;base64,{{ convergence | plain }}">\
-<figcaption>Running estimates over the number of encounters.</figcaption></figure>
-<h2 id="sensitivity">Sensitivity</h2>
-{% if changes %}
-<p>One parameter at a time, on the same {{ e.sensitivity_encounters }} encounters; the parameter \
-that matters most stands first.</p>
-<figure><img alt="sensitivity" src="data:image/png;base64,{{ sensitivity | plain }}">\
-<figcaption>Paired differences with their {{ level }} intervals.</figcaption></figure>
-<details><summary>In numbers</summary>
-{{ table(("parameter", "as stated", "changed to", "result", "difference", level + " interval"),
-         changes) }}</details>
-{% else %}<p>The case names no parameter to change.</p>{% endif %}
-<h2 id="parameters">Parameters and their sources</h2>
-{% for block, source, rows in stated %}
-<h3>{{ block }}</h3><p>{{ source }}</p>
-<details><summary>{{ rows | length }} stated</summary>
-{{ table(("parameter", "value", "meaning", "source", "written in"), rows) }}</details>
-{% endfor %}
-<details><summary>Parameters at the default of their model ({{ defaults | length }})</summary>
-{{ table(("parameter", "value", "meaning"), defaults) }}</details>
-<h2 id="models">The models and what they were held against</h2>
-{{ table(("block", "model", "what", "against", "agrees to", "by the test"), verified) }}
-<h2 id="left_out">What is left out, and why</h2>
-{{ table(("left out", "why"), left_out) }}
-{% if effects %}<details><summary>Effects of the models that the scene does not call for \
-({{ effects | length }})</summary>{{ table(("block", "effect", "because"), effects) }}</details>
-{% endif %}
-<h2 id="repeat">To repeat it</h2>
-<p>In the folder that holds this page:</p>{{ [e.command] | verbatim }}
-<p>The inputs lie in <code>inputs/</code>, the results of every run in <code>studies/</code>: \
-<code>dsa-des study show studies/assessed</code>. Another run gives the same \
-<code>evidence.json</code> on processors of one class.</p>
-{{ table(("study", "seed", "runs", "without result", "SHA-256 of all rows"), results) }}
-<details><summary>Inputs and versions</summary>
-{{ table(("input", "SHA-256"), inputs) }}{{ table(("package", "version"), versions) }}</details>
-</main></body></html>
-"""
-)
+_PAGE = PAGE_HEAD + page_part("evidence.html")
 
 
 def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None) -> bytes:
-    """Return the page of some evidence and its two pictures.
-
-    Parameters
-    ----------
-    e : mapping
-        As in ``evidence.json``.
-    convergence, sensitivity : bytes
-        PNG; no sensitivity where no parameter was changed.
-    """
+    """Return the page of some evidence and its two pictures."""
     confidence = e["requirements"][0]["confidence"]
     lines = [*e["requirements"], *e["also"]]
     names = list(dict.fromkeys(line["result"] for line in lines if line.get("study") in

@@ -6,7 +6,10 @@ found out before a byte is read.
 
 import os
 import stat
+from collections.abc import Callable
+from functools import lru_cache, wraps
 from pathlib import Path
+from typing import Any
 
 #: Files of tables and traffic; a day of dense traffic is a tenth of it.
 LARGEST_BYTES = 512 * 1024 * 1024
@@ -31,13 +34,7 @@ class NoSuchFile(InputFileError):
 
 
 def resolve_home(text: str) -> Path:
-    """Return a path with ``~`` at its start resolved.
-
-    Raises
-    ------
-    InputFileError
-        If it names a user who has no home folder here, or holds a NUL character.
-    """
+    """Return a path with ``~`` at its start resolved."""
     if "\0" in text:
         raise InputFileError("holds a NUL character: no file can have such a name")
     try:
@@ -48,13 +45,7 @@ def resolve_home(text: str) -> Path:
 
 
 def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
-    """Return the status of a regular file that may be read.
-
-    Raises
-    ------
-    InputFileError
-        If there is no such file, it is anything else than a regular file, or it is too large.
-    """
+    """Return the status of a regular file that may be read."""
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -75,13 +66,7 @@ def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
 
 
 def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
-    """Return what is in a regular file.
-
-    Raises
-    ------
-    InputFileError
-        As `status_of`, or if it cannot be read.
-    """
+    """Return what is in a regular file."""
     status_of(path, largest_bytes)
     try:
         with path.open("rb") as file:
@@ -95,13 +80,7 @@ def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
 
 
 def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
-    """Return the text of a regular file in UTF-8, with or without a byte-order mark.
-
-    Raises
-    ------
-    InputFileError
-        As `read_input_bytes`, or if it is not UTF-8 text.
-    """
+    """Return the text of a regular file in UTF-8, with or without a byte-order mark."""
     try:
         text = read_input_bytes(path, largest_bytes).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -109,6 +88,29 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     if "\0" in text:
         raise InputFileError("is not a text file: it holds NUL characters")
     return text.replace("\r\n", "\n")
+
+
+def read_once(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make a reader of a file keep what it returned for the files that were read last.
+
+    A file is read again when its size or the time of its last change is another; one without
+    status is read, so that the reader says what is wrong with it.
+    """
+
+    def keeping(read: Callable[..., Any]) -> Callable[..., Any]:
+        kept = lru_cache(most)(lambda state, path, *more, **named: read(path, *more, **named))
+
+        @wraps(read)
+        def again(path: Path, *more: Any, **named: Any) -> Any:
+            try:
+                status = path.stat()
+            except (OSError, ValueError):
+                return read(path, *more, **named)
+            return kept((status.st_mtime_ns, status.st_size), path, *more, **named)
+
+        return again
+
+    return keeping
 
 
 def is_regular_file(path: Path) -> bool:

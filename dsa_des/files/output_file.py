@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_names import reason_of, why_no_name
@@ -23,30 +23,25 @@ _ORDINARY = ("/dev/shm",)
 
 
 def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
-    """Write a file under a temporary name and rename it.
+    """Write a file under a temporary name and rename it; where that fails nothing is left behind.
 
-    A link that stands there is replaced; what it points to stays as it is.
-
-    Parameters
-    ----------
-    path : Path
-    content : bytes
-    to_disk : bool
-        Whether the content must be on the disk before it takes its name, so that it is whole even
-        after a loss of power.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; nothing is left behind then.
+    A link that stands there is replaced; what it points to stays as it is. `to_disk` has the
+    content on the disk before it takes its name, so that it is whole even after a loss of power.
     """
+    with streamed(path) as stream:
+        stream.write(content)
+        if to_disk:
+            stream.flush()
+            os.fsync(stream.fileno())
+
+
+@contextmanager
+def streamed(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write to, which takes its name when the block ends well; see `write_file`."""
     temporary = temporary_beside(path)
     try:
         with open(temporary, "xb") as stream:
-            stream.write(content)
-            if to_disk:
-                stream.flush()
-                os.fsync(stream.fileno())
+            yield stream
         os.replace(temporary, path)
     except BaseException as error:
         with suppress(OSError):
@@ -78,16 +73,7 @@ def check_file(path: Path, option: str = "--out") -> None:
 
 
 def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> None:
-    """Raise UsageError unless a file's name ends as one of its kind does.
-
-    Parameters
-    ----------
-    path : Path
-    endings : sequence of str
-        With their dots, in small letters; capitals will do as well.
-    option : str
-        That named it.
-    """
+    """Raise UsageError unless a file's name ends as one of its kind does."""
     if path.suffix.lower() not in endings:
         meant = "" if path.suffix else f"; {path.name}{endings[0]} would do"
         raise UsageError(
@@ -131,11 +117,6 @@ def unfinished(target: Path) -> Iterator[Path]:
     """Give an empty folder beside `target`, on the same file system; it is gone afterwards.
 
     Parents of `target` that do not exist are made; those that are empty at the end are removed.
-
-    Raises
-    ------
-    OSError
-        If there is no place for it.
     """
     made = [parent for parent in target.parents if not os.path.lexists(parent)]
     folder: Path | None = None

@@ -43,11 +43,6 @@ def foreign_in(folder: Path) -> list[str]:
 
     All of it if the folder holds no ``run.json`` of ours; nothing if it is empty. A file that was
     changed since is not what we wrote.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
     """
     names = list(_names(folder))
     files = _listed(folder / RUN_JSON)
@@ -100,18 +95,9 @@ _RESULTS = "results"
 class OutputFolder:
     """The folder that a command writes its results into.
 
-    Parameters
-    ----------
-    path : Path
-        What the user named: a new folder, an empty one, or earlier results to replace.
-    stem : str, optional
-        Take the next free ``stem-NNN`` in the folder `path` instead.
-
-    Attributes
-    ----------
-    path : Path
-        Where the results are once they are written; with a `stem`, two commands at once may each
-        expect the same number.
+    It is a new or empty one at `path`, or takes the place of earlier results; with a `stem`, the
+    next free ``stem-NNN`` in `path`. Of two commands at once each may expect the same number: once
+    the results are written, `path` is where they are.
     """
 
     def __init__(self, path: Path, stem: str | None = None) -> None:
@@ -134,13 +120,6 @@ class OutputFolder:
         """Give a temporary folder; it takes its name when the block succeeds.
 
         When the block raises, nothing is left behind.
-
-        Raises
-        ------
-        UsageError
-            If the results cannot go there; before the block is entered.
-        OutputError
-            If they cannot be written.
         """
         self.check()
         place = location_of(self.path)
@@ -211,11 +190,6 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
     """Make a folder for results that come one by one; it is removed again if none came.
 
     It is what ``--out`` names, which must be new or empty, or the next free ``parent/stem-NNN``.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be made.
     """
     folder = parent / stem if out is None else named(out)
     made = [above for above in folder.parents if not os.path.lexists(above)]

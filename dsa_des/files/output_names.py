@@ -19,13 +19,7 @@ _MOUNTS = Path("/proc/self/mountinfo")
 
 
 def named(text: str, option: str = "--out") -> Path:
-    """Return the path that a user wrote, with ``~`` for the home folder.
-
-    Raises
-    ------
-    UsageError
-        If it can be no path.
-    """
+    """Return the path that a user wrote, with ``~`` for the home folder."""
     if not text.strip():
         raise UsageError(f"{option} {text!r}: is empty; a name is needed")
     if reason := why_no_name(text):
@@ -81,11 +75,6 @@ def claim_folder(parent: Path, stem: str) -> Path:
     """Make the first of ``parent/stem-001``, ... that does not exist, and return it.
 
     Of processes that do so at once each gets a folder of its own.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be made.
     """
     while True:
         folder = new_folder_name(parent, stem)
@@ -103,13 +92,7 @@ def claim_folder(parent: Path, stem: str) -> Path:
 
 
 def location_of(folder: Path) -> Path:
-    """Return where a folder is, without links above it and whatever the working directory becomes.
-
-    Raises
-    ------
-    OSError
-        If the working directory is gone.
-    """
+    """Return where a folder is, without links above it, whatever the working directory becomes."""
     if folder.name in ("", ".."):
         return Path(os.path.realpath(folder))
     return Path(os.path.realpath(folder.parent)) / folder.name

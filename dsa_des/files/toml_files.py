@@ -52,13 +52,7 @@ class NotToml(TomlError):
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text.
-
-    Raises
-    ------
-    TomlError
-        If it is not TOML, nested too deeply, or holds a whole number of too many digits.
-    """
+    """Return the tables of a TOML text."""
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import examples, find_example
-from dsa_des.scene.overrides import parse_assignment, parse_value
-from dsa_des.scene.scene import Scene
+from dsa_des.scene.overrides import read_changes, scene_value
+from dsa_des.scene.scene import Scene, changed_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file, read_scene_tables
 
 #: What messages call a scene that is given as a table, and its title where it has none.
@@ -43,27 +42,10 @@ def load_scene(
     UsageError
         If an installed package is broken that shipped scenes or sections come from.
     """
-    problems: list[Problem] = []
-    changes: list[tuple[str, Any]] = []
-    for swap in swaps:
-        parsed = parse_assignment(swap, "--swap")
-        if isinstance(parsed, Problem):
-            problems.append(parsed)
-        else:
-            changes.append((f"swap.{parsed[0]}", scene_value(parsed[1])))
-    for assignment in sets:
-        parsed = parse_assignment(assignment, "--set")
-        if isinstance(parsed, Problem):
-            problems.append(parsed)
-        else:
-            changes.append((parsed[0], parse_value(parsed[1])))
-    if seed is not None:
-        changes.append(("seed", seed))
-    if duration_s is not None:
-        changes.append(("duration_s", duration_s))
+    changes, problems = read_changes(sets, swaps, seed, duration_s)
     if problems:
         raise SceneError(problems)
-    return Scene.of(Origin(_tables_of(source), tuple(changes)))
+    return changed_tables(_tables_of(source), tuple(changes))
 
 
 def scene_of_any(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -> Scene:

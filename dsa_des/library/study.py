@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 from shutil import rmtree
@@ -17,8 +18,8 @@ from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.printing import show
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
-from dsa_des.scene.changeable import Origin, scene_value
 from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.overrides import SWAP, Change, apply_changes, scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.executors import default_workers, make_executor
@@ -100,7 +101,7 @@ class StudyResult:
         table = self._folder.table(name)
         if table is None:
             raise UsageError(f"{self._folder.path / name}: is not there or not of this study")
-        return table.replace_schema_metadata(None)
+        return table
 
     def _repr_html_(self) -> str:
         return html_of(lambda console: show(console, self._tables))
@@ -201,7 +202,7 @@ def study(
     for key in {"scene", "set", "swap"} & tables.keys():
         message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
         raise SceneError([Problem("study", key, message)])
-    described = study_of_tables(tables, *_base_of(loaded.origin))
+    described = study_of_tables(tables, *_base_of(*loaded.origin))
     return _run(described, _workers(described, workers), out, resume, progress)
 
 
@@ -227,24 +228,23 @@ def _tables(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _base_of(
-    origin: Origin,
-) -> tuple[SceneFile, list[tuple[str, str]], list[tuple[str, Any]]]:
+    file: SceneFile, changes: Sequence[Change]
+) -> tuple[SceneFile, list[tuple[str, str]], list[Change]]:
     """Return a scene's tables as read, and its changes as swaps and then values.
 
     Where that order would give another scene, the changed tables, and no changes.
     """
-    swaps = [(k.removeprefix("swap."), v) for k, v in origin.changes if k.startswith("swap.")]
-    sets = list({k: v for k, v in origin.changes if not k.startswith("swap.")}.items())
-    file, problems, _ = origin.tables()
-    try:
-        ordered = Origin(
-            origin.file, (*((f"swap.{block}", name) for block, name in swaps), *sets)
-        ).tables()
-        same = not problems and not ordered[1] and ordered[0].data == file.data
-        changed_scene(origin.file, swaps, sets, "study")
-    except SceneError:
-        same = False
-    return (origin.file, swaps, sets) if same else (file, [], [])
+    swaps = [(k.removeprefix(SWAP), v) for k, v in changes if k.startswith(SWAP)]
+    sets = list({k: v for k, v in changes if not k.startswith(SWAP)}.items())
+    changed, ordered = file.copy(), file.copy()
+    problems, _ = apply_changes(changed, changes)
+    more, _ = apply_changes(ordered, [*((SWAP + block, name) for block, name in swaps), *sets])
+    same = not problems and not more and ordered.data == changed.data
+    with suppress(SceneError):
+        if same:
+            changed_scene(file, swaps, sets, "study")
+            return file, swaps, sets
+    return changed, [], []
 
 
 def _workers(study: Study, workers: int | None) -> int:

@@ -2,7 +2,8 @@
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -230,6 +231,19 @@ def draw_polar(
         tight(figure)
 
 
+@contextmanager
+def _chart(
+    target: Target, title: str, width_in: float = _WIDE_IN, height_in: float = 4.2
+) -> Iterator[Any]:
+    """Give the axes of a figure, which has its title and its legend afterwards."""
+    with drawing(width_in, height_in, target) as figure:
+        axes = figure.add_subplot()
+        yield axes
+        axes.set_title(figure_text(title, _TITLE), loc="left")
+        _beside(axes)
+        tight(figure)
+
+
 #: A label, and the values of its runs, NaN where a run has none.
 Spread = tuple[str, FloatArray]
 
@@ -243,8 +257,7 @@ def draw_histogram(
         for series_label, values in series[:_MOST_LINES]
     ]
     every = np.concatenate([values for _, values, _ in known] or [np.empty(0)])
-    with drawing(_WIDE_IN, 4.2, path) as figure:
-        axes = figure.add_subplot()
+    with _chart(path, title) as axes:
         edges = _edges(every, max((len(values) for _, values, _ in known), default=0))
         for number, (series_label, values, runs) in enumerate(known):
             colour = _style(mark, number, len(known))[0]
@@ -255,8 +268,7 @@ def draw_histogram(
             axes.stairs(counts, edges, color=colour, fill=True, alpha=0.15)
         axes.set_ylim(bottom=0.0)
         axes.yaxis.get_major_locator().set_params(integer=True)
-        axes.set_ylabel("Runs")
-        _finish(figure, axes, metric, title)
+        axes.set(xlabel=readable(metric), ylabel="Runs")
 
 
 def draw_cdf(
@@ -267,8 +279,7 @@ def draw_cdf(
     Runs without a value count as well: where some have none, a curve ends below 1.
     """
     shown = series[:_MOST_LINES]
-    with drawing(_WIDE_IN, 4.2, path) as figure:
-        axes = figure.add_subplot()
+    with _chart(path, title) as axes:
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
             colour = _style(mark, number, len(shown))[0]
@@ -284,9 +295,8 @@ def draw_cdf(
                 label=_counted(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)
-        axes.set_ylabel("Share of the runs at or below")
+        axes.set(xlabel=readable(metric), ylabel="Share of the runs at or below")
         axes.grid(color="#DDDDDD", linewidth=0.5)
-        _finish(figure, axes, metric, title)
 
 
 def _counted(series_label: str, values: FloatArray, runs: int) -> str:
@@ -304,13 +314,6 @@ def _edges(values: FloatArray, most: int) -> FloatArray:
         return np.array([low - half, low + half])
     bins = int(np.clip(np.ceil(np.sqrt(most)), _FEWEST_BINS, _MOST_BINS))
     return np.linspace(low, high, bins + 1)
-
-
-def _finish(figure: Any, axes: Any, metric: str, title: str) -> None:
-    axes.set_xlabel(readable(metric))
-    axes.set_title(figure_text(title, _TITLE), loc="left")
-    _beside(axes)
-    tight(figure)
 
 
 #: A label, numbers, and the line at each.
@@ -332,8 +335,7 @@ def draw_series(
     `limits` are one for all, or one for each number of the series.
     """
     name, _, along = metric.partition(".")
-    with drawing(_WIDE_IN, 4.2, path) as figure:
-        axes = figure.add_subplot()
+    with _chart(path, title) as axes:
         if freedom is not None and series:
             _bounds(axes, series[0][1], series[0][2], freedom, confidence)
         for place, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
@@ -355,9 +357,6 @@ def draw_series(
             axes.plot(x, known, color="#000000", ls="--", lw=1.2, label="limit", zorder=1)
         axes.set_ylim(bottom=0.0)
         axes.set(xlabel=axis_label(along) if along else "", ylabel=readable(name))
-        axes.set_title(figure_text(title, _TITLE), loc="left")
-        _beside(axes)
-        tight(figure)
 
 
 def _bounds(
@@ -381,8 +380,7 @@ def draw_scatter(
 ) -> None:
     """Draw a result of two conditions against each other, one point per encounter or replica."""
     both = ~np.isnan(first) & ~np.isnan(second)
-    with drawing(5.4, 5.2, path) as figure:
-        axes = figure.add_subplot()
+    with _chart(path, title, 5.4, 5.2) as axes:
         if both.any():
             held = np.concatenate([first[both], second[both]])
             ends = [held.min(), held.max()]
@@ -391,5 +389,3 @@ def draw_scatter(
                   alpha=0.6, markeredgewidth=0)  # fmt: skip
         across, up = (f"{readable(metric)}: {figure_text(name)}" for name in names)
         axes.set(xlabel=across, ylabel=up)
-        axes.set_title(figure_text(title, _TITLE), loc="left")
-        tight(figure)

@@ -71,7 +71,6 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     axes, metric = tables.rows.axes, str(figure.metric)
     if any(n is not None and n not in axes for n in (figure.axis, figure.x, figure.y)):
         return False
-    called = {name: name for name in axes}
     title = _cut(tables.record.title if figure.title is None else figure.title)
     confidence = tables.record.confidence
     if figure.kind in ("histogram", "cdf"):
@@ -85,8 +84,8 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return False
     lines = [line for line in tables.lines if line.result.name == metric]
     if figure.kind in ("heat", "map"):
-        x = called[figure.x or axes[0]]
-        y = called[figure.y] if figure.y else next((a for a in axes if a != x), x)
+        x = axes[axes.index(figure.x or axes[0])]  # which knows its words
+        y = axes[axes.index(figure.y)] if figure.y else next((a for a in axes if a != x), x)
         if x == y:
             return False
         if figure.kind == "heat":
@@ -94,7 +93,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         else:
             draw_map(target, axes, lines, metric, x, y, figure.limits, title, confidence)
         return True
-    axis = called[figure.axis or axes[0]]
+    axis = axes[axes.index(figure.axis or axes[0])]
     if figure.kind == "polar":
         draw_polar(target, axes, lines, metric, axis, title, confidence)
     else:
@@ -151,17 +150,14 @@ def _series_of(tables: Tables, metric: str) -> list[Series]:
 def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]) -> list[Path]:
     """Draw results of two types in one block against each other."""
     place = tables.rows.axes.index(axis)
-    by_place = dict(tables.rows.each_place())
     paths = []
-    for at, chosen in by_place.items():
-        base = (*at[:place], baseline, *at[place + 1 :])
-        if at[place] == baseline or base not in by_place:
-            continue
+    for value, others, base, chosen in tables.rows.against(axis, baseline):
+        at = (*others[:place], value, *others[place:])
         for metric in tables.notable_results(only):
-            _, first, second = paired(tables.rows, metric, by_place[base], chosen)
+            _, first, second = paired(tables.rows, metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
-            names = str(baseline), str(at[place])
             drawn = _stream(f"{safe_name(name)}.png")
+            names = str(baseline), str(value)
             draw_scatter(drawn, first, second, names, metric, _cut(tables.record.title))
             paths.append(_write(tables, drawn))
     return paths

@@ -45,13 +45,9 @@ class StudyFolder:
     def open(self, description: str, *, resume: bool) -> None:
         """Make the folder, or take up the one that is there, and lock it until `close`.
 
-        `description` is the content of ``study.json``.
-
-        Raises
-        ------
-        UsageError
-            If it holds something else, another study, or results that were not to be resumed, or
-            if another process runs the study.
+        `description` is the content of ``study.json``. A UsageError where the folder holds
+        something else, another study or results that were not to be resumed, or another process
+        runs the study.
         """
         if self.path.is_symlink() and not self.path.exists():
             raise UsageError(f"--out {self.path}: is a link to nothing; a folder is needed")
@@ -136,13 +132,7 @@ class StudyFolder:
 
     @property
     def record(self) -> StudyRecord:
-        """What the folder says of its study.
-
-        Raises
-        ------
-        UsageError
-            If the folder is not a study.
-        """
+        """What the folder says of its study."""
         if self._record is None:
             self._record = self._read(StudyRecord)
         return self._record
@@ -168,13 +158,7 @@ class StudyFolder:
     # -- parts -----------------------------------------------------------------------------
 
     def part_names(self) -> list[str]:
-        """Return the names of the parts that are there, good or not, in order.
-
-        Raises
-        ------
-        UsageError
-            If there are files among them that no study writes.
-        """
+        """Return the names of the parts that are there, good or not, in order."""
         if self.parts.is_symlink():
             raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
         try:
@@ -191,27 +175,25 @@ class StudyFolder:
 
         Only some `columns` are read of a part that was found good before.
         """
+        table = self._sealed(self.parts / f"{name}.parquet", name, columns)
+        whole = table is None or columns is not None or _fits(table, self.record)
+        return table if whole else None
+
+    def _sealed(self, path: Path, name: str, columns: Sequence[str] | None) -> "pa.Table | None":
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         try:
-            content = read_regular(self.parts / f"{name}.parquet")
+            content = read_regular(path)
             if not is_sealed(content, self._owner(name)):
                 return None
             table = pq.read_table(io.BytesIO(content), columns=columns)
         except (OSError, MemoryError, pa.ArrowException):
             return None
-        table = table.replace_schema_metadata(None)
-        return table if columns is not None or _fits(table, self.record) else None
+        return table.replace_schema_metadata(None)
 
     def write_part(self, name: str, content: bytes) -> None:
-        """Write a part as a whole, sealed as one of this study.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written; nothing is left behind then.
-        """
+        """Write a part as a whole, sealed as one of this study."""
         path = self.parts / f"{name}.parquet"
         write_file(path, sealed(content, self._owner(name)), to_disk=True)
 
@@ -226,11 +208,6 @@ class StudyFolder:
         """Return the rows of all parts, in order of cell and replica.
 
         All of them are in memory then; `dsa_des.results.rows` reads them part by part.
-
-        Raises
-        ------
-        UsageError
-            If there are none, or if one is damaged or of another study.
         """
         import pyarrow as pa
 
@@ -243,11 +220,6 @@ class StudyFolder:
         """Give the rows of each part, in order of their names.
 
         Only those of rounds before one, and only some columns of parts found good before.
-
-        Raises
-        ------
-        UsageError
-            At the end, if there are none, or if one is damaged or of another study.
         """
         names = self.part_names()
         if before_round is not None:
@@ -282,16 +254,7 @@ class StudyFolder:
 
     def table(self, name: str) -> "pa.Table | None":
         """Return a table beside the parts; None if it is not there or not of this study."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        try:
-            content = read_regular(self.path / name)
-            if not is_sealed(content, self._owner(name)):
-                return None
-            return pq.read_table(io.BytesIO(content))
-        except (OSError, MemoryError, pa.ArrowException):
-            return None
+        return self._sealed(self.path / name, name, None)
 
 
 #: How many damaged parts a message names.

@@ -6,6 +6,7 @@ left out and why, and with what versions the runs were made.
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from typing import TypeVar
 
 from pydantic import ConfigDict, ValidationError
 
@@ -17,6 +18,7 @@ from dsa_des.results.sealed_files import read_regular
 EXPLAINED, ERRORS = "explained.json", "errors.json"
 _PACKAGES = ("numpy", "scipy", "pyarrow", "simpy", "networkx", "pydantic", "numba")
 _MOST_BYTES = 16 * 2**20
+_Record = TypeVar("_Record", bound=StrictRecord)
 
 
 class ModelRecord(StrictRecord):
@@ -70,14 +72,6 @@ def versions() -> dict[str, str]:
     return found
 
 
-def read_explained(folder: StudyFolder) -> Explained | None:
-    """Return what a folder says of its scene; None where it says nothing that can be used."""
-    try:
-        return Explained.model_validate_json(read_regular(folder.path / EXPLAINED, _MOST_BYTES))
-    except (OSError, ValidationError):
-        return None
-
-
 class ErrorRecord(StrictRecord):
     """How far the model of a block is off in one quantity, over target-scans; NaN where unknown."""
 
@@ -103,9 +97,18 @@ class MeasuredErrors(StrictRecord):
     notes: list[str]
 
 
+def read_explained(folder: StudyFolder) -> Explained | None:
+    """Return the models of a folder's runs; None where it holds no record that can be used."""
+    return _read(folder, EXPLAINED, Explained)
+
+
 def read_errors(folder: StudyFolder) -> MeasuredErrors | None:
     """Return the errors that a folder holds; None where it holds none that can be used."""
+    return _read(folder, ERRORS, MeasuredErrors)
+
+
+def _read(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
     try:
-        return MeasuredErrors.model_validate_json(read_regular(folder.path / ERRORS, _MOST_BYTES))
+        return model.model_validate_json(read_regular(folder.path / name, _MOST_BYTES))
     except (OSError, ValidationError):
         return None

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 if TYPE_CHECKING:
@@ -305,12 +306,8 @@ class StudyRecord(StudyHead):
     ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
         """Return the swaps and the values that make the scene of a run."""
         swaps, sets = list(self.swaps), list(self.sets)
-        place = int(row["cell"])
-        places = []
-        for axis in reversed(self.axes):
-            place, index = divmod(place, len(axis.values))
-            places.append(index)
-        for axis, index in zip(self.axes, reversed(places), strict=True):
+        indices = np.unravel_index(int(row["cell"]), [len(axis.values) for axis in self.axes])
+        for axis, index in zip(self.axes, indices, strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         sets += [(draw.key, as_text(row[draw.column])) for draw in self.draws]

@@ -39,22 +39,17 @@ _LONGEST = 400
 _MOST_SHOWN = 60
 
 
-def _part(name: str) -> str:
+def page_part(name: str) -> str:
+    """Return one of the templates of pages."""
     return (files("dsa_des.results") / "page" / name).read_text(encoding="utf-8")
 
 
 #: The beginning of a page that loads nothing, up to its body, and how its tables are written.
-PAGE_HEAD = _part("head.html")
+PAGE_HEAD = page_part("head.html")
 
 
 def study_report(folder: StudyFolder) -> bytes:
-    """Return the page of a study's folder.
-
-    Raises
-    ------
-    UsageError
-        If the folder holds no results, or damaged ones.
-    """
+    """Return the page of a study's folder."""
     tables = Tables(folder.record, folder)
     record, stored, first = tables.record, tables.rows.stored, tables.rows.stored.first
     explained = read_explained(folder)
@@ -64,7 +59,7 @@ def study_report(folder: StudyFolder) -> bytes:
     pictures = _pictures(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
-    page = page_environment().from_string(PAGE_HEAD + _part("study.html")).render(
+    page = page_environment().from_string(PAGE_HEAD + page_part("study.html")).render(
         title=record.title,
         tables=tables, record=record, explained=explained, errors=read_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,

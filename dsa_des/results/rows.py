@@ -45,11 +45,6 @@ class StoredRows:
     """The rows with a result, in order of cell and replica, and what became of the others.
 
     With `before_round` only those of earlier rounds.
-
-    Raises
-    ------
-    UsageError
-        If there are none, or if a part is damaged or of another study.
     """
 
     def __init__(self, folder: StudyFolder, before_round: int | None = None) -> None:
@@ -176,6 +171,20 @@ class Rows:
         for rows in sorted(groups, key=lambda rows: int(rows[0])):
             at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
             yield at, rows
+
+    def against(
+        self, axis: str, baseline: Any
+    ) -> Iterator[tuple[Any, tuple[Any, ...], IntArray, IntArray]]:
+        """Give each place off an axis's baseline that has a place there to be compared with.
+
+        Its value of the axis, those of the others, the rows at the baseline and its own.
+        """
+        column = self.axes.index(axis)
+        places = dict(self.each_place())
+        for at, rows in places.items():
+            base = places.get((*at[:column], baseline, *at[column + 1 :]))
+            if at[column] != baseline and base is not None:
+                yield at[column], (*at[:column], *at[column + 1 :]), base, rows
 
     def by_unit(self, name: str, rows: IntArray) -> tuple[IntArray, FloatArray]:
         """Return the units in some rows and each one's mean value (over its replicas)."""

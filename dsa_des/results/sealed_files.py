@@ -27,11 +27,6 @@ def read_regular(path: Path, most: int | None = None) -> bytes:
     """Return the content of a file that is no link, folder, pipe or device.
 
     `most` is the largest size in bytes.
-
-    Raises
-    ------
-    OSError
-        If it is no such file, too large, or cannot be read.
     """
     with os.fdopen(os.open(path, os.O_RDONLY | _NO_FOLLOW | _NO_WAIT | _BINARY), "rb") as file:
         about = os.fstat(file.fileno())
@@ -43,13 +38,7 @@ def read_regular(path: Path, most: int | None = None) -> bytes:
 
 
 def open_lock(path: Path) -> int:
-    """Return the descriptor of a lock file, made if need be; its content is never touched.
-
-    Raises
-    ------
-    OSError
-        If it is a link or no regular file, or cannot be made.
-    """
+    """Return the descriptor of a lock file, made if need be; its content is never touched."""
     number = os.open(path, os.O_RDWR | os.O_CREAT | _NO_FOLLOW | _NO_WAIT, 0o666)
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)

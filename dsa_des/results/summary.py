@@ -92,26 +92,20 @@ def compare_axis(
     Rows are paired that share the unit and the values of all other axes. `weight` names the result
     that weighs units in ratios of events.
     """
-    place = rows.axes.index(axis)
-    by_place = dict(rows.each_place())
     found = []
-    for at, chosen in by_place.items():
-        base = (*at[:place], baseline, *at[place + 1 :])
-        if at[place] == baseline or base not in by_place:
-            continue
+    for value, others, base, chosen in rows.against(axis, baseline):
         for result in results:
             if not result.summed_up or result.quantile is not None:
                 continue  # paired differences are of means
-            others = (*at[:place], *at[place + 1 :])
             if result.kind == RATIO:
-                change = rows.ratio_difference(result, by_place[base], chosen, confidence)
+                change = rows.ratio_difference(result, base, chosen, confidence)
             else:
-                first, second = paired(rows, result.name, by_place[base], chosen)[1:]
+                first, second = paired(rows, result.name, base, chosen)[1:]
                 change = difference(first, second, confidence, method, kind=result.kind)
             ratio = None
             if result.kind == EVENT:
-                ratio = rows.event_ratio(result.name, by_place[base], chosen, weight, confidence)
-            found.append(Compared(others, at[place], baseline, result, change, ratio))
+                ratio = rows.event_ratio(result.name, base, chosen, weight, confidence)
+            found.append(Compared(others, value, baseline, result, change, ratio))
     return found
 
 

@@ -105,46 +105,35 @@ class Tables:
     def _ratio_columns(self) -> dict[str, list[Any]]:
         """Return all numbers of the ratios, with both kinds of interval."""
         lines = self.ratios()
-        columns: dict[str, list[Any]] = {
-            name: [line.at[k] for line in lines] for k, name in enumerate(self.rows.axes)
-        }
-        columns["result"] = [line.result.name for line in lines]
-        known = [line.ratio for line in lines if line.ratio is not None]
-        for name in (
+        columns = _at(self.rows.axes, lines) | _columns(lines, result="result.name")
+        names = (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
             "mitigated_probability", "few", "reason",
-        ):  # fmt: skip
-            columns[name] = [getattr(one, name) for one in known]
+        )  # fmt: skip
+        columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):
-            both = [{r.method: r for r in (line.ratio, line.other) if r is not None}
-                    for line in lines]  # fmt: skip
-            found = [known.get(method) for known in both]
-            columns |= {
-                f"{method}_error": [None if r is None else r.standard_error for r in found],
-                f"{method}_low": [None if r is None else r.interval[0] for r in found],
-                f"{method}_high": [None if r is None else r.interval[1] for r in found],
-            }
-        columns["missing"] = [line.missing for line in lines]
-        return columns
+            found = [{r.method: r for r in (line.ratio, line.other) if r is not None}.get(method)
+                     for line in lines]  # fmt: skip
+            columns |= _columns(
+                found,
+                **{f"{method}_error": "standard_error"},
+                **{f"{method}_low": "interval.0", f"{method}_high": "interval.1"},
+            )
+        return columns | _columns(lines, missing="missing")
 
     def _summary_columns(self) -> dict[str, list[Any]]:
-        columns: dict[str, list[Any]] = {
-            name: [line.at[k] for line in self.lines] for k, name in enumerate(self.rows.axes)
-        }
-        columns |= {
-            "result": [line.result.name for line in self.lines],
-            "value": [line.estimate.value for line in self.lines],
-            "low": [line.estimate.low for line in self.lines],
-            "high": [line.estimate.high for line in self.lines],
-            "count": [line.estimate.count for line in self.lines],
-            "missing": [line.missing for line in self.lines],
-            "few": [line.estimate.few for line in self.lines],
+        return {
+            **_at(self.rows.axes, self.lines),
+            **_columns(
+                self.lines, result="result.name", value="estimate.value", low="estimate.low",
+                high="estimate.high", count="estimate.count", missing="missing",
+                few="estimate.few",
+            ),
             "cut_off": [sum(many for _, many in line.cut_off) for line in self.lines],
             "cut_off_where": [cut_off_text(line) for line in self.lines],
-            "expected": [line.expected for line in self.lines],
-        }
-        return columns
+            **_columns(self.lines, expected="expected"),
+        }  # fmt: skip
 
     def other_values(self, answer: Answer) -> str:
         """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
@@ -162,46 +151,30 @@ class Tables:
             "cheapest_by_estimate": [
                 None if item.estimated is None else short(item.estimated) for item in found
             ],
-            "value": [item.line.estimate.value for item in found],
-            "low": [item.line.estimate.low for item in found],
-            "high": [item.line.estimate.high for item in found],
-            "few": [item.line.estimate.few for item in found],
-            "uneven": [item.uneven for item in found],
-        }
+            **_columns(
+                found, value="line.estimate.value", low="line.estimate.low",
+                high="line.estimate.high", few="line.estimate.few", uneven="uneven",
+            ),
+        }  # fmt: skip
 
     def _difference_columns(self) -> dict[str, list[Any]]:
         assert self.baseline is not None
         axis = self.baseline[0]
         others = [name for name in self.rows.axes if name != axis]
-        items = self.compared
-        columns: dict[str, list[Any]] = {
-            name: [item.at[k] for item in items] for k, name in enumerate(others)
-        }
-        columns |= {
-            axis: [item.value for item in items],
-            "baseline": [item.baseline for item in items],
-            "result": [item.result.name for item in items],
-            "difference": [item.difference.paired.value for item in items],
-            "low": [item.difference.paired.low for item in items],
-            "high": [item.difference.paired.high for item in items],
-            "unpaired_low": [item.difference.unpaired.low for item in items],
-            "unpaired_high": [item.difference.unpaired.high for item in items],
-            "pairs": [item.difference.paired.count for item in items],
-            "only_baseline": [item.difference.only_first for item in items],
-            "only_value": [item.difference.only_second for item in items],
-        }
-        ratios = [item.ratio for item in items]
-        columns |= {
-            "ratio": [None if r is None else r.ratio for r in ratios],
-            "ratio_low": [None if r is None else r.interval[0] for r in ratios],
-            "ratio_high": [None if r is None else r.interval[1] for r in ratios],
-            "unresolved": [None if r is None else r.unresolved for r in ratios],
-            "induced": [None if r is None else r.induced for r in ratios],
-            "effective_sample_size": [
-                None if r is None else r.effective_sample_size for r in ratios
-            ],
-        }
-        return columns
+        return {
+            **_at(others, self.compared),
+            **_columns(self.compared, **{axis: "value"}),
+            **_columns(
+                self.compared, baseline="baseline", result="result.name",
+                difference="difference.paired.value", low="difference.paired.low",
+                high="difference.paired.high", unpaired_low="difference.unpaired.low",
+                unpaired_high="difference.unpaired.high", pairs="difference.paired.count",
+                only_baseline="difference.only_first", only_value="difference.only_second",
+                ratio="ratio.ratio", ratio_low="ratio.interval.0", ratio_high="ratio.interval.1",
+                unresolved="ratio.unresolved", induced="ratio.induced",
+                effective_sample_size="ratio.effective_sample_size",
+            ),
+        }  # fmt: skip
 
     def notable_results(self, only: Sequence[str] = ()) -> list[str]:
         """Return the results worth a closer look: those named, drawn, or else that differ."""
@@ -220,6 +193,23 @@ def cut_off_text(line: Line) -> str:
     texts = [f"{many:,} {shortened(where)}" for where, many in line.cut_off]
     texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
     return ", ".join(texts)
+
+
+def _at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
+    """Return the values of some axes at items that are `at` them."""
+    return {name: [item.at[k] for item in items] for k, name in enumerate(axes)}
+
+
+def _columns(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
+    """Return columns of what stands at dotted paths in items; None behind what is None."""
+    return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
+
+
+def _value_at(item: Any, path: str) -> Any:
+    for part in path.split("."):
+        if item is not None:
+            item = item[int(part)] if part.isdecimal() else getattr(item, part)
+    return item
 
 
 def _parquet(columns: dict[str, list[Any]]) -> bytes:

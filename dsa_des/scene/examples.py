@@ -18,18 +18,6 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     """Return the file of a scene, study or case: a path that exists, or else a shipped one's.
 
     A name that is neither is returned as a path, for its reader to say what is wrong with it.
-
-    Parameters
-    ----------
-    asked : path or str
-        Such as ``mine/scene.toml`` or ``first_light``.
-    kind : {"scene", "study", "case"}, optional
-        Which of them is wanted where several have the name.
-
-    Raises
-    ------
-    SceneError
-        If there is no such file, and what was written is a name rather than a path.
     """
     path = Path(asked)
     if not str(asked) or "\0" in str(asked) or os.path.lexists(path):
@@ -112,20 +100,7 @@ def examples() -> list[Example]:
 
 
 def find_example(name: str, kind: Kind | None = None) -> Path | None:
-    """Return the file of a shipped scene, study or case; None if there is none of that name.
-
-    Parameters
-    ----------
-    name : str
-        ``first_light``, ``systems/oasys``, with ``.toml`` or without.
-    kind : {"scene", "study", "case"}, optional
-        Which of them is wanted where several have the name.
-
-    Raises
-    ------
-    UsageError
-        If a package that registered a folder cannot be imported.
-    """
+    """Return the file of a shipped scene, study or case; None if there is none of that name."""
     found = files_named(name)
     if len(found) > 1:
         kinds = {path: read[0] for path in found if (read := _kind_and_title(path))}

@@ -16,22 +16,14 @@ REMOVE = "remove"
 
 @dataclass(eq=False)
 class Removal:
-    """One key that a table removes from what it inherits.
+    """One key that a table removes from what it inherits."""
 
-    Parameters
-    ----------
-    text : str
-        Dotted, from the table that says it.
-    source : str
-        The file.
-    found : bool
-    known : tuple of str
-        What the table does inherit.
-    """
-
+    #: Dotted, from the table that says it.
     text: str
+    #: The file.
     source: str
     found: bool = False
+    #: What the table does inherit.
     known: tuple[str, ...] = ()
 
 
@@ -40,15 +32,7 @@ class Removals(list[Removal]):
 
 
 class Inheritance:
-    """Puts tables over each other.
-
-    Parameters
-    ----------
-    sources : dict
-        Key path → file; kept right where items of lists move.
-    problems : list of Problem
-        Takes what is wrong.
-    """
+    """Puts tables over each other."""
 
     def __init__(self, sources: dict[Key, str], problems: list[Problem]) -> None:
         self.of_other_type: dict[Key, str] = {}
@@ -90,16 +74,7 @@ class Inheritance:
         return base
 
     def note_beside(self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key) -> None:
-        """Note what stands beside each table of a block that a file is the first to write.
-
-        Parameters
-        ----------
-        own : mapping
-            What the file itself says at `at`.
-        merged : mapping
-            The same with what it extends.
-        at : tuple
-        """
+        """Note what stands beside each table of a block that a file is the first to write."""
         for key, value in own.items():
             inherited = merged.get(key)
             if not (isinstance(value, dict) and isinstance(inherited, dict)):

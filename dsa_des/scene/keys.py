@@ -1,6 +1,7 @@
 """Steps along a dotted key: keys of tables, and items of lists by number or by their ``name``."""
 
 import re
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsa_des.errors import did_you_mean, nearest
@@ -25,6 +26,21 @@ def unquoted(text: str) -> str:
     return _QUOTED.sub(lambda found: found[1] if found[2] is None else found[2], text).replace(
         '"', ""
     )
+
+
+def flat(
+    tables: Mapping[str, Any],
+    is_value: Callable[[Any], bool] = lambda value: not isinstance(value, dict),
+    prefix: str = "",
+) -> dict[str, Any]:
+    """Return dotted key → value of nested tables."""
+    found: dict[str, Any] = {}
+    for name, value in tables.items():
+        if is_value(value):
+            found[f"{prefix}{name}"] = value
+        else:
+            found |= flat(value, is_value, f"{prefix}{name}.")
+    return found
 
 
 def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:

@@ -1,23 +1,30 @@
-"""Changes from the command line: ``--set key=value`` and ``--swap block=type``.
+"""Changes of a scene's tables, from the command line, from Python and from studies.
 
-They are two verbs: `--set` changes one value; `--swap` puts another type into a block, keeps its
-name, its wires and the parameters the new type knows, and lists those it dropped.
+A change is a dotted key and its value, or ``swap.BLOCK`` and a type: that puts another type into a
+block, keeps its name, its wires and the parameters the new type knows, and lists those it dropped.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced
-from dsa_des.block.component import Component, SourcedText
+from dsa_des.block.class_text import sourced, type_text
+from dsa_des.block.component import Component, SourcedText, as_written
+from dsa_des.block.entry_points import COMPONENTS
 from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.keys import Key, dotted, is_new_item, no_item, step, unquoted
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
+
+#: A dotted key and its value, or ``swap.BLOCK`` and a type.
+Change = tuple[str, Any]
+SWAP = "swap."
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
@@ -30,13 +37,7 @@ def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value as TOML would read it; what is not TOML is text.
-
-    Raises
-    ------
-    TomlError
-        If it is nested too deeply or holds a whole number of too many digits.
-    """
+    """Return a value as TOML would read it; what is not TOML is text."""
     try:
         value = parse_toml(f"value = {text}")
     except NotToml:
@@ -66,6 +67,53 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
     return list(found.items()), problems
 
 
+def read_changes(
+    sets: Iterable[str], swaps: Iterable[str], seed: int | None, duration_s: object
+) -> tuple[list[Change], list[Problem]]:
+    """Return what ``--swap``, ``--set``, ``--seed`` and ``--duration`` change, in this order."""
+    changes: list[Change] = []
+    problems: list[Problem] = []
+    for swap in swaps:
+        parsed = parse_assignment(swap, "--swap")
+        if isinstance(parsed, Problem):
+            problems.append(parsed)
+        else:
+            changes.append((SWAP + parsed[0], sourced(parsed[1], Path.cwd())))
+    values, wrong = read_sets(sets)
+    for key, value in values:
+        if key.startswith(SWAP):
+            wrong.append(Problem(COMMAND_LINE, key, "types are changed with --swap", value))
+        else:
+            changes.append((key, value))
+    own = (("seed", seed), ("duration_s", duration_s))
+    changes += [(key, given) for key, given in own if given is not None]
+    return changes, problems + wrong
+
+
+def apply_changes(
+    scene: SceneFile,
+    changes: Iterable[Change],
+    source: str = COMMAND_LINE,
+    swap_source: str = COMMAND_LINE,
+    option: str = "--swap",
+) -> tuple[list[Problem], list[str]]:
+    """Make changes of a scene's tables; return what is wrong and which parameters swaps dropped.
+
+    Messages say that values are from `source` and types from `swap_source`, there named `option`.
+    """
+    problems: list[Problem] = []
+    dropped: list[str] = []
+    for key, value in changes:
+        if key.startswith(SWAP):
+            name = key.removeprefix(SWAP)
+            wrong, gone = swap_type(scene, name, value, swap_source, option)
+            problems += wrong
+            dropped += gone
+        else:
+            problems += set_value(scene, key, deepcopy(value), source)
+    return problems, dropped
+
+
 def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
     """Apply all ``--set`` to the scene's tables and return what is wrong with them."""
     found, problems = read_sets(assignments)
@@ -77,16 +125,8 @@ def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
     """Put a value at a dotted key of the scene's tables and return what is wrong with that.
 
-    Parameters
-    ----------
-    scene : SceneFile
-    text : str
-        The dotted key, for example ``blocks.traffic.intruders[0].east_m`` or, by the name of
-        the item, ``blocks.traffic.intruders.head_on.east_m``.
-    value : object
-        As TOML would give it.
-    source : str
-        Where it was written, for messages.
+    Items of lists go by number or name: ``blocks.traffic.intruders[0].east_m``, or
+    ``blocks.traffic.intruders.head_on.east_m``.
     """
     try:
         value = _extended(value, source)
@@ -138,45 +178,16 @@ def _extended(value: Any, source: str) -> Any:
     return {key: _extended(item, source) for key, item in value.items()}
 
 
-def apply_swap(
-    scene: SceneFile, assignment: str, folder: Path | None = None
-) -> tuple[list[Problem], list[str]]:
-    """Apply one ``--swap``; return what is wrong with it and the dropped parameters' keys.
-
-    `folder` is that of the file that says so, if one does: it is where ``./file.py:Class`` lies.
-    """
-    parsed = parse_assignment(assignment, "--swap")
-    if isinstance(parsed, Problem):
-        return [parsed], []
-    return swap_type(scene, *parsed, COMMAND_LINE)
-
-
 def swap_type(
-    scene: SceneFile, name: str, type_name: str, source: str
+    scene: SceneFile, name: str, type_name: str, source: str, option: str = "--swap"
 ) -> tuple[list[Problem], list[str]]:
-    """Put another type into a block of the scene's tables.
-
-    Parameters
-    ----------
-    scene : SceneFile
-    name, type_name : str
-        The block and its new type.
-    source : str
-        Where it was written, for messages.
-
-    Returns
-    -------
-    list of Problem
-        What is wrong with it, with the key ``--swap``.
-    list of str
-        Dotted keys of parameters that the new type lacks.
-    """
+    """Put another type into a block; return what is wrong, and the keys that the type lacks."""
     if not isinstance(type_name, SourcedText):
         type_name = sourced(type_name, Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
-        return [Problem(source, "--swap", f"the scene has no such block{hint}", name)], []
+        return [Problem(source, option or name, f"the scene has no such block{hint}", name)], []
     try:
         cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
@@ -184,7 +195,7 @@ def swap_type(
         scene.sources[_type_key(name)] = source
         return [], []
     except UnknownType as error:
-        return [Problem(source, f"--swap {name}", str(error), str(type_name))], []
+        return [Problem(source, f"{option} {name}".strip(), str(error), str(type_name))], []
     block = blocks[name]
     dropped = sorted(key for key in block if key not in _known_keys(cls))
     for parameter in dropped:
@@ -195,20 +206,9 @@ def swap_type(
 
 
 def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:
-    """Drop what a block inherited from a table of another type and its own type lacks.
+    """Drop what a block inherited from a table of another type and its own type `cls` lacks.
 
-    Parameters
-    ----------
-    scene : SceneFile
-    name : str
-        Of the block.
-    cls : type of Component
-        Its own type.
-
-    Returns
-    -------
-    list of str
-        A note on each parameter that was dropped, and on each that is kept and means another thing.
+    Return a note on each parameter that was dropped, or is kept and means another thing.
     """
     block = scene.data["blocks"][name]
     notes = []
@@ -259,6 +259,37 @@ def _wire_table(entry: Any) -> dict[str, str] | None:
     """Return the table of a wire written as ``"a -> b"``, so that its options can be set."""
     ends = [end.strip() for end in entry.split("->")] if isinstance(entry, str) else []
     return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
+
+
+def scene_value(value: Any, group: str = COMPONENTS) -> Any:
+    """Return a value of Python as a scene file in the working directory would hold it.
+
+    NumPy's numbers and arrays are among them, and classes by their names, in the entry points of
+    `group` where they are registered. Anything else is a TypeError.
+    """
+    if isinstance(value, bool | int | float):
+        return value
+    if isinstance(value, type):
+        return type_text(value, group)
+    if isinstance(value, Path):
+        return sourced(str(value), Path.cwd())
+    if isinstance(value, str):
+        return value if hasattr(value, "folder") else sourced(value, Path.cwd())
+    if isinstance(value, Fraction):
+        return as_written(value)
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"has the key {key!r}: keys are texts")
+        return {str(key): scene_value(item, group) for key, item in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [scene_value(item, group) for item in value]
+    if hasattr(value, "tolist") and not isinstance(plain := value.tolist(), type(value)):
+        return scene_value(plain, group)
+    raise TypeError(
+        f"is of the type {type(value).__name__}: a scene holds texts, numbers, truth values, "
+        "lists and tables"
+    )
 
 
 def _sourced(value: Any) -> Any:

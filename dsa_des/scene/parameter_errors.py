@@ -17,19 +17,7 @@ from dsa_des.scene.scene_file import SceneFile
 
 
 def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
-    """Return what every validator of a whole model says of a table that one of them refused.
-
-    Parameters
-    ----------
-    model : type
-    item : ErrorDetails
-        An error of pydantic's whose location is the model itself.
-
-    Returns
-    -------
-    list of str
-        The error's own text first. Nothing more where the table cannot be asked again.
-    """
+    """Return what every validator of a whole model says of a table that one of them refused."""
     found = _texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
         table = SchemaValidator(_of_fields(model.__pydantic_core_schema__)).validate_python(
@@ -45,13 +33,7 @@ def disagreements_besides(
 ) -> list[str]:
     """Return what the other keys of a table disagree about where some are refused by themselves.
 
-    Parameters
-    ----------
-    model : type
-    given : dict
-        The table.
-    refused : set of str
-        Keys that are missing or wrong. Validators that look at one of them say nothing.
+    Validators that look at one of the `refused` keys, missing or wrong, say nothing.
     """
     known = set(model.model_fields)
     refused = refused & known
@@ -114,15 +96,7 @@ def explain(
 ) -> list[Problem]:
     """Return what is wrong with a table, one problem per key, with the nearest valid name.
 
-    Parameters
-    ----------
-    scene_file : SceneFile
-    key : tuple
-        Where the table stands in the scene.
-    what : str
-        What it describes, for example a block type.
-    model : type of Parameters
-    error : ValidationError
+    It stands at `key` and describes `what`, for example a block type.
     """
     problems = []
     refused: set[str] = set()

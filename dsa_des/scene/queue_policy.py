@@ -56,13 +56,7 @@ POLICIES: dict[str, type[QueuePolicy]] = {
 
 
 def find_policy(name: Any) -> type[QueuePolicy]:
-    """Return the policy of a name, or that of ``module:Class`` or ``./file.py:Class``.
-
-    Raises
-    ------
-    ValueError
-        If there is none of this name, or it cannot be loaded.
-    """
+    """Return the policy of a name, ``module:Class`` or ``./file.py:Class``, or raise ValueError."""
     if name in POLICIES:
         return POLICIES[name]
     if not isinstance(name, str) or ":" not in name:

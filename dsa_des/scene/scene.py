@@ -1,7 +1,7 @@
 """From a scene file to a scene that can be run, with every problem reported at once."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from html import escape
 from pathlib import Path
@@ -12,9 +12,8 @@ import networkx as nx
 
 from dsa_des.block.component import Component, Parameters, as_written
 from dsa_des.block.registry import section_models
-from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block, ProcessorParameters
-from dsa_des.scene.changeable import Changeable
 from dsa_des.scene.checks import (
     check_activity,
     check_effects,
@@ -27,8 +26,15 @@ from dsa_des.scene.checks import (
     read_text,
 )
 from dsa_des.scene.graph import build_graph, check_graph
-from dsa_des.scene.overrides import apply_sets, apply_swap
-from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_file
+from dsa_des.scene.overrides import (
+    SWAP,
+    Change,
+    apply_changes,
+    read_changes,
+    read_sets,
+    scene_value,
+)
+from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
 
@@ -36,10 +42,12 @@ _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "
 _TOLERANCE = "accuracy"
 # Of what a scene is shown as in Python.
 _WIDTH, _MOST_LINES = 84, 5
+#: Where messages say that a change in Python was written.
+_SET, _SWAP = "scene.set", "scene.swap"
 
 
 @dataclass(repr=False)
-class Scene(Changeable):
+class Scene:
     """A checked scene; `set` and `swap` give changed ones.
 
     Parameters
@@ -80,6 +88,9 @@ class Scene(Changeable):
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    _origin: tuple[SceneFile, tuple[Change, ...]] | None = field(
+        default=None, init=False, compare=False
+    )
 
     def __repr__(self) -> str:
         return described(self)
@@ -94,9 +105,87 @@ class Scene(Changeable):
         table = f"<table><tr><th>block</th><th>type</th></tr>{rows}</table>"
         return f"<p><b>{heading}</b>, seed {self.seed}</p>{table}<p>{wires}</p>"
 
-    @classmethod
-    def _checked(cls, scene_file: SceneFile, problems: list[Problem]) -> "Scene":
-        return check_scene(scene_file, problems)
+    @property
+    def origin(self) -> tuple[SceneFile, tuple[Change, ...]]:
+        """The tables that the scene was made of, as they were read, and their changes.
+
+        Raises
+        ------
+        UsageError
+            If it was not made by `dsa_des.load_scene`.
+        """
+        if self._origin is None:
+            raise UsageError("this scene cannot be changed: it was not made by dsa_des.load_scene")
+        return self._origin
+
+    def set(self, values: Mapping[str, Any] | str, /, *more: str) -> "Scene":
+        """Return a scene with other values; this one stays as it is.
+
+        Parameters
+        ----------
+        values : mapping or str
+            Dotted key → value, for example ``{"blocks.radar.scan_rate_hz": 2}``, or texts as
+            ``--set`` takes them: ``"blocks.radar.scan_rate_hz=2"``. Relative paths are those of
+            the working directory; a table may say ``extends``, as in a file.
+        *more : str
+            Further texts.
+
+        Raises
+        ------
+        SceneError
+            With every problem that the new scene has.
+        """
+        if isinstance(values, str):
+            read, problems = read_sets((values, *more))
+            if problems:
+                raise SceneError(replace(one, source=_SET) for one in problems)
+            values = dict(read)
+        return self._changed(values, _SET)
+
+    def swap(
+        self,
+        types: "Mapping[str, str | type[Component]] | None" = None,
+        /,
+        **more: "str | type[Component]",
+    ) -> "Scene":
+        """Return a scene with other types in some blocks; this one stays as it is.
+
+        A block keeps its name, its wires and the parameters that the new type knows; ``dropped``
+        lists the others.
+
+        Parameters
+        ----------
+        types, **more
+            Block → type: a registered name, ``module:Class``, or a class.
+
+        Raises
+        ------
+        SceneError
+            With every problem that the new scene has.
+        """
+        return self._changed({**(types or {}), **more}, _SWAP)
+
+    def _changed(self, values: Mapping[str, Any], source: str) -> "Scene":
+        changes: list[Change] = []
+        problems: list[Problem] = []
+        for key, value in values.items():
+            if not isinstance(key, str):
+                problems.append(Problem(source, "", "a key must be text", key))
+            elif source == _SET and key.startswith(SWAP):
+                problems.append(Problem(source, key, "types are changed with scene.swap"))
+            elif source == _SWAP and not isinstance(value, str | type):
+                message = "must be a registered name, module:Class, or a class"
+                problems.append(Problem(source, key, message, value))
+            else:
+                try:
+                    name = key if source == _SET else SWAP + key
+                    changes.append((name, scene_value(value)))
+                except TypeError as error:
+                    problems.append(Problem(source, key, str(error)))
+        if problems:
+            raise SceneError(problems)
+        file, before = self.origin
+        return changed_tables(file, (*before, *changes))
 
     @property
     def tolerance(self) -> dict[str, float]:
@@ -172,65 +261,31 @@ def load_scene(
     SceneError
         With every problem found.
     """
-    return load_tables(
-        read_scene_file(path), sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
-    )
+    return load_tables(read_scene_file(path), sets, swaps, seed, duration_s)
 
 
-def load_tables(scene_file: SceneFile, **overrides: Any) -> Scene:
-    """Override and check tables that were read; see `load_scene`."""
-    problems, dropped = _overridden(scene_file, **overrides)
-    scene = check_scene(scene_file, problems)
-    scene.dropped = dropped
-    return scene
-
-
-def open_scene(path: Path | str, **overrides: Any) -> tuple[SceneFile, list[Problem], list[str]]:
-    """Read and override a scene without checking it.
-
-    Parameters
-    ----------
-    path, **overrides
-        As for `load_scene`.
-
-    Returns
-    -------
-    SceneFile
-    list of Problem
-        What is wrong with the overrides.
-    list of str
-        Dotted keys of parameters that a swap dropped.
-
-    Raises
-    ------
-    SceneError
-        If a file cannot be read.
-    """
-    scene_file = read_scene_file(path)
-    return scene_file, *_overridden(scene_file, **overrides)
-
-
-def _overridden(
+def load_tables(
     scene_file: SceneFile,
-    *,
     sets: Iterable[str] = (),
     swaps: Iterable[str] = (),
     seed: int | None = None,
     duration_s: object = None,
-) -> tuple[list[Problem], list[str]]:
-    """Override values, and return what is wrong and which parameters a swap dropped."""
-    problems: list[Problem] = []
-    dropped: list[str] = []
-    for swap in swaps:
-        found, gone = apply_swap(scene_file, swap)
-        problems += found
-        dropped += gone
-    problems += apply_sets(scene_file, sets)
-    if seed is not None:
-        _override(scene_file, "seed", seed)
-    if duration_s is not None:
-        _override(scene_file, "duration_s", duration_s)
-    return problems, dropped
+) -> Scene:
+    """Override and check tables that were read; see `load_scene`."""
+    changes, problems = read_changes(sets, swaps, seed, duration_s)
+    wrong, dropped = apply_changes(scene_file, changes)
+    scene = check_scene(scene_file, problems + wrong)
+    scene.dropped = dropped
+    return scene
+
+
+def changed_tables(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
+    """Return the checked scene that a program's changes make of tables; those stay as they are."""
+    changed = file.copy()
+    problems, dropped = apply_changes(changed, changes, _SET, _SWAP, "")
+    scene = check_scene(changed, problems)
+    scene.dropped, scene._origin = dropped, (file, changes)
+    return scene
 
 
 def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) -> Scene:
@@ -304,8 +359,3 @@ def described(scene: Scene) -> str:
     if scene.dropped:
         lines.append(f"  dropped by swaps: {shortened(', '.join(scene.dropped), _WIDTH)}")
     return "\n".join(lines)
-
-
-def _override(scene_file: SceneFile, key: str, value: object) -> None:
-    scene_file.data[key] = value
-    scene_file.sources[(key,)] = COMMAND_LINE

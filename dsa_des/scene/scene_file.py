@@ -41,28 +41,18 @@ _VALUES_PER_FILE = 200
 
 @dataclass
 class SceneFile:
-    """The merged tables of a scene and where each key came from.
-
-    Parameters
-    ----------
-    path : Path
-    data : dict
-        Merged tables; every text is a `SourcedText`.
-    sources : dict
-        For each key path that was written, the file (or ``command line``).
-    of_other_type : dict
-        Keys of blocks that were inherited from a table of another type → that type.
-    beside : dict
-        Tables within blocks → the values that stood beside them in the file that wrote them first.
-    replaced : dict
-        Lists that take the place of inherited ones → the named items that are gone with these.
-    """
+    """The merged tables of a scene and where each key came from."""
 
     path: Path
+    #: Merged tables; every text is a `SourcedText`.
     data: dict[str, Any]
+    #: For each key path that was written, the file (or ``command line``).
     sources: dict[Key, str] = field(default_factory=dict)
+    #: Keys of blocks that were inherited from a table of another type → that type.
     of_other_type: dict[Key, str] = field(default_factory=dict)
+    #: Tables within blocks → the values that stood beside them in the file that wrote them first.
     beside: dict[Key, dict[str, Any]] = field(default_factory=dict)
+    #: Lists that take the place of inherited ones → the named items that are gone with these.
     replaced: dict[Key, list[str]] = field(default_factory=dict)
 
     def copy(self) -> "SceneFile":
@@ -84,71 +74,41 @@ class SceneFile:
 
 
 def read_scene_file(path: Path | str) -> SceneFile:
-    """Read a scene with everything it extends.
-
-    Raises
-    ------
-    SceneError
-        If a file is missing, is not TOML, or extends itself.
-    """
+    """Read a scene with everything it extends."""
     path = Path(path)
-    problems: list[Problem] = []
-    reader = _Reader(problems)
+    reader = _Reader()
     data = reader.file(path, (), ())
-    if problems:
-        raise SceneError(problems)
-    inheritance = reader.inheritance
-    return SceneFile(
-        path,
-        data,
-        reader.sources,
-        inheritance.of_other_type,
-        inheritance.beside,
-        inheritance.replaced,
-    )
+    if reader.problems:
+        raise SceneError(reader.problems)
+    return reader.scene_file(path, data, reader.sources)
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
-    """Take tables as a scene with everything they extend; paths are those of the working directory.
-
-    Parameters
-    ----------
-    tables : mapping
-    name : str
-        What messages call them.
-
-    Raises
-    ------
-    SceneError
-        If a file that they extend is missing, is not TOML, or extends itself.
-    """
-    place = Path.cwd() / name
-    problems: list[Problem] = []
-    reader = _Reader(problems)
-    reader.sources[()] = str(place)
-    data = reader.table(tables, place)
-    if problems:
-        raise SceneError(replace(p, source=name) if p.source == str(place) else p for p in problems)
-    sources = {k: name if file == str(place) else file for k, file in reader.sources.items()}
-    inheritance = reader.inheritance
-    return SceneFile(
-        Path(name),
-        data,
-        sources,
-        inheritance.of_other_type,
-        inheritance.beside,
-        inheritance.replaced,
-    )
+    """Take tables, which messages call `name`, as a scene file of the working directory."""
+    here = Path.cwd() / name
+    reader = _Reader()
+    reader.sources[()] = str(here)
+    data = reader.table(tables, here)
+    if reader.problems:
+        raise SceneError(
+            replace(p, source=name) if p.source == str(here) else p for p in reader.problems
+        )
+    sources = {k: name if file == str(here) else file for k, file in reader.sources.items()}
+    return reader.scene_file(Path(name), data, sources)
 
 
 class _Reader:
-    def __init__(self, problems: list[Problem]) -> None:
-        self.problems = problems
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
         self.sources: dict[Key, str] = {}
-        self.inheritance = Inheritance(self.sources, problems)
-        #: What was read of each file: its real path, and its tables or what is wrong with it.
+        self._inheritance = Inheritance(self.sources, self.problems)
+        #: Each file that was read: its real path, and its tables or the error.
         self._read: dict[Path, tuple[Path, dict[str, Any] | Exception]] = {}
         self._taken = 0
+
+    def scene_file(self, path: Path, data: dict[str, Any], sources: dict[Key, str]) -> SceneFile:
+        of = self._inheritance
+        return SceneFile(path, data, sources, of.of_other_type, of.beside, of.replaced)
 
     def file(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
         self._count(path, _VALUES_PER_FILE)
@@ -185,8 +145,8 @@ class _Reader:
         return self._finished(tables, self._table(tables, path, (), (path,)), ())
 
     def _finished(self, own: Mapping[str, Any], merged: dict[str, Any], at: Key) -> dict[str, Any]:
-        self.inheritance.note_beside(own, merged, at)
-        return self.inheritance.finished(merged, at)
+        self._inheritance.note_beside(own, merged, at)
+        return self._inheritance.finished(merged, at)
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values
@@ -211,7 +171,7 @@ class _Reader:
                 continue
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
-            self.inheritance.merge(merged, self.file(self._extended(path, base), at, chain), at)
+            self._inheritance.merge(merged, self.file(self._extended(path, base), at, chain), at)
             self.sources[at] = base_source
         own = {
             key: self._value(value, path, (*at, key), chain)
@@ -219,8 +179,8 @@ class _Reader:
             if key != "extends"
         }
         if REMOVE in own:
-            own[REMOVE] = self.inheritance.removals(own[REMOVE], str(path))
-        return self.inheritance.merge(merged, own, at)
+            own[REMOVE] = self._inheritance.removals(own[REMOVE], str(path))
+        return self._inheritance.merge(merged, own, at)
 
     def _extended(self, path: Path, base: str) -> Path:
         """Return the file that one extends: beside it, or else the shipped one of that name."""
@@ -236,7 +196,7 @@ class _Reader:
     def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
         self._count(path)
         self.sources[at] = str(path)
-        self.inheritance.of_other_type.pop(at, None)
+        self._inheritance.of_other_type.pop(at, None)
         if isinstance(value, dict):
             return self._table(value, path, at, chain)
         if isinstance(value, list):

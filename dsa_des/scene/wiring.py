@@ -32,38 +32,26 @@ _KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "hold
 
 @dataclass(frozen=True)
 class Wire:
-    """One connection between an output and an input.
+    """One connection between an output and an input."""
 
-    Parameters
-    ----------
-    source, output, target, input : str
-        Block and port names.
-    delay_s : Fraction
-        Time on the wire; 0 for the same instant.
-    delay_scans : int
-        Delay counted in scans of the receiving block's clock (of the sender's when it has none).
-    holds : None, "nothing" or mapping
-        What the input holds before the first message; required of a feedback wire.
-    jitter_s : Fraction
-        Largest extra delay; each message takes a uniformly drawn part of it.
-    drop_probability : float
-        Share of the messages that are lost.
-    latency_s : Fraction
-        Processing time of the sending block, given in its table.
-    queued : bool
-        Whether the sending block's messages go through a shared processor.
-    """
-
+    #: Block and port names.
     source: str
     output: str
     target: str
     input: str
+    #: Time on the wire; 0 for the same instant.
     delay_s: Fraction = Fraction(0)
+    #: Delay counted in scans of the receiving block's clock (of the sender's when it has none).
     delay_scans: int = 0
+    #: What the input holds before the first message; required of a feedback wire.
     holds: Any = None
+    #: Largest extra delay; each message takes a uniformly drawn part of it.
     jitter_s: Fraction = Fraction(0)
+    #: Share of the messages that are lost.
     drop_probability: float = 0.0
+    #: Processing time of the sending block, given in its table.
     latency_s: Fraction = Fraction(0)
+    #: Whether the sending block's messages go through a shared processor.
     queued: bool = False
 
     @property
@@ -110,15 +98,8 @@ def read_wires(
 ) -> list[Wire]:
     """Return the wires of a scene, sorted; what is wrong is added to `problems`.
 
-    Parameters
-    ----------
-    scene : SceneFile
-    classes : mapping
-        The class of each block; blocks whose type is unknown map to None and their wires are
-        not judged.
-    problems : list of Problem
-    unsure : set of str, optional
-        Receives the blocks that a faulty wire meant to feed.
+    Wires of blocks whose class is None, not known, are not judged. `unsure` receives the blocks
+    that a faulty wire meant to feed.
     """
     entries = scene.data.get("wires", [])
     if not isinstance(entries, list):

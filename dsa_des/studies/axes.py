@@ -12,6 +12,7 @@ from typing import Any
 from dsa_des.block.component import as_written
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import did_you_mean
+from dsa_des.scene.keys import flat
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import parse_rational
 
@@ -51,27 +52,15 @@ class Axis:
         )
 
 
-def flatten_axes(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flatten_axes(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return dotted key → list or table of every axis; nested tables are keys of the scene."""
-    found: dict[str, Any] = {}
-    for name, value in tables.items():
-        key = f"{prefix}.{name}" if prefix else str(name)
-        nested = isinstance(value, dict) and not (value and set(value) & set(_SPEC_KEYS))
-        if nested and value:
-            found |= flatten_axes(value, key)
-        else:
-            found[key] = value
-    return found
+    return flat(
+        tables, lambda v: not isinstance(v, dict) or not v or bool(set(v) & set(_SPEC_KEYS))
+    )
 
 
 def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
-    """Return an axis from what a study says of it.
-
-    Raises
-    ------
-    ValueError
-        With what is wrong and what is allowed.
-    """
+    """Return an axis from what a study says of it."""
     if isinstance(spec, list):
         values = spec
     elif not isinstance(spec, dict):

@@ -8,7 +8,7 @@ Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millihertz: clo
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.scene.keys import flat
 from dsa_des.studies.axes import Axis
 from dsa_des.time.randomness import key_of
 
@@ -89,14 +90,21 @@ def _strata(seed: int, key: str, block: int, batch: int) -> IntArray:
     return np.asarray(generator.permutation(batch), dtype=np.int64)
 
 
-def parse_draw(key: str, table: Any) -> Draw:
-    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``.
+def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return dotted key → how it is drawn; nested tables are keys of the scene."""
 
-    Raises
-    ------
-    ValueError
-        With what is wrong and what is allowed.
-    """
+    def is_draw(value: Any) -> bool:
+        return (
+            not isinstance(value, dict)
+            or bool(set(value) & set(KINDS))
+            or not any(isinstance(item, dict) for item in value.values())
+        )
+
+    return flat(tables, is_draw)
+
+
+def parse_draw(key: str, table: Any) -> Draw:
+    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``."""
     form = "must be one of {uniform = [low, high]}, {normal = [mean, standard deviation]}, " \
         "{choice = [...]}, {latin_hypercube = [low, high]}, {sequence = [first, step]}"  # fmt: skip
     if not isinstance(table, dict) or len(table) != 1:
@@ -189,13 +197,7 @@ def identity(axis: Axis, index: int) -> tuple[str, ...]:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's content; a file that stays as it is is read once.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
+    """Return the SHA-256 of a file's content; a file that stays as it is is read once."""
     state = path.stat()
     return _digest(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
 

@@ -226,11 +226,6 @@ class Dask:
 
     Its workers need this package, and the scene's files under the same names; results travel back
     through the scheduler.
-
-    Raises
-    ------
-    UsageError
-        If Dask is not installed or the scheduler does not answer.
     """
 
     def __init__(self, scheduler: str) -> None:
@@ -292,13 +287,7 @@ class Dask:
 
 
 def make_executor(kind: str, workers: int, scheduler: str | None) -> Executor:
-    """Return the executor that a command line asks for.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be had.
-    """
+    """Return the executor that a command line asks for."""
     if kind == "dask":
         if scheduler is None:
             raise UsageError("--executor dask needs --scheduler, for example tcp://localhost:8786")

@@ -55,13 +55,7 @@ def description_text(study: Study) -> str:
 
 
 def files_of(study: Study) -> set[Path]:
-    """Return the files that a study's values name: their content fixes results too.
-
-    Raises
-    ------
-    OSError
-        If one of them cannot be read.
-    """
+    """Return the files that a study's values name: their content fixes results too."""
     given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
     given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
     beside = study.path.parent, study.scene_path.parent

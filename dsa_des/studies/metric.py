@@ -199,19 +199,7 @@ class Metric:
 
 
 def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
-    """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``.
-
-    Parameters
-    ----------
-    name : str
-    beside : sequence of Path
-        Folders in which a module may lie, such as that of the scene.
-
-    Raises
-    ------
-    ValueError
-        If there is none of this name, or it cannot be loaded.
-    """
+    """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``."""
     if isinstance(name, ClassText):
         return _metric(name, name.cls)
     point = registered(METRICS).get(name)

@@ -107,13 +107,7 @@ def _less(found: SceneRecord, first: SceneRecord) -> SceneRecord:
 
 
 def keep_explained(study: Study, folder: StudyFolder) -> None:
-    """Write ``explained.json`` into a study's folder, unless it is there.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write ``explained.json`` into a study's folder, unless it is there."""
     if read_explained(folder) is None:
         content = explained(study).model_dump()
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -124,13 +118,6 @@ def measure_errors(folder: StudyFolder) -> None:
     """Run the first run's scene with its models and their references, and keep the errors.
 
     It reads the scene that the folder names, and imports its blocks: not for folders of strangers.
-
-    Raises
-    ------
-    SceneError
-        If the scene cannot be run.
-    OSError
-        If the folder cannot be written.
     """
     record = folder.record
     first = StoredRows(folder).first

@@ -60,15 +60,9 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run what is missing of a study into its open folder; `report` is called after every chunk.
-
-    Raises
-    ------
-    Stopped
-        On ctrl-C or when the disk is full; what is finished is kept.
-    """
+    """Run what is missing of a study into its open folder; `report` is called after every chunk."""
     progress = Progress(total=len(study.cells) * study.replicas)
-    cells = list(range(len(study.cells)))
+    cells = list(study.cells)
     rounds = -(-study.replicas // study.batch)
     try:
         keep_explained(study, folder)
@@ -190,7 +184,7 @@ def _expected(study: Study) -> Expected:
     """Return the analytic answers at every place, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
-    for cell in range(len(study.cells)):
+    for cell in study.cells:
         labels = study.labels(cell)
         at = tuple(
             float(labels[axis.column]) if axis.numeric else str(labels[axis.column])

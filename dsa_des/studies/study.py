@@ -6,20 +6,20 @@ gives never depends on who ran it.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
+
+import numpy as np
 
 from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
-from dsa_des.errors import Problem
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
-from dsa_des.scene.overrides import set_value, swap_type
+from dsa_des.scene.overrides import SWAP, apply_changes
 from dsa_des.scene.scene import Scene, check_scene
-from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -36,13 +36,7 @@ class MetricSpec:
     place: int = 0
 
     def build(self, scene: Scene) -> Metric:
-        """Return the metric for a scene.
-
-        Raises
-        ------
-        ValueError, pydantic.ValidationError
-            If the name or a key is unknown, or the scene lacks what it needs.
-        """
+        """Return the metric for a scene."""
         from dsa_des.studies.metric import check_tables
 
         cls = find_metric(self.name, (scene.path.parent,))
@@ -63,40 +57,6 @@ class Chunk:
 
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)
-
-
-class StudyCells(Sequence[tuple[int, ...]]):
-    """The cells of a study, each made when it is asked for; the last axis runs fastest."""
-
-    def __init__(self, sizes: Iterable[int]) -> None:
-        self._sizes = tuple(sizes)
-        self._count = math.prod(self._sizes)
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, number: int) -> tuple[int, ...]: ...
-    @overload
-    def __getitem__(self, number: slice) -> list[tuple[int, ...]]: ...
-    def __getitem__(self, number: int | slice) -> tuple[int, ...] | list[tuple[int, ...]]:
-        """Return the index of each axis's value at a cell."""
-        if isinstance(number, slice):
-            return [self[k] for k in range(*number.indices(self._count))]
-        if not -self._count <= number < self._count:
-            raise IndexError(number)
-        rest, places = number % self._count, []
-        for size in reversed(self._sizes):
-            rest, place = divmod(rest, size)
-            places.append(place)
-        return tuple(reversed(places))
-
-    def number(self, places: Iterable[int]) -> int:
-        """Return which cell has these indices."""
-        found = 0
-        for size, place in zip(self._sizes, places, strict=True):
-            found = found * size + place
-        return found
 
 
 @dataclass
@@ -135,9 +95,21 @@ class Study:
     compare_weight: str | None = None
 
     @property
-    def cells(self) -> StudyCells:
-        """Index of each axis's value, cell by cell; the last axis runs fastest."""
-        return StudyCells(len(axis.labels) for axis in self.axes)
+    def _sizes(self) -> tuple[int, ...]:
+        return tuple(len(axis.labels) for axis in self.axes)
+
+    @property
+    def cells(self) -> range:
+        """The numbers of all cells."""
+        return range(math.prod(self._sizes))
+
+    def indices(self, cell: int) -> tuple[int, ...]:
+        """Return the index of each axis's value at a cell; the last axis runs fastest."""
+        return tuple(map(int, np.unravel_index(cell, self._sizes)))
+
+    def cell_at(self, indices: Sequence[int]) -> int:
+        """Return the cell with these indices."""
+        return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
 
     @property
     def batch(self) -> int:
@@ -146,33 +118,27 @@ class Study:
 
     def labels(self, cell: int) -> dict[str, Any]:
         """Return column → value of every axis at a cell."""
-        indices = self.cells[cell]
+        indices = self.indices(cell)
         return {a.column: a.labels[i] for a, i in zip(self.axes, indices, strict=True)}
 
     def changes(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
         """Return the swaps and the values that make a cell's scene of the base scene."""
         swaps, sets = list(self.swaps), list(self.sets)
-        for axis, index in zip(self.axes, self.cells[cell], strict=True):
+        for axis, index in zip(self.axes, self.indices(cell), strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         return swaps, sets
 
     def scene(self, cell: int) -> Scene:
-        """Return the checked scene of a cell.
-
-        Raises
-        ------
-        SceneError
-            With every problem found.
-        """
+        """Return the checked scene of a cell."""
         return changed_scene(self.base, *self.changes(cell), str(self.path))
 
     def member_seed(self, cell: int) -> int:
         """Return the seed of a cell's encounter; without a sample the study's."""
         if not self.over:
             return self.seed
-        places = zip(self.axes, self.cells[cell], strict=True)
-        return member_seed(self.seed, ((a, i) for a, i in places if a.column in self.over))
+        members = zip(self.axes, self.indices(cell), strict=True)
+        return member_seed(self.seed, ((a, i) for a, i in members if a.column in self.over))
 
     def replica(self, number: int, cell: int = 0) -> Replica:
         """Return the seed and the drawn values of a replica.
@@ -231,18 +197,8 @@ def changed_scene(
     sets: Sequence[tuple[str, Any]],
     source: str,
 ) -> Scene:
-    """Return the checked scene that swaps and values make of a scene's tables.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
-    """
-    file = base.copy()
-    problems: list[Problem] = []
-    for block, name in swaps:
-        found, _ = swap_type(file, block, sourced(name, Path(source).parent), COMMAND_LINE)
-        problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
-    for key, value in sets:
-        problems += set_value(file, key, deepcopy(value), source)
+    """Return the checked scene that swaps and values make of a scene's tables."""
+    file, folder = base.copy(), Path(source).parent
+    types = [(SWAP + block, sourced(name, folder)) for block, name in swaps]
+    problems, _ = apply_changes(file, [*types, *sets], source, source, "swap")
     return check_scene(file, problems)

@@ -219,7 +219,7 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     if draw.kind == "sequence":
         return [draw.value(study.seed, number, study.batch) for number in (0, study.replicas - 1)]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
-    cells = range(len(study.cells) if study.over else 1)
+    cells = study.cells if study.over else range(1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
     drawn = [draw.value(seed, number, study.batch) for seed in seeds for number in range(count)]
     return list(dict.fromkeys([min(drawn), max(drawn)]))
@@ -253,7 +253,7 @@ def one_per_value(study: Study) -> list[int]:
     for place, axis in enumerate(study.axes):
         for index in range(1, len(axis.labels)):
             wanted.append(tuple(index if k == place else 0 for k in range(len(study.axes))))
-    return [study.cells.number(cell) for cell in wanted]
+    return [study.cell_at(indices) for indices in wanted]
 
 
 def _different(scenes: list[Scene]) -> list[Scene]:

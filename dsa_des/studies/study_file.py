@@ -16,23 +16,17 @@ from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.results.record import StopWhen
 from dsa_des.scene.examples import find_example
-from dsa_des.scene.keys import Key
+from dsa_des.scene.keys import Key, flat
 from dsa_des.scene.overrides import apply_sets, read_sets
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
-from dsa_des.studies.draws import Draw, parse_draw
+from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
 from dsa_des.studies.study import MetricSpec, Study, changed_scene
 from dsa_des.studies.study_checks import cell_problems
-from dsa_des.studies.study_tables import (
-    flat_draws,
-    flat_values,
-    read_figures,
-    read_requirements,
-    resolved,
-)
+from dsa_des.studies.study_tables import read_figures, read_requirements, resolved
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
@@ -51,11 +45,6 @@ def read_study(
 
     `swaps` are further swap axes; `sets` change the study itself, as ``key=value``; `keys` take the
     place of its own.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
     """
     reader = _StudyReader(read_scene_file(path))
     reader.data.update(keys or {})
@@ -95,11 +84,6 @@ def study_of_tables(
 
     `tables` are as a study file would hold them, without ``scene``, ``set`` and ``swap``; `swaps`
     and `sets` are made in every cell.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
     """
     return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 
@@ -215,7 +199,7 @@ class _StudyReader:
         return value
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        return (*self._sets, *flat_values(self.table("set")).items())
+        return (*self._sets, *flat(self.table("set")).items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
         named = [
@@ -273,7 +257,7 @@ class _StudyReader:
 
     def draws(self) -> tuple[Draw, ...]:
         found = []
-        for key, spec in flat_draws(self.table("draws")).items():
+        for key, spec in flatten_draws(self.table("draws")).items():
             try:
                 found.append(parse_draw(key, spec))
             except ValueError as error:

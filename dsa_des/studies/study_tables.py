@@ -10,7 +10,6 @@ from dsa_des.errors import did_you_mean
 from dsa_des.results.record import FigureRecord, Requirement, as_text
 from dsa_des.scene.scene_file import Key
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.draws import KINDS
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
@@ -72,31 +71,6 @@ def json_safe(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else repr(value)
     return as_text(value)
-
-
-def flat_values(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return dotted key → value; tables on the way are keys of the scene."""
-    found: dict[str, Any] = {}
-    for name, value in tables.items():
-        key = f"{prefix}.{name}" if prefix else str(name)
-        if isinstance(value, dict):
-            found |= flat_values(value, key)
-        else:
-            found[key] = value
-    return found
-
-
-def flat_draws(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return dotted key → how it is drawn."""
-    found: dict[str, Any] = {}
-    for name, value in tables.items():
-        key = f"{prefix}.{name}" if prefix else str(name)
-        if isinstance(value, dict) and value and not set(value) & set(KINDS):
-            nested = any(isinstance(item, dict) for item in value.values())
-            found |= flat_draws(value, key) if nested else {key: value}
-        else:
-            found[key] = value
-    return found
 
 
 FIGURES = {

@@ -28,11 +28,6 @@ def plain_ending() -> Iterator[None]:
     What a signal interrupts may raise anything (an import that is broken off, a thread pool that
     is closed), so after a signal every exception is its consequence. Handlers that other code
     has installed, and signals that are ignored, stay as they are.
-
-    Raises
-    ------
-    SystemExit
-        With 128 and the number of the signal.
     """
     received: list[int] = []
 

@@ -33,23 +33,11 @@ def print_table(
     right: Collection[int] = (),
     notes: Mapping[str, str] | None = None,
 ) -> None:
-    """Print a table, no wider than the console.
+    """Print a table, no wider than the console; a column without any text is left out.
 
-    Parameters
-    ----------
-    console : rich.console.Console
-    title : str
-    headings : sequence of str
-    rows : sequence of sequence of str
-        One text per heading; a column without any text is left out.
-    group : int, optional
-        Number of the column that may become lines above the rows that share its value.
-    below : int, optional
-        Number of the column that may stand in lines below its row; for a table without groups.
-    right : collection of int
-        Columns that are flush right; for a table without groups.
-    notes : mapping, optional
-        Value of the group column → what is said behind it in such a line.
+    Values of the column `group` may become lines above the rows that share one, with its text of
+    `notes` behind. Without groups, the column `below` may stand in lines below its rows, and the
+    columns `right` are flush right.
     """
     names = [printable(heading) for heading in headings]
     cells = [[printable(cell) for cell in row] for row in rows]

@@ -17,14 +17,7 @@ from dsa_des.text.safe_text import printable
 
 
 def say(line: object = "", *, err: bool = False) -> None:
-    """Print one line; what could break out of it is escaped.
-
-    Parameters
-    ----------
-    line : object
-    err : bool
-        On standard error.
-    """
+    """Print one line, on standard error with `err`; what could break out of it is escaped."""
     _put(printable(line), err)
 
 
@@ -48,13 +41,7 @@ def _put(text: str, err: bool) -> None:
 def console(width: int | None = None, *, err: bool = False) -> Any:
     """Return a ``rich.console.Console`` that prints no control character and reads no markup.
 
-    Parameters
-    ----------
-    width : int, optional
-        Letters in a line where the stream is no terminal and ``COLUMNS`` is not set; a terminal
-        has its own.
-    err : bool
-        On standard error.
+    Lines have `width` letters where the stream is no terminal and ``COLUMNS`` is not set.
     """
     from dsa_des.terminal.safe_console import SafeConsole
 
@@ -89,10 +76,7 @@ def html_of(show: Callable[[Any], None]) -> str:
 def progress(text: str) -> Any:
     """Return a ``rich.progress.Progress`` on standard error, gone when it is done.
 
-    Parameters
-    ----------
-    text : {"seconds", "text"}
-        What stands behind the bar: simulated seconds, or the task's field ``text``.
+    Behind the bar stand simulated ``"seconds"``, or the task's field ``"text"``.
     """
     from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 

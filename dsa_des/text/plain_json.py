@@ -6,23 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def json_text(content: Any, **options: Any) -> str:
-    """Return content as JSON text; NaN and infinities become null.
-
-    Parameters
-    ----------
-    content : object
-    **options
-        As for `json.dumps`.
-    """
-    return json.dumps(_plain(content), allow_nan=False, **options)
+def json_text(content: Any, *, digits: int = 17, **options: Any) -> str:
+    """Return content as JSON text, floats to so many digits; NaN and infinities become null."""
+    return json.dumps(_plain(content, digits), allow_nan=False, **options)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, digits: int) -> Any:
     if isinstance(value, float):
-        return value if math.isfinite(value) else None
+        if not math.isfinite(value):
+            return None
+        return value if digits == 17 else float(f"{value:.{digits}g}")
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _plain(item, digits) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_plain(item, digits) for item in value]
     return value

@@ -17,24 +17,9 @@ MOST_OF_A_NAME = 60
 def printable(text: object, *, lines: bool = False) -> str:
     r"""Return `text` with every character that is not plainly visible as an escape.
 
-    Parameters
-    ----------
-    text : object
-        Anything; what is no text is turned into some.
-    lines : bool
-        Whether line feeds stay what they are: for text whose parts were made printable before.
-
-    Returns
-    -------
-    str
-        Controls (C0 and C1), marks of direction, characters without width, separators other than
-        the blank, private, unassigned and lone surrogate code points as ``\x1b``, ``\u202e`` or
-        ``\U000e0001``. Text that was made printable before stays as it is.
-
-    Notes
-    -----
-    The rule is that of `str.isprintable`: Unicode's categories "other" and "separator", the blank
-    excepted, are not printable.
+    Those are Unicode's categories "other" and "separator" but the blank, as in `str.isprintable`:
+    they become ``\x1b``, ``\u202e`` or ``\U000e0001``. With `lines` line feeds stay, for text whose
+    parts were made printable before.
     """
     plain = _text_of(text)
     if plain.isprintable():

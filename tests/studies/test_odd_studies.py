@@ -8,8 +8,9 @@ from click.testing import CliRunner, Result
 
 from dsa_des.block.component import SourcedText
 from dsa_des.cli import main
+from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import parse_draw
-from dsa_des.studies.study import StudyCells
+from dsa_des.studies.study import Study
 from dsa_des.studies.study_tables import resolved
 
 STUDY = """
@@ -140,13 +141,17 @@ def test_a_scene_compared_with_itself_is_run_once(small: Path) -> None:
 def test_cells_are_counted_like_a_product() -> None:
     import itertools
 
-    cells = StudyCells((2, 3, 1, 4))
+    axes = tuple(Axis(f"a{size}", tuple(range(size)), ((),) * size, ((),) * size)
+                 for size in (2, 3, 1, 4))  # fmt: skip
+    study = object.__new__(Study)
+    study.axes = axes
     every = list(itertools.product(range(2), range(3), range(1), range(4)))
-    assert list(cells) == every == cells[:] and len(cells) == 24
-    assert [cells.number(cell) for cell in every] == list(range(24))
-    assert cells[-1] == every[-1] and len(StudyCells(())) == 1 and StudyCells(())[0] == ()
-    with pytest.raises(IndexError):
-        cells[24]
+    assert [study.indices(cell) for cell in study.cells] == every and len(study.cells) == 24
+    assert [study.cell_at(indices) for indices in every] == list(range(24))
+    with pytest.raises(ValueError, match="24"):
+        study.indices(24)
+    study.axes = ()
+    assert list(study.cells) == [0] and study.indices(0) == () and study.cell_at(()) == 0
 
 
 @pytest.mark.parametrize("value", ["what?", "a*b", "[c]"])
