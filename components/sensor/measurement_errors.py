@@ -16,11 +16,10 @@ from components.sensor.grid import (
     Grid,
     Measured,
     Values,
-    constant_column,
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import nothing_in
+from dsa_des.arrays.column_values import constant, nothing_in
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -203,7 +202,7 @@ class ErrorModel:
         return {
             VARIANCE_OF[name]: value + of_signal[name]
             if name in of_signal
-            else constant_column(value, count)
+            else constant(value, count, np.float64)
             for name, value in self._variances.items()
         }
 
