@@ -14,7 +14,6 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.flown_flights import read_flights
 from components.metrics.losses import nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
@@ -133,13 +132,13 @@ class RiskRatios(Mitigated):
         result = dict(super().measure(group))
         if self.p.needless:
             commanded = np.zeros(len(group))
-            commanded[list(self._steering.of(group))] = 1.0
+            commanded[list(self.manoeuvres(group))] = 1.0
             kept = 1.0 - result["well_clear_lost_nominal"]
             result |= {_KEPT: kept, _COMMANDED: commanded, _NEEDLESS: kept * commanded}
         if self._weight is not None:
             result |= self._weight.measure(group)
         if self.p.by:
-            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg)
+            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)
