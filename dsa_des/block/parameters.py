@@ -154,7 +154,7 @@ class Parameters(BaseModel):
         return []
 
     def idle(self, *keys: str, because: str) -> list[str]:
-        """Say which of some keys without effect, `because` of another one, are not at their defaults."""
+        """Say which keys without effect, `because` of another one, are not at their defaults."""
         fields = type(self).model_fields
         return [
             f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"
