@@ -158,7 +158,7 @@ def _compare_swap(
     study = changes.study(path, chosen)
     result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
-        folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
+        folder = run_into(study, home, workers, resume=False, again=_ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
@@ -201,7 +201,7 @@ def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: P
         return Tables(study, StudyFolder(path))
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
-    folder = run_into(study, target, workers, resume=False, again=lambda _: _ANEW)
+    folder = run_into(study, target, workers, resume=False, again=_ANEW)
     return tables_of(study, folder)
 
 

@@ -76,9 +76,8 @@ def cost_of_accuracy(
             from dsa_des.costs.chain import draw_chain, run_chain
 
             progress.say("whole chain ...")
-            found = run_chain(variants, costs, compare)
-            chain = found.rows
-            notes.append(found.picked)
+            chain, picked = run_chain(variants, costs, compare)
+            notes.append(picked)
             write_table(folder / "chain.parquet", chain)
             label = compare.difference.label
             draw_chain(folder / "chain.png", variants.scene.title, chain, label)

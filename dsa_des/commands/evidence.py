@@ -1,7 +1,6 @@
 """``dsa-des evidence``: run a case and leave the pack that shows what came of it."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from dsa_des.commands.study import check_workers, report_crashes, run_into, target_of
@@ -61,7 +60,7 @@ def evidence_command(
     tables: dict[str, Tables] = {}
     for name, study in found.studies.items():
         path = target / STUDIES / name
-        folders[name] = run_into(study, path, workers, resume, again=_saying(again))
+        folders[name] = run_into(study, path, workers, resume, again)
         tables[name] = tables_of(study, folders[name])
         tables[name].write()
     pack = Pack(found, folders, tables, sets, encounters)
@@ -75,10 +74,6 @@ def evidence_command(
     report_crashes(list(tables.values()), again)
     if pack.passes is None:
         sys.exit(1)
-
-
-def _saying(again: str) -> Callable[[Path], str]:
-    return lambda path: again
 
 
 def _write(path: Path, content: bytes) -> None:

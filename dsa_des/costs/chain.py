@@ -8,7 +8,6 @@ combined, with the scene's own.
 import itertools
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +27,10 @@ _REPEATS = 7
 Group = list[RungCost]
 
 
-@dataclass
-class ChainStudy:
-    """Rows of the whole chain, and how its combinations were picked."""
-
-    rows: list[dict[str, Any]]
-    picked: str
-
-
-def run_chain(variants: Variants, costs: Sequence[RungCost], comparison: Comparison) -> ChainStudy:
-    """Run combinations of rungs and compare what they find with the references together.
+def run_chain(
+    variants: Variants, costs: Sequence[RungCost], comparison: Comparison
+) -> tuple[list[dict[str, Any]], str]:
+    """Return rows of combinations of rungs, compared with the references, and how they were picked.
 
     The error is the comparison's `Difference`. Every combination is run seven times,
     interleaved, without recording; its cost is the shortest of them.
@@ -79,7 +72,7 @@ def run_chain(variants: Variants, costs: Sequence[RungCost], comparison: Compari
     )
     if whole > MOST:
         picked += f"; of {whole} such combinations, ladders were thinned to at most {MOST}"
-    return ChainStudy(rows, picked)
+    return rows, picked
 
 
 def _count(groups: Sequence[Sequence[RungCost]]) -> int:
