@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -13,7 +13,7 @@ from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_
 from components.aircraft.equipage import AdsBEquipage, Equipage, IcaoAddress
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters, ScenePath
-from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.files.input_files import InputFileError, read_once, status_of
 from dsa_des.text.safe_text import shortened
 from dsa_des.time.randomness import target_keys
 
@@ -46,9 +46,10 @@ def _silhouette(path: Path) -> Any:
     return read_aspect_table(path)
 
 
-@lru_cache(maxsize=64)
-def _read(reader: Callable[[Path], Any], path: Path, changed_ns: int, size: int) -> TableFile:
+@read_once(64)
+def _read(path: Path, reader: Callable[[Path], Any]) -> TableFile:
     # Aircraft that name the same file share one table, and are looked up in it together.
+    status_of(path, LARGEST_TABLE_BYTES)
     return TableFile(path, reader(path))
 
 
@@ -59,8 +60,7 @@ def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
         path = _PATH.validate_python(value)
         name = shortened(str(path), 300)
         try:
-            status = status_of(path, LARGEST_TABLE_BYTES)
-            return _read(reader, path, status.st_mtime_ns, status.st_size)
+            return _read(path, reader)
         except InputFileError as error:
             raise ValueError(f"must be a table that can be read: {name}: {error}") from None
 
@@ -264,13 +264,9 @@ class Roster:
 
     @cached_property
     def extents_m(self) -> FloatArray:
-        """Length, span and height of each target by its bodies as an EO camera sees them.
-
-        Returns
-        -------
-        (targets, 3) array, m
-            Those of the fuselage, a round body of the front's and the side's area, and of a wing
-            three times as wide as deep.
+        """Length, span and height (targets, 3), m, of each target by its bodies as an EO camera
+        sees them: those of the fuselage, a round body of the front's and the side's area, and of a
+        wing three times as wide as deep.
         """
         front, side, plane = (
             self.column(f"eo.{body}_m2") for body in ("front", "side", "horizontal")
@@ -315,19 +311,8 @@ class Roster:
         return columns[path]
 
     def tables(self, path: str) -> tuple[tuple[Any, ...], IntArray]:
-        """Return the tables that targets name, and which one each target has.
-
-        Parameters
-        ----------
-        path : str
-            ``"rcs_table"``, ``"eo.silhouette_table"`` or ``"ir.silhouette_table"``.
-
-        Returns
-        -------
-        tables : tuple
-            Each once, in the order of the targets.
-        place : (targets,) of int
-            Index into `tables`; -1 for a target without one.
+        """Return the tables that targets name at a path such as ``"eo.silhouette_table"``, each
+        once in the order of the targets, and the index (targets,) of each one's, -1 without.
         """
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:

@@ -48,23 +48,12 @@ def dbsm_to_m2(rcs_dbsm: ArrayLike) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class RcsTable:
-    """Hold an RCS over the direction of the radar in the target's body axes.
+    """An RCS (elevations, azimuths), dBsm, over the direction of the radar in the target's body
+    axes.
 
-    Interpolation is bilinear in dB; azimuth wraps, elevation is held beyond the outermost nodes.
-
-    Parameters
-    ----------
-    azimuth_deg : (n,) array, degrees
-        Rising, from 0 to below 360; spacing may vary.
-    elevation_deg : (m,) array, degrees
-        Rising, within [-90, 90]; spacing may vary.
-    rcs_dbsm : (m, n) array, dBsm
-        One row per elevation.
-
-    Raises
-    ------
-    ValueError
-        If the nodes are not in order, the shape does not fit or a value is not finite.
+    Azimuths rise from 0 to below 360, elevations within [-90, 90]; spacing may vary. Interpolation
+    is bilinear in dB; azimuth wraps, elevation is held beyond the outermost nodes. ValueError says
+    what is no such table.
     """
 
     azimuth_deg: FloatArray
@@ -100,24 +89,11 @@ class RcsTable:
 
 @dataclass(frozen=True, eq=False)
 class SilhouetteTable:
-    """Hold a projected area over the direction of the observer in the target's body axes.
+    """A projected area (elevations, azimuths), m², over the direction of the observer in body axes.
 
-    Interpolation is bilinear in azimuth and elevation and wraps in azimuth: exact at the nodes,
-    continuous, never outside the four values around.
-
-    Parameters
-    ----------
-    azimuth_deg : (n,) array, degrees
-        At least three nodes, rising, within one turn [0, 360).
-    elevation_deg : (m,) array, degrees
-        Rising nodes from -90 to 90.
-    area_m2 : (m, n) array, m²
-        One row per elevation.
-
-    Raises
-    ------
-    ValueError
-        If the nodes are not in order, leave a hole, or an area is negative or not finite.
+    At least three azimuths within one turn, elevations from -90 to 90, none missing. Interpolation
+    is bilinear and wraps in azimuth: exact at the nodes, continuous, never outside the four values
+    around. ValueError says what is no such table.
     """
 
     azimuth_deg: FloatArray

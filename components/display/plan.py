@@ -26,7 +26,7 @@ from components.display.symbols import (
 )
 from components.display.terminal import distance_text
 from components.messages.reach import Reach
-from components.sensor.mounting import BodyAxes
+from components.sensor.mounting import SensorAxes
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
@@ -60,7 +60,7 @@ def draw_plan(
         for name in detected.sensors
     }
     reaches = {name: reach for name, reach in looks.items() if isinstance(reach, Reach)}
-    mounted = {name: getattr(simulation.components[name], "axes", BodyAxes()) for name in reaches}
+    mounted = {name: getattr(simulation.components[name], "axes", SensorAxes()) for name in reaches}
     outlines = {
         name: outline_of(flights.start_yaw_rad, reach, mounted[name])
         for name, reach in reaches.items()

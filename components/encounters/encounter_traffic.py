@@ -5,7 +5,7 @@ function of its number: the same in every scene and condition.
 """
 
 from collections import OrderedDict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -17,11 +17,7 @@ from pydantic import Field, model_validator
 
 from components.encounters.made_encounters import read_made
 from components.encounters.model_file import read_model
-from components.encounters.pair_densities import (
-    PairingRules,
-    horizontal_density,
-    vertical_density,
-)
+from components.encounters.pair_densities import PairingRules, pairing_rules
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
@@ -38,100 +34,83 @@ from dsa_des.block.ladder import Verified
 
 #: An encounter: its set, and its index there.
 Encounter = tuple[EncounterSet, int]
-#: Time (s), north, east and altitude (m) of aircraft that are known at the same times.
-_Paths = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+#: An aircraft: its encounter's set, its row there, and how its events are flown.
+_Craft = tuple[EncounterSet, int, str]
 
-#: Flights that were flown last, with their sets.
-_FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = OrderedDict()
-#: So many encounters' flights are kept: a study asks for each of a chunk several times.
-MOST_FLOWN = 600
+
+class MadeTogether:
+    """What is made of many keys at once and then asked for one by one; the last `most` are kept.
+
+    A study asks for each encounter of a chunk several times.
+    """
+
+    def __init__(self, make: Callable[[list[Any]], Iterable[Any]], most: int) -> None:
+        self._make, self.most = make, most
+        self._kept: OrderedDict[Any, Any] = OrderedDict()
+
+    def prepare(self, keys: Iterable[Any]) -> None:
+        """Make what is not known of some keys, as many as are kept."""
+        new = [key for key in dict.fromkeys(keys) if key not in self._kept][: self.most]
+        self._kept.update(zip(new, self._make(new), strict=True))
+        while len(self._kept) > self.most:
+            self._kept.popitem(last=False)
+
+    def __getitem__(self, key: Any) -> Any:
+        if key not in self._kept:
+            self.prepare([key])
+        return self._kept[key]
 
 
 def encounter_flights(
     encounter_set: EncounterSet, index: int, dynamics: str
 ) -> list[SampledTrajectory]:
     """Return the flights of an encounter, by its index in the set, the ownship's first."""
-    key = _key(encounter_set, index, dynamics)
-    if key not in _FLOWN:
-        (flights,) = flights_of([(encounter_set, index)], dynamics)
-        _keep(key, encounter_set, flights)
-    return _FLOWN[key][1]
+    flights: list[SampledTrajectory] = _FLIGHTS[encounter_set, index, dynamics]
+    return flights
 
 
-def prepare_flights(wanted: Iterable[Encounter], dynamics: str) -> None:
-    """Make the flights of many encounters, which will be asked for one after the other."""
-    new = {_key(*one, dynamics): one for one in wanted}
-    new = {key: one for key, one in new.items() if key not in _FLOWN}
-    encounters = list(new.values())[:MOST_FLOWN]
-    try:
-        flights = flights_of(encounters, dynamics)
-    except ValueError:  # of one of them, which says so when it is asked for
-        return
-    for key, (encounter_set, _), one in zip(new, encounters, flights, strict=False):
-        _keep(key, encounter_set, one)
-
-
-def flights_of(encounters: Sequence[Encounter], dynamics: str) -> list[list[SampledTrajectory]]:
+def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[SampledTrajectory]]:
     """Return the flights of each encounter, to the bit as if it were asked for alone."""
+    rows = [range(*of.first_rows[index : index + 2].tolist()) for of, index, _ in keys]
     aircraft = [
-        (encounter_set, row)
-        for encounter_set, index in encounters
-        for row in range(encounter_set.first_rows[index], encounter_set.first_rows[index + 1])
-    ]
+        (of, row, dynamics) for (of, _, dynamics), mine in zip(keys, rows, strict=True)
+        for row in mine
+    ]  # fmt: skip
     alike: dict[Any, list[int]] = {}
-    for number, (encounter_set, row) in enumerate(aircraft):
-        lasts = number if encounter_set.kind == TRACKS else encounter_set.seconds(row)
-        alike.setdefault((encounter_set.kind, lasts, encounter_set.reference_deg), []).append(
-            number
-        )
+    for number, (of, row, dynamics) in enumerate(aircraft):
+        lasts = number if of.kind == TRACKS else of.seconds(row)
+        alike.setdefault((of.kind, lasts, of.reference_deg, dynamics), []).append(number)
     made: dict[int, SampledTrajectory] = {}
     for numbers in alike.values():
-        for some in _in_parts(numbers, len(_paths([aircraft[numbers[0]]], dynamics)[0])):
-            flights = _flown_alike([aircraft[number] for number in some], dynamics)
-            made.update(zip(some, flights, strict=True))
+        width = max(1, CELLS_AT_ONCE // len(_paths([aircraft[numbers[0]]])[0]))
+        for first in range(0, len(numbers), width):
+            some = numbers[first : first + width]
+            made.update(zip(some, _flown_alike([aircraft[k] for k in some]), strict=True))
     each = iter(range(len(aircraft)))
-    return [
-        [
-            made[next(each)]
-            for _ in range(encounter_set.first_rows[index], encounter_set.first_rows[index + 1])
-        ]
-        for encounter_set, index in encounters
-    ]
+    return [[made[next(each)] for _ in mine] for mine in rows]
 
 
-def _in_parts(numbers: list[int], samples: int) -> list[list[int]]:
-    width = max(1, CELLS_AT_ONCE // samples)
-    return [numbers[first : first + width] for first in range(0, len(numbers), width)]
+_FLIGHTS = MadeTogether(_flights_of, 600)
 
 
-def _paths(aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str) -> _Paths:
-    encounter_set, row = aircraft[0]
+def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
+    """Return time (s), north, east and altitude (m) of aircraft known at the same times."""
+    encounter_set, row, dynamics = aircraft[0]
     if encounter_set.kind != TRACKS:
-        return flown_events(aircraft, dynamics)
-    time_s, north, east, altitude = encounter_set.path(row)
-    return time_s, north[:, np.newaxis], east[:, np.newaxis], altitude[:, np.newaxis]
+        return flown_events([(of, row) for of, row, _ in aircraft], dynamics)
+    time_s, *place = encounter_set.path(row)
+    return time_s, *(part[:, np.newaxis] for part in place)
 
 
-def _flown_alike(aircraft: Sequence[Encounter], dynamics: str) -> list[SampledTrajectory]:
-    time_s, north, east, altitude = _paths(aircraft, dynamics)
+def _flown_alike(aircraft: Sequence[_Craft]) -> list[SampledTrajectory]:
+    time_s, north, east, altitude = _paths(aircraft)
     origin = aircraft[0][0].reference_deg
     lat, lon, _ = enu_to_geodetic(
         east, north, 0.0,
         reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
     )  # fmt: skip
-    names = [encounter_set.names[row] for encounter_set, row in aircraft]
+    names = [encounter_set.names[row] for encounter_set, row, _ in aircraft]
     return SampledTrajectory.together(names, time_s, lat, lon, altitude)
-
-
-def _key(encounter_set: EncounterSet, index: int, dynamics: str) -> Any:
-    # Of a set put elsewhere what was read is the same: the arrays stand for it.
-    return id(encounter_set.starts), encounter_set.reference_deg, index, dynamics
-
-
-def _keep(key: Any, encounter_set: EncounterSet, flights: list[SampledTrajectory]) -> None:
-    _FLOWN[key] = encounter_set, flights
-    while len(_FLOWN) > MOST_FLOWN:
-        _FLOWN.popitem(last=False)
 
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
@@ -184,6 +163,11 @@ class MissDistances(Parameters):
         "encounters in it, of vertical ones the chance (at most 1) with which they are accepted."
     )
 
+    @property
+    def steps(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Edges and proportions."""
+        return self.edges_ft, self.proportions
+
 
 class ModelParameters(OneEncounter):
     """Parameters of traffic that an encounter model makes."""
@@ -213,15 +197,8 @@ class ModelParameters(OneEncounter):
 
     def pairing_rules(self) -> PairingRules:
         """Return how tracks become encounters; ValueError where edges or proportions do not fit."""
-        changes: dict[str, Any] = {}
-        for name, make in (("horizontal", horizontal_density), ("vertical", vertical_density)):
-            if (given := getattr(self, name)) is not None:
-                try:
-                    density = make(np.array(given.edges_ft), np.array(given.proportions))
-                except ValueError as error:
-                    raise ValueError(f"{name}: {error}") from None
-                changes[f"{name}_ft"] = density
-        return PairingRules(**changes)
+        both = self.horizontal, self.vertical
+        return pairing_rules(*(None if one is None else one.steps for one in both))
 
 
 class _EncounterTraffic(RecordedTraffic):
@@ -254,13 +231,9 @@ class _EncounterTraffic(RecordedTraffic):
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Make the flights that many blocks will ask for, all at once."""
-        wanted: dict[str, list[tuple[EncounterSet, int]]] = {}
-        for p in parameters[:MOST_FLOWN]:
-            # What is wrong is said by the block that asks for it.
-            with suppress(ValueError):
-                wanted.setdefault(p.dynamics, []).append(_encounter_of(cls, p))
-        for dynamics, encounters in wanted.items():
-            prepare_flights(encounters, dynamics)
+        with suppress(ValueError):  # what is wrong is said by the block that asks for it
+            _FLIGHTS.prepare([(*_encounter_of(cls, p), p.dynamics)
+                              for p in parameters[: _FLIGHTS.most]])  # fmt: skip
 
     def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
         at = self.encounter_set.reference_deg
@@ -303,21 +276,14 @@ class ModelTraffic(_EncounterTraffic):
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Make the encounters and flights that many blocks will ask for, all at once."""
-        wanted: dict[Any, set[int]] = {}
-        for p in parameters:
-            wanted.setdefault(_model_key(p), set()).add(p.encounter)
-        for key, numbers in wanted.items():
-            new = np.array(sorted(n for n in numbers if (*key, n) not in _MADE), dtype=np.int64)
-            for run in np.split(new, np.flatnonzero(np.diff(new) != 1) + 1):
-                if len(run) > 1:
-                    _make(key, range(int(run[0]), int(run[-1]) + 1))
+        _PAIRS.prepare([(_model_key(p), p.encounter) for p in parameters])
         super().prepare(parameters)
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter that a block's parameters name, and its index there."""
     if issubclass(cls, ModelTraffic):
-        return _made(_model_key(parameters), parameters.encounter), 0
+        return _PAIRS[_model_key(parameters), parameters.encounter], 0
     if parameters.file.suffix == ".toml":
         encounter_set = read_made(parameters.file)
     else:
@@ -329,15 +295,17 @@ def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter where the scene puts it, and its index there."""
     encounter_set, index = chosen_encounter(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
-    return (encounter_set if None in at else replace(encounter_set, reference_deg=at)), index
+    return (encounter_set if None in at else _moved(encounter_set, at)), index
+
+
+@lru_cache(maxsize=1200)
+def _moved(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
+    """Return a set elsewhere, the same one for those who ask again: its flights are kept by it."""
+    return replace(encounter_set, reference_deg=reference_deg)
 
 
 #: What makes encounters of a model: both files, the seed, and how miss distances are drawn.
 _ModelKey = tuple[Path, Path, int, MissDistances | None, MissDistances | None]
-#: Encounters of models that were made last, each a set of its own, by model and number.
-_MADE: OrderedDict[Any, EncounterSet] = OrderedDict()
-# So many are kept: a study asks for each encounter of a chunk several times.
-_MOST_MADE = 1200
 
 
 def _model_key(parameters: Any) -> _ModelKey:
@@ -345,21 +313,22 @@ def _model_key(parameters: Any) -> _ModelKey:
     return p.file, p.intruder_file or p.file, p.model_seed, p.horizontal, p.vertical
 
 
-def _made(key: _ModelKey, number: int) -> EncounterSet:
-    if (*key, number) not in _MADE:
-        _make(key, range(number, number + 1))
-    return _MADE[(*key, number)]
+def _pairs_of(keys: Sequence[tuple[_ModelKey, int]]) -> list[EncounterSet]:
+    """Return encounters of models, each a set of its own; numbers in a row are drawn together."""
+    made: dict[Any, EncounterSet] = {}
+    for model in dict.fromkeys(model for model, _ in keys):
+        numbers = np.array(sorted(n for of, n in keys if of == model), dtype=np.int64)
+        sampler = _sampler(model)
+        for some in np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1):
+            pairs = sampler.pairs(range(int(some[0]), int(some[-1]) + 1), paths=False)
+            for index, number in enumerate(some.tolist()):
+                one = pairs if len(some) == 1 else pairs.take(np.array([index]))
+                source = str(model[0])
+                made[model, number] = set_of_pairs(one, sampler.rules.closest_s, (0.0, 0.0), source)
+    return [made[key] for key in keys]
 
 
-def _make(key: _ModelKey, numbers: range) -> None:
-    sampler = _sampler(key)
-    pairs, rules = sampler.pairs(numbers, paths=False), sampler.rules
-    for index, number in enumerate(numbers):
-        one = pairs if len(numbers) == 1 else pairs.take(np.array([index]))
-        made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
-        _MADE[(*key, number)] = made
-    while len(_MADE) > _MOST_MADE:
-        _MADE.popitem(last=False)
+_PAIRS = MadeTogether(_pairs_of, 1200)
 
 
 @lru_cache(maxsize=4)

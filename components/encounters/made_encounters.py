@@ -8,7 +8,6 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.errors.budgets import refuse_samples
-from dsa_des.files.input_files import InputFileError, read_input_text, resolve_home
+from dsa_des.files.input_files import InputFileError, read_input_text, read_once, resolve_home
 from dsa_des.files.toml_files import parse_toml
 
 _KT = 1852.0 / 3600.0
@@ -70,24 +69,11 @@ _TRIES = 200
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a table asks for.
+    """What a table asks for, in SI units.
 
-    Parameters
-    ----------
-    path : Path
-    fixed : list of dict
-        One per swept combination: quantity → value, or (low, high) where it is drawn, SI.
-    geometries : list of str
-        One per combination.
-    count : int
-        Encounters for each combination.
-    seed : int
-    at_deg : (latitude, longitude)
-    duration_s, weight : float
-    sense : str
-    courses : list of int, optional
-        Which of the two courses that lead there each combination takes; the first of its geometry
-        by default.
+    Of each swept combination `fixed` gives every quantity, as a value or as (low, high) where it is
+    drawn, `geometries` the geometry, and `courses` which of the two courses that lead there it
+    takes (None: the first of its geometry). `count` encounters are made of each.
     """
 
     path: Path
@@ -228,18 +214,13 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
+@read_once(32)
 def read_made(path: Path) -> EncounterSet:
-    """Return the encounters of a table; those of one that was read before, if it is the same."""
+    """Return the encounters of a table."""
     try:
-        return _read_made(path, path.stat().st_mtime_ns)
-    except (UsageError, OSError) as error:
+        return made_set(read_recipe(str(path)))
+    except UsageError as error:
         raise EncounterSetError(str(error)) from None
-
-
-@lru_cache(maxsize=32)
-def _read_made(path: Path, state: object) -> EncounterSet:
-    """Read a table; the replicas of a study read the same one over and over."""
-    return made_set(read_recipe(str(path)))
 
 
 def made_set(recipe: Recipe) -> EncounterSet:

@@ -23,18 +23,9 @@ class NetworkError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class NetworkNode:
-    """One variable given its parents.
+    """One variable given its parents, which are ascending indices in the network.
 
-    Parameters
-    ----------
-    name : str
-    size : int
-        Number of bins.
-    parents : tuple of int
-        Their places in the network, ascending.
-    strides : tuple of int
-        What one bin more of a parent adds to the column.
-    counts : (columns, size)
+    A bin more of a parent adds its stride to the column of `counts` (columns, size).
     """
 
     name: str
@@ -85,16 +76,8 @@ class NetworkNode:
 
 @dataclass(frozen=True)
 class BayesNetwork:
-    """Nodes in the file's order, and the order in which they can be drawn.
-
-    Parameters
-    ----------
-    labels : tuple of str
-    sizes : tuple of int
-    nodes : dict of int to NetworkNode
-        Place → node; of a transition network only what is drawn.
-    order : tuple of int
-        Places of all nodes, parents first.
+    """Nodes by their index in the file's order (of a transition network only what is drawn), and
+    the order in which they can be drawn, parents first.
     """
 
     labels: tuple[str, ...]
@@ -162,13 +145,8 @@ CLIMB, TURN = "\\dot h", "\\dot \\psi"
 
 @dataclass(frozen=True)
 class Bins:
-    """What the bins of a variable stand for.
-
-    Parameters
-    ----------
-    edges : (bins + 1,) or None
-        None for a category, whose value is the number of its bin, from 1.
-    size : int
+    """What the bins of a variable stand for: edges (bins + 1,), or None for a category, whose value
+    is the number of its bin, from 1.
     """
 
     edges: FloatArray | None
@@ -199,23 +177,11 @@ class Bins:
 class EncounterModel:
     """A model as its file gives it, with dynamic variables matched by name.
 
-    Parameters
-    ----------
-    name : str
-    initial : BayesNetwork
-        Over the variables at time 0.
-    transition : BayesNetwork
-        Over those variables (dynamic ones at t) and the dynamic ones at t + 1.
-    bins : tuple of Bins
-        Of the initial variables.
-    resample_rates_hz : (variables,)
-        Probability per second of a new value within the same bin.
-    sources : tuple of int
-        For each variable of the transition network the initial one whose value it is at t, or -1.
-    targets : dict of int to int
-        Place in the transition network of a variable at t + 1 → the initial variable that it is.
-    notes : tuple of str
-        What is odd about the file.
+    `bins` and `resample_rates_hz` (probability per second of a new value within the same bin) are
+    of the initial variables. The transition network is over these (dynamic ones at t) and dynamic
+    ones at t + 1: `sources` gives for each of its variables the initial one whose value it is at t,
+    or -1, and `targets` maps those at t + 1 to the initial ones. `notes` say what is odd about the
+    file.
     """
 
     name: str

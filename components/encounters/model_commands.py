@@ -5,7 +5,6 @@ import io
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,19 +13,19 @@ from components.encounters.model import EncounterModel
 from components.encounters.model_file import ModelFileError, read_model
 from components.encounters.pair_densities import (
     PairingRules,
-    horizontal_density,
-    vertical_density,
+    pairing_rules,
 )
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
+from components.formats.encounter_set import EncounterSet
 from components.formats.public_formats import SET
-from components.formats.set_file import is_origin, set_writer, streamed
+from components.formats.set_file import is_origin, write_set
 from dsa_des.arrays.types import AnyArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import foreseen
 from dsa_des.files.input_files import InputFileError, resolve_home
-from dsa_des.files.output_file import check_ending, check_file
+from dsa_des.files.output_file import check_ending, check_file, streamed
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
 
@@ -188,42 +187,41 @@ def generate_set(
         say(f"note: {long}", err=True)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0
+
+    def parts(pairing: PairSampler) -> Iterator[EncounterSet]:
+        nonlocal total, squares, attempts
+        for pairs in pairing.batches(range(first, first + count)):
+            total += math.fsum(pairs.weight)
+            squares += math.fsum(pairs.weight**2)
+            attempts += int(np.sum(pairs.attempts + 1))
+            yield set_of_pairs(pairs, rules.closest_s, at, str(path))
+
     try:
         pairing = PairSampler(own, intruder, seed, rules)
-        with set_writer(path, about) as writer:
-            for pairs in pairing.batches(range(first, first + count)):
-                writer.write(set_of_pairs(pairs, rules.closest_s, at, str(path)))
-                total += math.fsum(pairs.weight)
-                squares += math.fsum(pairs.weight**2)
-                attempts += int(np.sum(pairs.attempts + 1))
+        write_set(path, about, parts(pairing))
     except TrackError as error:
         raise UsageError(f"{model}: {error}") from None
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {count} encounters of {rules.duration_s} s")
     say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
 
 
 def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:
     """Return the densities of miss distances that a command line asks for."""
-    changes: dict[str, Any] = {}
+    steps = []
     for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
-        if given is None:
-            continue
         try:
-            edges, parts = (np.array([float(word) for word in text.split(",")]) for text in given)
+            steps.append(given and [[float(word) for word in text.split(",")] for text in given])
         except ValueError:
             raise UsageError(
-                f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
-                "step between two, all with commas between them"
+                f"{option} {' '.join(given or ())}: must be rising edges, ft, and the proportion "
+                "of each step between two, all with commas between them"
             ) from None
-        make = horizontal_density if option == "--horizontal" else vertical_density
-        try:
-            density = make(edges, parts)
-        except ValueError as error:
-            raise UsageError(f"{option} {' '.join(given)}: {error}") from None
-        changes["horizontal_ft" if option == "--horizontal" else "vertical_ft"] = density
-    return PairingRules(**changes)
+    try:
+        return pairing_rules(*steps)
+    except ValueError as error:
+        name, _, why = str(error).partition(": ")
+        given = horizontal if name == "horizontal" else vertical
+        raise UsageError(f"--{name} {' '.join(given or ())}: {why}") from None
 
 
 def _write_made(made: str, out: str) -> None:
@@ -231,13 +229,9 @@ def _write_made(made: str, out: str) -> None:
     path = named(out)
     check_ending(path, [SET])
     check_file(path)
-    found = made_set(recipe)
-    try:
-        with set_writer(path, {"made_by": "hand", "seed": recipe.seed}) as writer:
-            writer.write(found)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
-    say(f"{path}: {len(found)} encounters of {recipe.duration_s:g} s")
+    encounters = made_set(recipe)
+    write_set(path, {"made_by": "hand", "seed": recipe.seed}, [encounters])
+    say(f"{path}: {len(encounters)} encounters of {recipe.duration_s:g} s")
 
 
 def check_origin(at: tuple[float, float]) -> None:

@@ -8,7 +8,6 @@ import csv
 import math
 import re
 from collections import Counter
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,7 @@ from components.encounters.model import (
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, read_input_text
+from dsa_des.files.input_files import InputFileError, read_input_text, read_once
 
 PARTS = (
     "labels_initial", "G_initial", "r_initial", "N_initial",
@@ -42,20 +41,9 @@ class ModelFileError(ValueError):
     """A model file cannot be used; the message names the file and the place in it."""
 
 
+@read_once(8)
 def read_model(path: Path) -> EncounterModel:
     """Read and check a model file."""
-    try:
-        state = path.stat()
-        return _read(path, (state.st_mtime_ns, state.st_size))
-    except (OSError, ValueError) as error:
-        if isinstance(error, ModelFileError):
-            raise
-        return _read(path, None)
-
-
-@lru_cache(maxsize=8)
-def _read(path: Path, state: object) -> EncounterModel:
-    """Read a file; the replicas of a study read the same one over and over."""
     try:
         text = read_input_text(path)
     except InputFileError as error:

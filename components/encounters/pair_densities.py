@@ -1,6 +1,8 @@
 """Densities from which miss distances of encounters are drawn, and what weights undo them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,19 +13,8 @@ _NAUTICAL_MILE_FT = 6076.115485564304
 
 @dataclass(frozen=True, eq=False)
 class StepDensity:
-    """A function that is constant between edges.
-
-    Parameters
-    ----------
-    edges : (n + 1,)
-        Rising.
-    heights : (n,)
-        Above 0.
-
-    Raises
-    ------
-    ValueError
-        Where they do not fit.
+    """A function that is constant between rising edges (n + 1,), with heights (n,) above 0;
+    ValueError where they do not fit.
     """
 
     edges: FloatArray
@@ -99,19 +90,10 @@ def _steps(edges: list[float], heights: list[float]) -> StepDensity:
 class PairingRules:
     """How two independent tracks become an encounter.
 
-    Parameters
-    ----------
-    duration_s, closest_s : int
-        Length of the tracks, and when they are closest.
-    vertical_ft : StepDensity
-        Probability (times any factor) with which a vertical miss distance is accepted; none is
-        outside its edges.
-    horizontal_ft : StepDensity
-        Density (times any factor) from which the signed horizontal miss distance is drawn.
-    start_vertical_ft, start_range_ft : float
-        Pairs that begin nearer than both are rejected.
-    largest_horizontal_error_ft, largest_vertical_error_ft : float
-        Pairs whose tracks miss what was drawn by as much are rejected.
+    They last `duration_s` and are closest at `closest_s`. A vertical miss distance is accepted with
+    a probability in proportion to `vertical_ft`, none outside its edges; the signed horizontal one
+    is drawn from the density `horizontal_ft`. Pairs that begin nearer than both `start_*` are
+    rejected, as are those whose tracks miss what was drawn by a `largest_*_error_ft`.
     """
 
     duration_s: int = 180
@@ -138,6 +120,22 @@ class PairingRules:
                 f"closest_s = {self.closest_s}: must lie between 0 and duration_s = "
                 f"{self.duration_s}"
             )
+
+
+def pairing_rules(*steps: Sequence[Sequence[float]] | None) -> PairingRules:
+    """Return rules with edges (ft) and proportions of horizontal and of vertical distances, if any.
+
+    ValueError begins with which of both does not fit.
+    """
+    changes: dict[str, Any] = {}
+    makers = {"horizontal": horizontal_density, "vertical": vertical_density}
+    for (name, make), given in zip(makers.items(), steps, strict=True):
+        try:
+            if given is not None:
+                changes[f"{name}_ft"] = make(*map(np.array, given))
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    return PairingRules(**changes)
 
 
 #: Half the width of the cylinder over which miss distances are uniform in the airspace: 10 nmi.

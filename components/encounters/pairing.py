@@ -44,22 +44,12 @@ _PATHS = ("north_ft", "east_ft", "up_ft", "heading_rad", "speed_ft_s")
 
 @dataclass(frozen=True)
 class Pairs:
-    """Encounters; arrays of both aircraft have the ownship first.
+    """Encounters (pairs,); arrays of both aircraft (2, seconds + 1, pairs) have the ownship first.
 
-    Parameters
-    ----------
-    numbers : (pairs,)
-    weight : (pairs,)
-    horizontal_ft, vertical_ft : (pairs,)
-        Miss distances at the closest approach: signed, and intruder above ownship.
-    course_rad : (pairs,)
-        The intruder's at the closest approach, when the ownship's is 0.
-    attempts : (pairs,)
-        How many proposals were rejected before.
-    north_ft, east_ft, up_ft, heading_rad, speed_ft_s, climb_ft_s : (2, seconds + 1, pairs)
-        The origin is where the ownship is at the closest approach.
-    turn_rad_s, acceleration_ft_s2 : (2, seconds + 1, pairs)
-        Commands, held from each second on.
+    Miss distances are those at the closest approach, signed, and intruder above ownship;
+    `course_rad` is the intruder's then, when the ownship's is 0, and the origin where the ownship
+    is. `attempts` proposals were rejected before. Turns and accelerations are commands, held from
+    each second on.
     """
 
     numbers: IntArray

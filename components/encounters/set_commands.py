@@ -13,7 +13,7 @@ from components.encounters.model_commands import check_origin
 from components.encounters.splitting import expected_copies, nearness, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
 from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
-from components.formats.set_file import EncounterSetError, read_set, set_writer
+from components.formats.set_file import EncounterSetError, read_set, write_set
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import refuse_samples
@@ -43,8 +43,7 @@ def convert_sets(
         if weights is not None:
             found = replace(found, weights=_weights(weights, found))
         if path.suffix.lower() == SET:
-            with set_writer(path, {"made_by": "conversion"}) as writer:
-                writer.write(found)
+            write_set(path, {"made_by": "conversion"}, [found])
         else:
             write_file(path, waypoints_of(found))
     except InputFileError as error:
@@ -252,11 +251,7 @@ def split_encounters(
     made = split_set(found, expected, seed)
     if not len(made):
         raise UsageError(f"{file}: no encounter is left; more copies are needed")
-    try:
-        with set_writer(path, {"made_by": "splitting", "of": str(file), "seed": seed}) as writer:
-            writer.write(made)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    write_set(path, {"made_by": "splitting", "of": str(file), "seed": seed}, [made])
     families = len(np.unique(made.extra["family"]))
     say(f"{path}: {len(made)} encounters, copies of {families} of {len(found)}")
     say(f"sum of weights {math.fsum(made.weights):.6g}, of the set {math.fsum(found.weights):.6g}")

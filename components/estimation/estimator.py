@@ -327,6 +327,8 @@ def combined(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
     """Return mean (6, n) and covariance (6, 6, n) of position and velocity over the models."""
     states, covariances, probabilities = tracks
     many = len(states)
+    if many == 1:
+        return states[0][:6], covariances[0][:6, :6]
     state = sum_of([probabilities[i] * states[i][:6] for i in range(many)])
     covariance = np.zeros((6, 6, state.shape[1]))
     for i in range(many):

@@ -4,7 +4,6 @@ Azimuth is clockwise from the nose, elevation upward, both in the ownship's body
 rate is positive when the range grows. Which of them a sensor measures is its `Kind`.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,19 +103,15 @@ def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatAr
     return seen, jacobian
 
 
-def range_share(
-    away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
-) -> FloatArray:
+def range_share(away: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the standard deviation of the range over the range, of vectors (3, n)."""
     squared = squared_length(away)
-    along = sum(
-        away[i] * away[j] * covariance[min(i, j), max(i, j)] for i in range(3) for j in range(3)
-    )
+    along = sum(away[i] * away[j] * covariance[i, j] for i in range(3) for j in range(3))
     return np.asarray(np.sqrt(np.maximum(along, 0.0)) / np.maximum(squared, _NEAREST_M**2))
 
 
 def direction(
-    away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
+    away: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances."""
     x, y, z = away

@@ -6,7 +6,7 @@ stretch of time in which that leaves nothing nearer than what is known already i
 What is found is what looking at every time would find, to the bit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -77,40 +77,24 @@ class RegularTimes:
         return first, last
 
 
-@dataclass(frozen=True, eq=False)
-class SharedTimes:
-    """Every target has the same times (samples,), ascending."""
+class KnownTimes:
+    """Every target has times of its own (samples,), ascending; those of one alone are all's."""
 
-    times_s: FloatArray
-
-    def at(self, target: IntArray, number: IntArray) -> FloatArray:
-        """Return the time of each sample."""
-        return self.times_s[number]
-
-    def between(
-        self, target: IntArray, first_s: FloatArray, last_s: FloatArray
-    ) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the first and the last sample in each interval."""
-        first = np.searchsorted(self.times_s, first_s, side="left")
-        return first, np.searchsorted(self.times_s, last_s, side="right") - 1
-
-
-class OwnTimes:
-    """Every target has times of its own."""
-
-    def __init__(self, times_s: Sequence[FloatArray]) -> None:
+    def __init__(self, *times_s: FloatArray) -> None:
         self._find = PieceSearch.of(times_s)
+        self._of_each = np.asarray(len(times_s) > 1)
 
     def at(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return the time of each sample."""
-        return self._find.starts_s[self._find.first[target] + number]
+        return self._find.starts_s[self._find.first[target * self._of_each] + number]
 
     def between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return the numbers of the first and the last sample in each interval."""
-        times_s, start = self._find.starts_s, self._find.first[target]
-        first, last = self._find(target, first_s), self._find(target, last_s)
+        of = target * self._of_each
+        times_s, start = self._find.starts_s, self._find.first[of]
+        first, last = self._find(of, first_s), self._find(of, last_s)
         first += times_s[first] < first_s
         last -= times_s[last] > last_s
         return first - start, last - start

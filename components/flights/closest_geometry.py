@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_state
+from components.flights.geodesic_motion import geodesic_parameters, geodesic_state
 from components.geometry import enu_to_geodetic, line_of_sight_ned, local_axes
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -100,21 +100,9 @@ def _placed(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray, Flo
     altitude = a.altitude_m[0] + a.vertical_m
     up = a.vertical_m.copy()
     for _ in range(3):  # until the point has its altitude, and its place in the level plane
-        lat, lon, got = (
-            np.array(values)
-            for values in zip(
-                *(
-                    enu_to_geodetic(
-                        e, n, u, reference_lat_deg=a.lat_deg, reference_lon_deg=a.lon_deg,
-                        reference_alt_m=float(h),
-                    )
-                    for e, n, u, h in zip(
-                        distance * np.sin(angle), distance * np.cos(angle), up, a.altitude_m[0],
-                        strict=True,
-                    )
-                ),
-                strict=True,
-            )
+        lat, lon, got = enu_to_geodetic(
+            distance * np.sin(angle), distance * np.cos(angle), up, reference_lat_deg=a.lat_deg,
+            reference_lon_deg=a.lon_deg, reference_alt_m=a.altitude_m[0],
         )  # fmt: skip
         up = up + altitude - got
     return lat, lon, altitude
@@ -152,7 +140,7 @@ def flown(
             (lat, lon, altitude),
         )
     ):
-        table = geodesic_parameter_table(
+        table = geodesic_parameters(
             at_lat, at_lon, at_alt, a.heading_rad[k], a.speed_mps[k], a.climb_mps[k]
         )
         elapsed = time_s[np.newaxis] - closest_s[:, np.newaxis]

@@ -27,14 +27,9 @@ _MOST_PIECES_PER_TARGET = 100
 
 @dataclass(frozen=True, eq=False)
 class NearIntervals:
-    """Intervals of time in which targets may be near; outside them they are surely not.
+    """Intervals (n,) of time in which targets may be near; outside them they are surely not.
 
-    Parameters
-    ----------
-    target : (n,) of int
-        Ascending.
-    start_s, end_s : (n,)
-        Both included; those of one target are in order and apart.
+    Targets ascend; both ends are included, and those of one target are in order and apart.
     """
 
     target: IntArray
@@ -44,41 +39,29 @@ class NearIntervals:
     def near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
         """Return which targets may be near during looks from times on, (rows, targets).
 
-        A window holds targets that are near at some of its instants; this says at which, so that
-        what is counted does not depend on the window.
+        `columns` are those of `during` all of these looks: which of them are near at which one does
+        not depend on the window.
         """
-        last_s = float(time_s.max())
-        if self.throughout(float(time_s.min()) + lasts_s, last_s) == len(columns):
+        always = (self.start_s <= time_s.min() + lasts_s) & (self.end_s >= time_s.max())
+        if np.count_nonzero(always) == len(columns):
             return np.ones((len(time_s), len(columns)), dtype=bool)
-        if bool((time_s[1:] >= time_s[:-1]).all()):
-            return self.at_each(columns, time_s, time_s + lasts_s)
-        order = np.argsort(time_s, kind="stable")  # replicas, one after the other
-        near: BoolArray = np.empty((len(time_s), len(columns)), dtype=bool)
-        near[order] = self.at_each(columns, time_s[order], time_s[order] + lasts_s)
-        return near
-
-    def during(self, first_s: float, last_s: float) -> IntArray:
-        """Return the targets that may be near at some time in [first_s, last_s], ascending."""
-        met = (self.start_s <= last_s) & (self.end_s >= first_s)
-        return np.unique(self.target[met])
-
-    def throughout(self, first_s: float, last_s: float) -> int:
-        """Return how many targets may be near at every time in [first_s, last_s]."""
-        return int(np.count_nonzero((self.start_s <= first_s) & (self.end_s >= last_s)))
-
-    def at_each(self, columns: IntArray, first_s: FloatArray, last_s: FloatArray) -> BoolArray:
-        """Return which targets may be near at some time of each of several looks, (rows, targets).
-
-        Looks are in order; `columns` holds, ascending, all that are near in any of them.
-        """
+        order = np.argsort(time_s, kind="stable")  # of replicas, one comes after the other
+        first_s = time_s[order]
+        last_s = first_s + lasts_s
         met = (self.start_s <= last_s[-1]) & (self.end_s >= first_s[0])
         column = np.searchsorted(columns, self.target[met])
         change = np.zeros((len(first_s) + 1, len(columns)), dtype=np.int8)
         np.add.at(change, (np.searchsorted(last_s, self.start_s[met]), column), 1)
         ends = np.searchsorted(first_s, self.end_s[met], side="right")
         np.subtract.at(change, (ends, column), 1)
-        near: BoolArray = np.cumsum(change[:-1], axis=0, dtype=np.int8) > 0
+        near: BoolArray = np.empty((len(time_s), len(columns)), dtype=bool)
+        near[order] = np.cumsum(change[:-1], axis=0, dtype=np.int8) > 0
         return near
+
+    def during(self, first_s: float, last_s: float) -> IntArray:
+        """Return the targets that may be near at some time in [first_s, last_s], ascending."""
+        met = (self.start_s <= last_s) & (self.end_s >= first_s)
+        return np.unique(self.target[met])
 
     def holds(self, target: IntArray, time_s: FloatArray, until_s: FloatArray) -> BoolArray:
         """Return whether each of some targets (n,) may be near at some time of its own look."""
@@ -100,17 +83,12 @@ class NearIntervals:
 
 
 def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> NearIntervals:
-    """Find when targets may be within a range of the ownship, between time 0 and an end.
+    """Return when targets may be within a range of the ownship, between time 0 and an end.
 
     Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
     true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
-    few metres of the edge).
-
-    Parameters
-    ----------
-    own, targets : Fleet
-        The ownship of each run, and the targets of all, as many in each run, one run after the
-        other.
+    few metres of the edge). `own` is the ownship of each run; `targets` are as many in each run,
+    one run after the other.
     """
     of_run = max(1, len(targets) // len(own))
     run = np.arange(len(targets)) // of_run
@@ -178,13 +156,7 @@ _OWN_SPEED_MARGIN = 1.05
 class SteeredCulling:
     """The targets near ownships that are steered, one in each run, by epochs of time.
 
-    Parameters
-    ----------
-    own : Fleet
-        The ownship of each run as it flies before it is steered.
-    targets : Fleet
-        The targets of all runs, as many in each, one run after the other.
-    reach_m : float
+    `own` flies as before it is steered; `targets` are as many in each run, one run after the other.
     """
 
     def __init__(self, own: Fleet, targets: Fleet, reach_m: float) -> None:
@@ -210,14 +182,8 @@ class SteeredCulling:
         self._last[run] = -1
 
     def near(self, own: SteeredFleet, run: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may be in reach at each row, (rows, targets).
-
-        Parameters
-        ----------
-        own : SteeredFleet
-            The ownships as they are steered by now.
-        run, time_s : (rows,)
-            Ascending by run.
+        """Return which targets may be in reach at each row, (rows, targets), of ownships as they
+        are steered by now; rows are in order of run.
         """
         width = self._targets_mps.shape[1]
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from components.geometry import (
     DEG_PER_RAD,
@@ -43,127 +42,72 @@ _INVERSE_TERMS, _LONGITUDE_TERMS = 5, 3
 
 
 def geodesic_parameters(
-    lat_deg: float,
-    lon_deg: float,
-    alt_m: float,
-    azimuth_rad: float,
-    speed_mps: float,
-    climb_mps: float,
+    lat_deg: Any, lon_deg: Any, alt_m: Any, azimuth_rad: Any, speed_mps: Any, climb_mps: Any
 ) -> FloatArray:
-    """Prepare a straight leg: everything that does not depend on time.
+    """Prepare a straight leg (rows,), or many (rows, n), each to the bit as it would be alone.
 
     The series are those of C. F. F. Karney, "Algorithms for geodesics", Journal of Geodesy 87
-    (2013), eqs 15-18, 21, 24 and 25, to the fifth order: below 4 nm on WGS-84.
+    (2013), eqs 15-18, 21, 24 and 25, to the fifth order: below 4 nm on WGS-84. Functions whose last
+    bit may differ between libraries are those of `math`, one value at a time.
     """
     n = FLATTENING / (2.0 - FLATTENING)
     semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
     # The cosine from the distance to the pole in degrees, which is exact, keeps its digits there.
-    sin_beta = (1.0 - FLATTENING) * math.sin(math.radians(lat_deg))
-    cos_beta = math.sin(math.radians(90.0 - abs(lat_deg)))
-    length = math.hypot(sin_beta, cos_beta)
-    # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
-    sin_beta, cos_beta = sin_beta / length, max(cos_beta / length, 1e-100)
-    sin_az, cos_az = math.sin(azimuth_rad), math.cos(azimuth_rad)
-    sin_az0 = sin_az * cos_beta
-    cos_az0 = math.hypot(cos_az, sin_az * sin_beta)
-    sigma1 = math.atan2(sin_beta, cos_az * cos_beta) if sin_beta or cos_az else 0.0
-    # Not by the sine and cosine of sigma1: near a pole they have lost the longitude.
-    omega1 = math.atan2(sin_az0 * sin_beta, cos_az * cos_beta) if sin_beta or cos_az else 0.0
-    k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
-    eps = k2 / (2.0 * (1.0 + math.sqrt(1.0 + k2)) + k2)
-    a1, c1, c1_inverse = _distance_series(eps)
-    a3, c3 = _longitude_series(eps, n)
-    tau1 = sigma1 + _sines_added(c1, sigma1)
-    lon_slope = FLATTENING * sin_az0 * a3
-    i3 = sigma1 + _sines_added(c3, sigma1)
-    # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
-    meridian, prime_vertical = (float(r) for r in radii_of_curvature(lat_deg))
-    radius = 1.0 / (cos_az * cos_az / meridian + sin_az * sin_az / prime_vertical)
-    table = np.zeros(GEODESIC_ROWS)
-    table[_SPEED_RADIUS] = speed_mps * radius
-    table[_CENTRE_DISTANCE] = radius + alt_m
-    table[_CLIMB], table[_ALT] = climb_mps, alt_m
-    table[_TAU], table[_PER_METRE] = tau1, 1.0 / (semi_minor * a1)
-    table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
-    table[_LON_RAD] = math.radians(lon_deg) - omega1 + lon_slope * i3
-    table[_LON_SLOPE] = lon_slope
-    table[_SIGMA] = sigma1
-    table[_RADIUS] = radius
-    table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
-    table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
-    return table
-
-
-def geodesic_parameter_table(
-    lat_deg: npt.ArrayLike,
-    lon_deg: npt.ArrayLike,
-    alt_m: npt.ArrayLike,
-    azimuth_rad: npt.ArrayLike,
-    speed_mps: npt.ArrayLike,
-    climb_mps: npt.ArrayLike,
-) -> FloatArray:
-    """Prepare many straight legs, bit for bit as `geodesic_parameters` prepares each.
-
-    Sums and products are taken over arrays. Functions whose last bit may differ between libraries
-    are those of `math`, one value at a time.
-    """
-    n = FLATTENING / (2.0 - FLATTENING)
-    semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
-    lat, alt = np.array(lat_deg, dtype=np.float64), np.array(alt_m, dtype=np.float64)
-    speed = np.array(speed_mps, dtype=np.float64)
-    sin_beta = (1.0 - FLATTENING) * _each(math.sin, _each(math.radians, lat))
-    cos_beta = _each(math.sin, _each(math.radians, 90.0 - np.abs(lat)))
+    sin_beta = (1.0 - FLATTENING) * _each(math.sin, _each(math.radians, lat_deg))
+    cos_beta = _each(math.sin, _each(math.radians, 90.0 - abs(lat_deg)))
     length = _each(math.hypot, sin_beta, cos_beta)
-    sin_beta, cos_beta = sin_beta / length, np.maximum(cos_beta / length, 1e-100)
-    azimuth = np.array(azimuth_rad, dtype=np.float64)
-    sin_az, cos_az = _each(math.sin, azimuth), _each(math.cos, azimuth)
+    # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
+    sin_beta, cos_beta = sin_beta / length, _each(_not_zero, cos_beta / length)
+    sin_az, cos_az = _each(math.sin, azimuth_rad), _each(math.cos, azimuth_rad)
     sin_az0 = sin_az * cos_beta
     cos_az0 = _each(math.hypot, cos_az, sin_az * sin_beta)
-    somewhere = (sin_beta != 0.0) | (cos_az != 0.0)
     along = cos_az * cos_beta
-    sigma1 = np.where(somewhere, _each(math.atan2, sin_beta, along), 0.0)
-    omega1 = np.where(somewhere, _each(math.atan2, sin_az0 * sin_beta, along), 0.0)
+    sigma1 = _each(_arc, sin_beta, along, sin_beta, cos_az)
+    # Not by the sine and cosine of sigma1: near a pole they have lost the longitude.
+    omega1 = _each(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
     k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
-    eps = k2 / (2.0 * (1.0 + np.sqrt(1.0 + k2)) + k2)
+    eps = k2 / (2.0 * (1.0 + _each(math.sqrt, 1.0 + k2)) + k2)
     a1, c1, c1_inverse = _distance_series(eps)
     a3, c3 = _longitude_series(eps, n)
     sines = [_each(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
     lon_slope = FLATTENING * sin_az0 * a3
-    meridian, prime_vertical = radii_of_curvature(lat)
+    # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
+    meridian, prime_vertical = radii_of_curvature(lat_deg)
     radius = 1.0 / (cos_az * cos_az / meridian + sin_az * sin_az / prime_vertical)
-    table = np.zeros((GEODESIC_ROWS, len(lat)))
-    table[_SPEED_RADIUS] = speed * radius
-    table[_CENTRE_DISTANCE] = radius + alt
-    table[_CLIMB], table[_ALT] = climb_mps, alt
+    table = np.zeros((GEODESIC_ROWS, *np.shape(lat_deg)))
+    table[_SPEED_RADIUS] = speed_mps * radius
+    table[_CENTRE_DISTANCE] = radius + alt_m
+    table[_CLIMB], table[_ALT] = climb_mps, alt_m
     table[_TAU], table[_PER_METRE] = sigma1 + _added(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
     i3 = sigma1 + _added(c3, sines)
-    table[_LON_RAD] = (
-        _each(math.radians, np.array(lon_deg, dtype=np.float64)) - omega1 + lon_slope * i3
-    )
-    table[_LON_SLOPE] = lon_slope
-    table[_SIGMA] = sigma1
-    table[_RADIUS] = radius
+    table[_LON_RAD] = _each(math.radians, lon_deg) - omega1 + lon_slope * i3
+    table[_LON_SLOPE], table[_SIGMA], table[_RADIUS] = lon_slope, sigma1, radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
     return table
 
 
-def _each(function: Callable[..., float], *values: FloatArray) -> FloatArray:
+def _each(function: Callable[..., float], *values: Any) -> Any:
+    """Return a function of numbers, or of each of the numbers in arrays."""
+    if not isinstance(values[0], np.ndarray):
+        return function(*values)
     columns = (value.tolist() for value in values)
     return np.fromiter(map(function, *columns), dtype=np.float64, count=len(values[0]))
 
 
+def _not_zero(cosine: float) -> float:
+    return max(cosine, 1e-100)
+
+
+def _arc(y: float, x: float, sin_beta: float, cos_az: float) -> float:
+    """Return an angle from the node of the geodesic; at the equator heading east there is none."""
+    return math.atan2(y, x) if sin_beta or cos_az else 0.0
+
+
 def _power(base: Any, exponent: int) -> Any:
     """Return a power as Python takes it, also of each value of an array: NumPy's differs."""
-    if isinstance(base, np.ndarray):
-        return _each(lambda value: value**exponent, base)
-    return base**exponent
-
-
-def _sines_added(factors: Sequence[float], angle: float) -> float:
-    """Return the sum of c_j sin(2 j x)."""
-    return _added(factors, [math.sin(2 * (j + 1) * angle) for j in range(len(factors))])
+    return _each(lambda value: value**exponent, base)
 
 
 def _added(factors: Sequence[Any], sines: Sequence[Any]) -> Any:

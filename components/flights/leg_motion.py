@@ -147,20 +147,12 @@ Kind = Literal["geodesic", "turn", "hold"]
 
 @dataclass(frozen=True)
 class Segment:
-    """One leg, ready to be evaluated.
+    """One leg, ready to be evaluated: its formula's table, from when on since the start of the
+    flight, and the attitude that follows from the motion; its speed is along the path, climb
+    included.
 
-    Parameters
-    ----------
-    kind : {"geodesic", "turn", "hold"}
-        Which formula; "hold" stays over one place, and may climb and turn on the spot.
-    start_s : float
-        When it begins, since the start of the flight.
-    parameters : ndarray
-        The formula's table. For "hold": lat_deg, lon_deg, alt_m, climb_mps, yaw_rad, rate_rad_s.
-    pitch_rad, roll_rad : float
-        The attitude that follows from the motion.
-    speed_mps : float
-        Along the path, climb included.
+    A "hold" stays in one position, and may climb and turn on the spot; the rows of its table are
+    lat_deg, lon_deg, alt_m, climb_mps, yaw_rad and rate_rad_s.
     """
 
     kind: Kind

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
 
 import numpy as np
 
 from components.flights.fleet import Fleet, Trajectory, in_rows
-from components.flights.geodesic_motion import geodesic_parameter_table
+from components.flights.geodesic_motion import geodesic_parameters
 from components.flights.leg_motion import KINDS
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
@@ -21,72 +20,64 @@ from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
-@dataclass(eq=False)
-class Starts:
-    """Where and how straight flights start, as columns (flights,); units of `ScriptedTrajectory`.
+def straight_fleet(
+    names: Sequence[str],
+    *,
+    lat_deg: FloatArray,
+    lon_deg: FloatArray,
+    alt_m: FloatArray,
+    heading_deg: FloatArray,
+    speed_mps: FloatArray,
+    climb_mps: FloatArray,
+    start_time_s: FloatArray,
+    end_time_s: FloatArray,
+    fixed_deg: FloatArray,
+) -> ScriptedFleet:
+    """Return straight flights of columns (flights,), prepared together where all of them move.
 
-    `fixed_deg` is (3, flights): yaw, pitch and roll, NaN where they follow from the motion.
+    Units are those of `ScriptedTrajectory`, which says what is wrong with one; `fixed_deg`
+    (3, flights) is yaw, pitch and roll, NaN where they follow from the motion.
     """
-
-    names: Sequence[str]
-    lat_deg: FloatArray
-    lon_deg: FloatArray
-    alt_m: FloatArray
-    heading_deg: FloatArray
-    speed_mps: FloatArray
-    climb_mps: FloatArray
-    start_time_s: FloatArray
-    end_time_s: FloatArray
-    fixed_deg: FloatArray
-
-    def flight(self, number: int) -> ScriptedTrajectory:
-        """Return one of the flights, made by itself."""
-        names = ("lat_deg", "lon_deg", "alt_m", "heading_deg", "speed_mps", "climb_mps")
-        columns: dict[str, Any] = {name: float(getattr(self, name)[number]) for name in names}
-        yaw, pitch, roll = (None if isnan(a) else a for a in self.fixed_deg[:, number].tolist())
-        end_s = float(self.end_time_s[number])
-        return ScriptedTrajectory(
-            self.names[number], **columns, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll,
-            start_time_s=float(self.start_time_s[number]),
-            end_time_s=None if end_s == inf else end_s,
-        )  # fmt: skip
-
-    def are_plain(self) -> bool:
-        """Return whether all flights move, and have no value that `ScriptedTrajectory` refuses."""
-        others = (self.lon_deg, self.heading_deg, self.climb_mps, self.start_time_s)
-        return bool(
-            np.all(np.isfinite(self.speed_mps) & (self.speed_mps > 0.0))
-            and np.all(np.abs(self.lat_deg) <= 90.0)
-            and np.all(np.abs(self.alt_m) <= MOST_ALT_M)
-            and np.all(self.end_time_s >= self.start_time_s)
-            and all(np.isfinite(column).all() for column in others)
-            and not np.isinf(self.fixed_deg).any()
-        )
-
-    def fleet(self) -> ScriptedFleet:
-        """Return the flights, prepared together where that can be."""
-        count = len(self.names)
-        if not self.are_plain() or not count:
-            return ScriptedFleet([self.flight(number) for number in range(count)])
-        lon = self.lon_deg
-        lon = np.where((lon >= -180.0) & (lon < 180.0), lon, wrap_longitude_deg(lon))
-        speeds, climbs = self.speed_mps.tolist(), self.climb_mps.tolist()
-        headings = [heading_from_deg(heading) for heading in self.heading_deg.tolist()]
-        table = geodesic_parameter_table(self.lat_deg, lon, self.alt_m, headings, speeds, climbs)
-        pitches = list(map(atan2, climbs, speeds))
-        path_mps = self.speed_mps / np.array(list(map(cos, pitches)))
-        yaw, pitch, roll = self.fixed_deg.tolist()
-        fixed = [list(map(heading_from_deg, yaw)), *(list(map(radians, a)) for a in (pitch, roll))]
-        zero, straight = np.zeros(count), KINDS.index("geodesic")
-        return ScriptedFleet.of_columns(
-            self.names,
-            np.stack((self.start_time_s, self.end_time_s)),
-            np.array(fixed),
-            np.ones(count, dtype=np.int64),
-            np.stack((zero, pitches, zero, path_mps)),
-            np.full(count, straight, dtype=np.int64),
-            {straight: table},
-        )
+    others = (lon_deg, heading_deg, climb_mps, start_time_s)
+    are_plain = bool(
+        np.all(np.isfinite(speed_mps) & (speed_mps > 0.0))
+        and np.all(np.abs(lat_deg) <= 90.0)
+        and np.all(np.abs(alt_m) <= MOST_ALT_M)
+        and np.all(end_time_s >= start_time_s)
+        and all(np.isfinite(column).all() for column in others)
+        and not np.isinf(fixed_deg).any()
+    )
+    if not are_plain or not len(names):
+        given = {
+            "lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m, "heading_deg": heading_deg,
+            "speed_mps": speed_mps, "climb_mps": climb_mps, "start_time_s": start_time_s,
+        }  # fmt: skip
+        ends_s = np.where(end_time_s == inf, np.nan, end_time_s)
+        yaw, pitch, roll = fixed_deg
+        free = {"end_time_s": ends_s, "yaw_deg": yaw, "pitch_deg": pitch, "roll_deg": roll}
+        flights = []
+        for number, name in enumerate(names):
+            one: dict[str, Any] = {key: float(of[number]) for key, of in given.items()}
+            one |= {key: float(of[number]) for key, of in free.items() if not isnan(of[number])}
+            flights.append(ScriptedTrajectory(name, **one))
+        return ScriptedFleet(flights)
+    lon = np.where((lon_deg >= -180.0) & (lon_deg < 180.0), lon_deg, wrap_longitude_deg(lon_deg))
+    headings = np.array([heading_from_deg(heading) for heading in heading_deg.tolist()])
+    table = geodesic_parameters(lat_deg, lon, alt_m, headings, speed_mps, climb_mps)
+    pitches = list(map(atan2, climb_mps.tolist(), speed_mps.tolist()))
+    path_mps = speed_mps / np.array(list(map(cos, pitches)))
+    yaw, pitch, roll = fixed_deg.tolist()
+    fixed = [list(map(heading_from_deg, yaw)), *(list(map(radians, a)) for a in (pitch, roll))]
+    zero, straight = np.zeros(len(names)), KINDS.index("geodesic")
+    return ScriptedFleet.of_columns(
+        names,
+        np.stack((start_time_s, end_time_s)),
+        np.array(fixed),
+        np.ones(len(names), dtype=np.int64),
+        np.stack((zero, pitches, zero, path_mps)),
+        np.full(len(names), straight, dtype=np.int64),
+        {straight: table},
+    )
 
 
 #: What an ownship flies after each of its manoeuvres, and from when on, s.
@@ -97,10 +88,8 @@ class SteeredFleet(Fleet):
     """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
-    climb. The flight's own script ends with the first one.
-
-    It never changes: `steered` returns another one, so that a run can go back to the flights it
-    had, and rows of a message keep those that they know.
+    climb. The flight's own script ends with the first one. A fleet never changes: `steered` returns
+    another one, so that a run can go back, and rows of a message keep those that they know.
     """
 
     def __init__(self, flights: Fleet, parts: Sequence[Parts] = ()) -> None:
@@ -135,9 +124,8 @@ class SteeredFleet(Fleet):
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
-        """Return the states of ownships (n,), each at a time (n,) of its own, in s.
-
-        `known` says how many of the ownship's manoeuvres count; all by default.
+        """Return the states of ownships (n,), each at a time (n,) of its own, in s, by the first
+        `known` of their manoeuvres, or all.
         """
         own, after, which = self._part_flown(aircraft, time_s, known)
         if not len(after):

@@ -169,12 +169,10 @@ def eased_turn(
     Once a second the pilot commands a rate in proportion to what was left to turn a second ago
     (`left_before_rad`, positive to the right as `left_rad` is), up to the largest; within
     `eases_rad` of the heading it falls, at least `LEAST_EASING_S` at the largest rate, or the turn
-    would not settle. The bank follows as that of `fly_point_mass`, in level flight at a ground
-    speed above 0. A step of Euler moves along the heading at its beginning, which is half a step
-    old: so the rates begin half a step later, and path and heading agree to second order.
-
-    Bank and roll: em-core of MIT Lincoln Laboratory; the command: as its pilot model (release 6)
-    flies, recorded once a second.
+    would not settle. The bank follows as that of `fly_point_mass` (em-core), in level flight at a
+    ground speed above 0; the command is that of em-core's pilot model (release 6), recorded once a
+    second. A step of Euler moves along the heading at its beginning: so the rates begin half a step
+    later, and path and heading agree to second order.
     """
     left_rad -= 0.5 * STEP_S * rate_rad_s
     rates = [(0.5 * STEP_S, math.degrees(rate_rad_s))]

@@ -82,33 +82,16 @@ class SampledTrajectory:
     """An aircraft known at samples in time, interpolated between them and nowhere else.
 
     Between two samples the unit normal of the ellipsoid and the altitude follow a cubic (Hermite)
-    that meets both samples and both velocities where velocities were measured and fit the
-    samples, and a straight line otherwise. Working on the normal there is no seam at the
-    antimeridian and no singular pole. At a sample, position and attitude are the sample's own
-    bits. Measured errors in a 3 deg/s turn at 60 m/s: with velocities 23 µm from 1 Hz samples and
-    0.5 µm from 10 Hz; without, 0.39 m (V·rate·dt²/8) and 3.9 mm. Ten-hertz flight recordings
-    thinned to 1 Hz come back within 0.4 m, mostly the recordings' own inconsistency.
+    that meets both samples and both velocities where velocities were measured and fit the samples,
+    and a straight line otherwise. Working on the normal there is no seam at the antimeridian and no
+    singular pole. At a sample, position and attitude are the sample's own bits. Measured errors in
+    a 3 deg/s turn at 60 m/s: with velocities 23 µm from 1 Hz samples and 0.5 µm from 10 Hz;
+    without, 0.39 m (V·rate·dt²/8) and 3.9 mm. Ten-hertz flight recordings thinned to 1 Hz come back
+    within 0.4 m.
 
-    Parameters
-    ----------
-    name : str
-        The aircraft's name.
-    time_s : array_like, shape (n,)
-        Strictly increasing; any spacing; n of at least 1.
-    lat_deg, lon_deg, alt_m : array_like, shape (n,)
-        Geodetic position; longitude may have any number of turns.
-    velocity_enu_mps : tuple of three array_like, optional
-        Ground velocity east, north, up at the samples.
-    yaw_rad, pitch_rad, roll_rad : array_like, optional
-        Attitude where known; what is not given is derived from the path.
-    wind_east_north_mps : tuple of two float
-        Where the air goes: a derived attitude is that of the velocity through it.
-
-    Raises
-    ------
-    ValueError
-        Times that do not increase, values that are not finite, a latitude outside ±90, or
-        arrays of different lengths.
+    Columns are (n,), n of at least 1; times strictly increase, longitudes may have any number of
+    turns. Attitude that is not given is derived from the path through the air, which moves by
+    `wind_east_north_mps`. ValueError names what cannot be.
     """
 
     def __init__(

@@ -39,40 +39,17 @@ _STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
 
 
 class ScriptedTrajectory:
-    """An aircraft that flies a script; every position is computed from its leg's start.
+    """An aircraft that flies a script from `start_time_s` to `end_time_s`, both included.
 
     Nothing is integrated, so there is no drift. Straight legs follow the geodesic of the WGS-84
-    ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed
-    is measured at the flight's own altitude. Turns are circles (see `turn_parameters`).
+    ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed is
+    measured at the flight's own altitude. Turns are circles (see `turn_parameters`). Without legs
+    it flies straight on; the last leg goes on for ever.
 
-    Parameters
-    ----------
-    name : str
-        The aircraft's name.
-    lat_deg, lon_deg, alt_m : float
-        Where it is at `start_time_s`.
-    heading_deg : float
-        Clockwise from true north.
-    speed_mps : float
-        Ground speed; 0 stands still.
-    climb_mps : float
-        Rate of climb of every leg that does not give its own.
-    legs : sequence of legs
-        `Straight`, `Turn`, `Climb`, `Stationary`, `Waypoints`. None means straight on. The last
-        leg goes on for ever: a turn keeps turning, a climb without `to_alt_m` keeps climbing.
-    yaw_deg, pitch_deg, roll_deg : float, optional
-        Fixed attitude. What is not given follows the path: yaw is the track, pitch the
-        flight-path angle, roll the bank of a coordinated turn, atan(V·rate/g).
-    reference : tuple of three float, optional
-        Latitude, longitude and altitude from which waypoints given as offsets are measured:
-        the ownship's start. Left out: this aircraft's own start.
-    start_time_s, end_time_s : float
-        The aircraft is there from the one to the other, both included.
-
-    Raises
-    ------
-    ValueError
-        A value that is not allowed, naming it.
+    Attitude that is not given follows the path: yaw is the track, pitch the flight-path angle, roll
+    the bank of a coordinated turn, atan(V·rate/g). Waypoints given as offsets count from
+    `reference` (latitude, longitude, altitude), by default the aircraft's own start. ValueError
+    names the value that is not allowed.
     """
 
     def __init__(

@@ -62,20 +62,8 @@ class Turning(NamedTuple):
 
 
 class SteeringPlan(NamedTuple):
-    """What is still to be flown of turns, climbs and speeds, side by side, and what comes after.
-
-    Parameters
-    ----------
-    turns : Pieces
-        Rates in deg/s; then straight on.
-    climbs : Pieces
-        In m/s.
-    climb_mps : float
-        Afterwards.
-    speeds : Pieces
-        Over ground, in m/s.
-    speed_mps : float
-        Afterwards.
+    """What is still to be flown of turns (deg/s), climbs and ground speeds (m/s), side by side;
+    afterwards straight on, at the climb and the speed that remain.
     """
 
     turns: Pieces

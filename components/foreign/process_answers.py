@@ -9,7 +9,14 @@ from components.aircraft.aircraft import Roster
 from components.estimation.measurement import direction
 from components.foreign.reported_look import reported_looks
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
-from components.messages.state_tracks import CONFIRMED, COVARIANCE, EXTRAS, STATUSES, StateTracks
+from components.messages.state_tracks import (
+    CONFIRMED,
+    COVARIANCE,
+    EXTRAS,
+    STATUSES,
+    StateTracks,
+    full_covariance,
+)
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -94,7 +101,7 @@ def _state_tracks(
     """Return tracks with states; what they do not say of direction follows from the state."""
     count, now_s = table.num_rows, float(tick[0]) / ticks_per_s
     state = np.stack([numbers[name] for name in STATE])
-    covariance = {place: numbers[name] for place, name in COVARIANCE.items()}
+    covariance = full_covariance(numbers, slice(None))
     ranged: BoolArray = np.asarray(np.isfinite(state).all(axis=0))
     for name in (*ORIGIN, *OWN_POSITION):
         if not np.isfinite(numbers[name]).all():

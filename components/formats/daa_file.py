@@ -72,7 +72,6 @@ _OPTIONAL = frozenset({"yaw", "airspeed"})
 
 def read_daa(
     path: str | PathLike[str],
-    *,
     reference_lat_deg: float = 0.0,
     reference_lon_deg: float = 0.0,
     reference_alt_m: float = 0.0,

@@ -28,34 +28,16 @@ class NoSuchEncounter(ValueError):
     """A set holds no encounter of that number."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EncounterSet:
     """Encounters; arrays over encounters (n), over aircraft (rows) and over list entries.
 
-    Parameters
-    ----------
-    source : str
-        The file, for messages.
-    kind : {"events", "tracks"}
-    numbers : (n,)
-        Rising.
-    weights : (n,)
-    first_rows : (n + 1,)
-        The rows of encounter k are ``first_rows[k]`` up to ``first_rows[k + 1]``.
-    names : tuple of str
-        Of the aircraft, (rows,).
-    state : dict of str to (rows,)
-        Of events: `STATE`.
-    starts : (rows + 1,)
-        Where the lists of each row begin.
-    lists : dict of str to (entries,)
-        `LISTS`.
-    reference_deg : (latitude, longitude)
-        Where the origin is put; altitudes are above the ellipsoid.
-    extra : dict of str to (n,)
-        Geometry and classes of encounters, as far as the file gives them.
-    skipped : int
-        Damaged encounters that were left out.
+    `source` is the file, for messages; `kind` is "events" or "tracks"; numbers rise. The rows of
+    encounter k are ``first_rows[k]`` up to ``first_rows[k + 1]``, the lists of a row begin at its
+    `starts` (rows + 1,). `state` holds `STATE` of sets of events, `lists` the `LISTS` of the kind,
+    `extra` (n,) geometry and classes as far as the file gives them. The origin is at
+    `reference_deg` (latitude, longitude); altitudes are above the ellipsoid. `skipped` damaged
+    encounters were left out.
     """
 
     source: str
@@ -108,9 +90,8 @@ class EncounterSet:
         return replace(kept, skipped=self.skipped + len(places))
 
     def together(self, place: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Give for each intruder the times (n,) of both paths' samples at which both are there.
-
-        With them go north, east and altitude (3, n) of the ownship and of the intruder.
+        """Give for each intruder the times (n,) of both paths' samples at which both are there, and
+        north, east and altitude (3, n) of the ownship and of the intruder.
         """
         first, end = (int(self.first_rows[place + k]) for k in (0, 1))
         own = self.path(first)

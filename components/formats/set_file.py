@@ -5,12 +5,10 @@ be left out and counted instead.
 """
 
 import json
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from functools import lru_cache
+from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,26 +22,13 @@ from components.formats.encounter_set import (
     EncounterSet,
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.errors import did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, status_of
-from dsa_des.files.output_file import temporary_beside
+from dsa_des.errors import OutputError, did_you_mean, shown_value
+from dsa_des.files.input_files import InputFileError, read_once, status_of
+from dsa_des.files.output_file import streamed
+from dsa_des.files.output_names import reason_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-
-@contextmanager
-def streamed(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write to; nothing is left behind where the block does not end well."""
-    temporary = temporary_beside(path)
-    try:
-        with open(temporary, "xb") as file:
-            yield file
-        os.replace(temporary, path)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
 
 
 _META = b"dsa_des.encounters"
@@ -76,23 +61,17 @@ class EncounterSetError(ValueError):
     """A set cannot be used; each line of the message names the file, and the encounter if one."""
 
 
+@read_once(4)
 def read_set(path: Path, skip_damaged: bool = False) -> EncounterSet:
     """Read a set of encounters."""
-    try:
-        state = status_of(path, _LARGEST_BYTES)
-    except InputFileError as error:
-        raise EncounterSetError(f"{path}: {error}") from None
-    return _read(path, (state.st_mtime_ns, state.st_size), skip_damaged)
-
-
-@lru_cache(maxsize=4)
-def _read(path: Path, state: object, skip_damaged: bool) -> EncounterSet:
-    """Read a file; the replicas of a study read the same one over and over."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
+        status_of(path, _LARGEST_BYTES)
         table = pq.read_table(path)
+    except InputFileError as error:
+        raise EncounterSetError(f"{path}: {error}") from None
     except (pa.ArrowException, OSError) as error:
         raise EncounterSetError(
             f"{path}: is no whole Parquet file: it may be cut short ({str(error)[:200]})"
@@ -282,51 +261,40 @@ class _SetReader:
         }
 
 
-@contextmanager
-def set_writer(path: Path, about: dict[str, Any]) -> Iterator["SetWriter"]:
-    """Give a writer of a set; the file takes its name when the block ends well."""
-    with streamed(path) as file:
-        writer = SetWriter(file, about)
-        try:
-            yield writer
-        finally:
-            writer.close()
+def write_set(path: Path, about: dict[str, Any], parts: Iterable[EncounterSet]) -> None:
+    """Write a set part by part, each with numbers that follow those before, wholly or not at all.
+
+    OutputError says why it cannot be written.
+    """
+    import pyarrow.parquet as pq
+
+    try:
+        with streamed(path) as file, ExitStack() as stack:
+            writer: Any = None
+            for part in parts:
+                table = _table_of(part)
+                if writer is None:
+                    said = {**about, "reference_deg": list(part.reference_deg), "kind": part.kind}
+                    schema = table.schema.with_metadata({_META: json.dumps(said, sort_keys=True)})
+                    writer = stack.enter_context(pq.ParquetWriter(file, schema))
+                writer.write_table(table.replace_schema_metadata(writer.schema.metadata))
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
 
 
-class SetWriter:
-    """Writes encounters batch by batch, each a set of its own."""
+def _table_of(some: EncounterSet) -> "pa.Table":
+    import pyarrow as pa
 
-    def __init__(self, file: Any, about: dict[str, Any]) -> None:
-        self._file, self._about = file, about
-        self._writer: Any = None
-        self.count = 0
-
-    def write(self, some: EncounterSet) -> None:
-        """Write more encounters, whose numbers follow those written before."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        counts = np.diff(some.first_rows)
-        columns: dict[str, Any] = {
-            "encounter": np.repeat(some.numbers, counts),
-            "weight": np.repeat(some.weights, counts),
-            "aircraft": list(some.names),
-            **some.state,
-        }
-        offsets = pa.array(some.starts, type=pa.int32())
-        for name in LISTS[some.kind]:
-            columns[name] = pa.ListArray.from_arrays(offsets, pa.array(some.lists[name]))
-        for name, values in some.extra.items():
-            columns[name] = np.repeat(values, counts)
-        table = pa.table(columns)
-        if self._writer is None:
-            about = {**self._about, "reference_deg": list(some.reference_deg), "kind": some.kind}
-            schema = table.schema.with_metadata({_META: json.dumps(about, sort_keys=True)})
-            self._writer = pq.ParquetWriter(self._file, schema)
-        self._writer.write_table(table.replace_schema_metadata(self._writer.schema.metadata))
-        self.count += len(some)
-
-    def close(self) -> None:
-        """Write what a whole file ends with."""
-        if self._writer is not None:
-            self._writer.close()
+    counts = np.diff(some.first_rows)
+    columns: dict[str, Any] = {
+        "encounter": np.repeat(some.numbers, counts),
+        "weight": np.repeat(some.weights, counts),
+        "aircraft": list(some.names),
+        **some.state,
+    }
+    offsets = pa.array(some.starts, type=pa.int32())
+    for name in LISTS[some.kind]:
+        columns[name] = pa.ListArray.from_arrays(offsets, pa.array(some.lists[name]))
+    for name, values in some.extra.items():
+        columns[name] = np.repeat(values, counts)
+    return pa.table(columns)

@@ -1,6 +1,6 @@
 """The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from operator import attrgetter
@@ -238,18 +238,29 @@ class _Entries:
             if len(rows):
                 self.found[sensors.index(name)] = rows, entries[name].take(rows) + start
             start += len(new.message.target)
+        self._entries = start
 
-    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray]:
-        """Return the sensor and the entry that each row takes, -1 for none; the last one counts."""
+    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
+        """Return the sensor and the entry that each row takes, -1 for none; the last one counts.
+
+        The entries are None where they are those of the only message, one after the other.
+        """
+        taking = [index for index in ranked if index in self.found]
+        if len(self._messages) == 1 and taking:
+            (mine,) = taking
+            entry = self.found[mine][1]
+            if len(entry) == self._rows == self._entries and bool((entry[1:] > entry[:-1]).all()):
+                return np.full(self._rows, mine, dtype=np.int64), None
         sensor, entry = np.full((2, self._rows), -1, dtype=np.int64)
-        for index in ranked:
-            if index in self.found:
-                rows, mine = self.found[index]
-                sensor[rows], entry[rows] = index, mine
+        for index in taking:
+            rows, those = self.found[index]
+            sensor[rows], entry[rows] = index, those
         return sensor, entry
 
-    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray) -> Any:
+    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray | None) -> Any:
         """Return what rows take of a message's entries, (..., rows); NaN or 0 for none."""
+        if entry is None:
+            return of(self._messages[0])
         parts = [of(message) for message in self._messages]
         none = np.nan if parts[0].dtype.kind == "f" else 0
         parts.append(np.full((*parts[0].shape[:-1], 1), none, dtype=parts[0].dtype))
@@ -282,6 +293,22 @@ def latest_in_gate(
         & (asked.tick - arrivals.tick[of] <= gate_ticks)
     )
     return np.where(fits, entry, -1)
+
+
+def each_alone(
+    taken: Mapping[str, tuple[IntArray, IntArray]], sensors: Iterable[str]
+) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return rows, and for `Fusion.combine` entries, of fused detections of one entry each.
+
+    `taken` has by sensor the rows and the entries; they follow each other sensor by sensor.
+    """
+    row = np.concatenate([rows for rows, _ in taken.values()])
+    entries = {name: np.full(len(row), -1, dtype=np.int64) for name in sensors}
+    start = 0
+    for name, (_, mine) in taken.items():
+        entries[name][start : start + len(mine)] = mine
+        start += len(mine)
+    return row, entries
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:

@@ -1,9 +1,8 @@
 """Gated fusion: detections that lie close in time and place belong together (``fusion.gated``)."""
 
 import math
-from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -19,141 +18,110 @@ from components.geometry import (
 )
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run, no_runs
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
 
 
-class Carrier:
-    """Carries detections of one sensor to the instants of another one's.
+class Entries(NamedTuple):
+    """The detections of one sensor, by entry."""
+
+    message: Any  # What was measured: azimuth, elevation, range and its rate
+    run: IntArray
+    made: IntArray  # Tick of the measurement, and that at which it came
+    came: IntArray
+    pose: FloatArray  # (6, entries), believed by the ownship; NaN where not stated
+
+    @classmethod
+    def of(cls, arrivals: Arrivals) -> "Entries":
+        """Return those of a sensor's reports."""
+        message, row = arrivals.message, arrivals.message.row_of_entries
+        made = message.measured_ticks()
+        return cls(message, message.run[row], made, arrivals.tick[row], poses(message))
+
+
+class Gates(NamedTuple):
+    """How far apart detections that belong together may be."""
+
+    ticks: int  # Of the measurements
+    came_ticks: int  # How much earlier another one may have come
+    angle_rad: float
+    range_m: float
+    ticks_per_s: int
+
+
+def carried(
+    one: Entries, mine: IntArray, other: Entries, theirs: IntArray, ticks_per_s: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return azimuth, elevation and range of entries `theirs` at the instants of `mine`.
 
     What is known of the time between is how the ownship turned and moved, by the poses that it
     believed itself to have, and how the range changed, where its rate was measured. A target's
     own motion across the line of sight is not: the gates are there for it. A detection without
     a range is taken to be as far away as the one that it is compared with.
     """
-
-    def __init__(
-        self,
-        one: Any,
-        one_ticks: IntArray,
-        one_pose: FloatArray,
-        other: Any,
-        other_ticks: IntArray,
-        other_pose: FloatArray,
-        ticks_per_s: int,
-    ) -> None:
-        self._one, self._other = one, other
-        self._ticks = one_ticks, other_ticks
-        self._poses = one_pose, other_pose
-        self._ticks_per_s = ticks_per_s
-
-    def __call__(
-        self, mine: IntArray, theirs: IntArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return azimuth, elevation and range of entries `theirs` at the instants of `mine`."""
-        other = self._other
-        azimuth, elevation = other.azimuth_rad[theirs], other.elevation_rad[theirs]
-        range_m = other.range_m[theirs]
-        before, after = self._poses[1][:, theirs], self._poses[0][:, mine]
-        ticks = self._ticks[0][mine] - self._ticks[1][theirs]
-        known = np.isfinite(before).all(axis=0) & np.isfinite(after).all(axis=0)
-        moved = np.flatnonzero((ticks != 0) & known)
-        if len(moved) == 0:
-            return azimuth, elevation, range_m
-        before, after = before[:, moved], after[:, moved]
-        line = unit_vector_unchecked(azimuth[moved], elevation[moved])
-        seen = np.stack(body_to_ned(*line, *before[3:]))
-        reach = range_m[moved]
-        away = np.where(np.isnan(reach), self._one.range_m[mine[moved]], reach)
-        step = np.stack(line_of_sight_ned(*before[:3], *after[:3], validate=False))
-        # Without any range the parallax is not known.
-        vector = np.where(np.isnan(away), seen, away * seen - step)
-        length = np.sqrt((vector**2).sum(axis=0))
-        ahead = ned_to_body(*(vector / np.maximum(length, 1e-9)), *after[3:])
-        azimuth[moved], elevation[moved] = body_angles(*ahead)
-        by_rate = reach + other.range_rate_m_s[theirs[moved]] * ticks[moved] / self._ticks_per_s
-        by_step = np.where(np.isnan(reach), np.nan, length)
-        range_m[moved] = np.where(np.isnan(by_rate), by_step, by_rate)
+    message = other.message
+    azimuth, elevation = message.azimuth_rad[theirs], message.elevation_rad[theirs]
+    range_m = message.range_m[theirs]
+    before, after = other.pose[:, theirs], one.pose[:, mine]
+    ticks = one.made[mine] - other.made[theirs]
+    known = np.isfinite(before).all(axis=0) & np.isfinite(after).all(axis=0)
+    moved = np.flatnonzero((ticks != 0) & known)
+    if len(moved) == 0:
         return azimuth, elevation, range_m
+    before, after = before[:, moved], after[:, moved]
+    line = unit_vector_unchecked(azimuth[moved], elevation[moved])
+    seen = np.stack(body_to_ned(*line, *before[3:]))
+    reach = range_m[moved]
+    away = np.where(np.isnan(reach), one.message.range_m[mine[moved]], reach)
+    step = np.stack(line_of_sight_ned(*before[:3], *after[:3], validate=False))
+    # Without any range the parallax is not known.
+    vector = np.where(np.isnan(away), seen, away * seen - step)
+    length = np.sqrt((vector**2).sum(axis=0))
+    ahead = ned_to_body(*(vector / np.maximum(length, 1e-9)), *after[3:])
+    azimuth[moved], elevation[moved] = body_angles(*ahead)
+    by_rate = reach + message.range_rate_m_s[theirs[moved]] * ticks[moved] / ticks_per_s
+    by_step = np.where(np.isnan(reach), np.nan, length)
+    range_m[moved] = np.where(np.isnan(by_rate), by_step, by_rate)
+    return azimuth, elevation, range_m
 
 
-#: Given entries of one sensor and of another, pair by pair: azimuth, elevation and range of the
-#: other one at the instant of the first.
-Carried = Callable[[IntArray, IntArray], tuple[FloatArray, FloatArray, FloatArray]]
+def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gates) -> IntArray:
+    """Return for each anchor, an entry of one, the entry of the other that belongs to it, or -1.
 
-
-def nearest_in_gate(
-    one: Any,
-    anchors: IntArray,
-    anchor_ticks: IntArray,
-    other: Any,
-    other_ticks: IntArray,
-    *,
-    gate_ticks: int,
-    angle_gate_rad: float,
-    range_gate_m: float,
-    anchor_came: IntArray | None = None,
-    other_came: IntArray | None = None,
-    keep_ticks: int | None = None,
-    carried: Carried | None = None,
-    runs: tuple[IntArray, IntArray] | None = None,
-) -> IntArray:
-    """Return for each anchor the entry of the other sensor that belongs to it, or -1.
-
-    `runs` are those of the anchors and of the other entries, where there are several.
     Of the entries in the gates those nearest in time count, of these the one nearest in angle,
     then in range. Nothing but measured values decides.
     """
     best = np.full(len(anchors), -1, dtype=np.int64)
-    if len(other_ticks) == 0:
+    if len(other.made) == 0:
         return best
-    here = anchor_ticks if anchor_came is None else anchor_came
-    there = other_ticks if other_came is None else other_came
-    if runs is None:
-        runs = no_runs(len(anchors)), no_runs(len(other_ticks))
-    asked, others = RunTicks(runs[0], anchor_ticks), RunTicks(runs[1], other_ticks)
+    asked = RunTicks(one.run[anchors], one.made[anchors])
+    others = RunTicks(other.run, other.made)
     order = others.order()
     in_time = np.arange(len(others)) if order is None else order
     others = others.take(in_time)
-    first = next_of_run(others, asked.later(-gate_ticks))
-    counts = next_of_run(others, asked.later(gate_ticks + 1)) - first
+    first = next_of_run(others, asked.later(-gates.ticks))
+    counts = next_of_run(others, asked.later(gates.ticks + 1)) - first
     which = np.repeat(np.arange(len(anchors)), counts)
     start = np.repeat(np.cumsum(counts) - counts, counts)
     candidate = in_time[np.arange(len(which)) - start + np.repeat(first, counts)]
-    known = there[candidate] <= here[which]
-    if keep_ticks is not None:
-        known &= there[candidate] >= here[which] - keep_ticks
+    waited = one.came[anchors[which]] - other.came[candidate]
+    known = (waited >= 0) & (waited <= gates.came_ticks)
     which, candidate = which[known], candidate[known]
     mine = anchors[which]
-    azimuth, elevation, range_m = (
-        (other.azimuth_rad[candidate], other.elevation_rad[candidate], other.range_m[candidate])
-        if carried is None
-        else carried(mine, candidate)
-    )
+    azimuth, elevation, range_m = carried(one, mine, other, candidate, gates.ticks_per_s)
     apart_rad = angle_by_haversine(
-        one.azimuth_rad[mine], one.elevation_rad[mine], azimuth, elevation
+        one.message.azimuth_rad[mine], one.message.elevation_rad[mine], azimuth, elevation
     )
-    apart_m = np.abs(one.range_m[mine] - range_m)
+    apart_m = np.abs(one.message.range_m[mine] - range_m)
     # Where either has no range the difference is NaN, and the range gate is open.
-    inside = np.flatnonzero((apart_rad <= angle_gate_rad) & ~(apart_m > range_gate_m))
-    late = np.abs(other_ticks[candidate[inside]] - anchor_ticks[which[inside]])
+    inside = np.flatnonzero((apart_rad <= gates.angle_rad) & ~(apart_m > gates.range_m))
+    late = np.abs(other.made[candidate] - one.made[mine])
     # The first of each anchor counts. A sensor's own order would tell who is who, so that alike
     # ones are told apart by what was measured of them, as long as that differs.
-    order = np.lexsort(
-        (
-            candidate[inside],
-            range_m[inside],
-            elevation[inside],
-            azimuth[inside],
-            apart_m[inside],
-            apart_rad[inside],
-            late,
-            which[inside],
-        )
-    )
-    chosen = inside[order]
+    keys = (candidate, range_m, elevation, azimuth, apart_m, apart_rad, late, which)
+    chosen = inside[np.lexsort([key[inside] for key in keys])]
     anchor, place = np.unique(which[chosen], return_index=True)
     best[anchor] = candidate[chosen[place]]
     return best
@@ -210,51 +178,30 @@ class Gated(Fusion):
         arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
-        rows_of = {name: _rows_of_entries(arrivals[name]) for name in order}
-        came = {name: arrivals[name].tick[rows_of[name]] for name in order}
-        runs = {name: arrivals[name].message.run[rows_of[name]] for name in order}
-        made = {name: arrivals[name].message.measured_ticks() for name in order}
-        pose = {name: poses(arrivals[name].message) for name in order}
+        seen = {name: Entries.of(arrivals[name]) for name in order}
+        gates = Gates(
+            self.gate_ticks, self.keep_ticks, float(np.radians(self.p.angle_gate_deg)),
+            self.p.range_gate_m, self.context.ticks_per_s,
+        )  # fmt: skip
         # What came before this wake was reported then; it can only be gathered now.
         free = {
-            name: came[name] >= since[name]
-            if name in since
-            else np.zeros(len(came[name]), dtype=bool)
-            for name in order
+            name: one.came >= since[name] if name in since else np.zeros(len(one.came), dtype=bool)
+            for name, one in seen.items()
         }
         rows: list[IntArray] = []
         anchors: list[tuple[str, IntArray]] = []
         gathered: dict[str, list[IntArray]] = {name: [] for name in order}
         for anchor in order:
-            mine = np.flatnonzero(free[anchor])
-            instants = arrivals[anchor].instants.take(rows_of[anchor][mine])
-            rows.append(last_of_run(wake.instants, instants))
+            mine, one = np.flatnonzero(free[anchor]), seen[anchor]
+            rows.append(last_of_run(wake.instants, RunTicks(one.run[mine], one.came[mine])))
             anchors.append((anchor, mine))
             for other in order:
                 if other == anchor:
                     gathered[other].append(mine)
                     continue
-                one, two = arrivals[anchor].message, arrivals[other].message
-                entry = nearest_in_gate(
-                    one,
-                    mine,
-                    made[anchor][mine],
-                    two,
-                    made[other],
-                    gate_ticks=self.gate_ticks,
-                    angle_gate_rad=np.radians(self.p.angle_gate_deg),
-                    range_gate_m=self.p.range_gate_m,
-                    anchor_came=came[anchor][mine],
-                    other_came=came[other],
-                    keep_ticks=self.keep_ticks,
-                    runs=(runs[anchor][mine], runs[other]),
-                    carried=Carrier(
-                        one, made[anchor], pose[anchor], two, made[other], pose[other],
-                        self.context.ticks_per_s,
-                    ),
-                )  # fmt: skip
+                entry = nearest_in_gate(one, mine, seen[other], gates)
                 together = np.flatnonzero(entry >= 0)
-                same = came[other][entry[together]] == came[anchor][mine[together]]
+                same = seen[other].came[entry[together]] == one.came[mine[together]]
                 free[other][entry[together][same]] = False
                 gathered[other].append(entry)
         in_order = self._in_order(rows, anchors, arrivals)
@@ -289,7 +236,3 @@ class Gated(Fusion):
             seen = arrivals[name].message.target[entry[found]]
             target[found[seen >= 0]] = seen[seen >= 0]
         return target
-
-
-def _rows_of_entries(arrivals: Arrivals) -> IntArray:
-    return np.repeat(np.arange(len(arrivals.tick)), np.diff(arrivals.message.offsets))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.fusion_block import Fusion
+from components.fusion.fusion_block import Fusion, each_alone
 from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from components.messages.looks import Looks
@@ -34,23 +34,16 @@ class PassThrough(Fusion):
         arrivals = {new.source: new for new in wake.arrivals("detections")}
         if not arrivals:
             return None
-        rows, entries, places = [], [], []
-        for new in arrivals.values():
+        alone = {}
+        for name, new in arrivals.items():
             row = last_of_run(wake.instants, new.instants)
             row = np.repeat(row, np.diff(new.message.offsets))
-            rows.append(row)
-            places.append(np.arange(len(row)))
-        sizes = [len(place) for place in places]
-        order = np.argsort(np.concatenate(rows), kind="stable")
-        for k in range(len(arrivals)):
-            mine = [p if i == k else np.full(n, -1) for i, (p, n) in
-                    enumerate(zip(places, sizes, strict=True))]  # fmt: skip
-            entries.append(np.concatenate(mine)[order])
+            alone[name] = row, np.arange(len(row))
+        row, entries = each_alone(alone, arrivals)
+        order = np.argsort(row, kind="stable")
         target = np.concatenate([new.message.target for new in arrivals.values()])[order]
-        fused = self.combine(
-            wake.instants, np.concatenate(rows)[order], target, arrivals,
-            dict(zip(arrivals, entries, strict=True)),
-        )  # fmt: skip
+        entries = {name: entry[order] for name, entry in entries.items()}
+        fused = self.combine(wake.instants, row[order], target, arrivals, entries)
         fused.looks = self._looks(wake.instants, arrivals)
         return fused
 

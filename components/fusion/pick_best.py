@@ -1,88 +1,20 @@
 """Pick-best fusion: radar gives range, optics give the angles (``fusion.pick_best``, §3.6)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import (
-    FUSION_LADDER,
-    Fusion,
-    latest_in_gate,
-    poses,
-    velocities,
-)
-from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
-from components.messages.contributors import mask_type
-from components.messages.false_detections import FALSE_TARGET, true_entries
+from components.fusion.fusion_block import FUSION_LADDER, Fusion, each_alone, latest_in_gate
+from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import last_of_run
+from dsa_des.arrays.run_ticks import last_of_run, positions_among
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
-
-
-def pass_false_alarms(
-    fused: FusedDetections, arrivals: Mapping[str, Arrivals], ranging: Sequence[str]
-) -> FusedDetections:
-    """Return fused detections with the false alarms of each instant after them."""
-    rows: list[IntArray] = [fused.row_of_entries]
-    columns: dict[str, list[Any]] = {
-        name: [getattr(fused, name)]
-        for name in (
-            "target", "azimuth_rad", "elevation_rad", "range_m", "contributors", "angle_source",
-            "range_source", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
-            "measured_tick", *MEASURED,
-        )
-    }  # fmt: skip
-    own = [np.stack(list(fused.pose_columns().values()))] if fused.pose_columns() else None
-    known = fused.own_velocity
-    moves = None if known is None else [np.stack(list(known.values()))]
-    for index, name in enumerate(fused.sensors):
-        if name not in arrivals:
-            continue
-        new = arrivals[name]
-        false = np.flatnonzero(new.message.target == FALSE_TARGET)
-        if len(false) == 0:
-            continue
-        row = last_of_run(fused.instants, new.instants)
-        rows.append(row[new.message.row_of_entries[false]])
-        for column in ("azimuth_rad", "elevation_rad", "range_m"):
-            columns[column].append(getattr(new.message, column)[false])
-            columns[f"true_{column}"].append(np.full(len(false), np.nan))
-        for column in MEASURED:
-            columns[column].append(getattr(new.message, column)[false])
-        columns["measured_tick"].append(new.message.measured_ticks()[false])
-        if own is not None:
-            own.append(poses(new.message)[:, false])
-        if moves is not None:
-            moves.append(velocities(new.message)[:, false])
-        for column, value in (
-            ("target", FALSE_TARGET),
-            ("contributors", 1 << index),
-            ("angle_source", index),
-            ("range_source", index if name in ranging else -1),
-        ):
-            kind = mask_type(len(fused.sensors)) if column == "contributors" else np.int64
-            columns[column].append(np.full(len(false), value, dtype=kind))
-    if len(rows) == 1:
-        return fused
-    joined = np.concatenate(rows)
-    # Stable: fused detections first, then sensor by sensor.
-    order = np.argsort(joined, kind="stable")
-    values: dict[str, Any] = {name: np.concatenate(parts)[order] for name, parts in columns.items()}
-    offsets = np.searchsorted(joined[order], np.arange(len(fused) + 1))
-    if own is not None:
-        pose = np.concatenate(own, axis=1)[:, order]
-        values["own_of_entries"] = dict(zip(POSE, pose, strict=True))
-    if moves is not None:
-        velocity = np.concatenate(moves, axis=1)[:, order]
-        values["own_velocity"] = dict(zip(OWN_VELOCITY, velocity, strict=True))
-    return replace(fused, offsets=offsets, **values)
 
 
 class PickBestParameters(Parameters):
@@ -121,17 +53,14 @@ class PickBest(Fusion):
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""
-        reported = {new.source: new for new in wake.arrivals("detections")}
-        if not reported:
+        arrivals = {new.source: new for new in wake.arrivals("detections")}
+        if not arrivals:
             return None
-        arrivals = reported
-        true = {name: true_entries(new.message) for name, new in reported.items()}
-        all_true = all(true[name] is new.message for name, new in reported.items())
-        if not all_true:
-            arrivals = {n: Arrivals(n, new.instants, true[n]) for n, new in reported.items()}
-        roster = next(iter(arrivals.values())).message.roster
-        width = max(1, len(roster))
-        keys = [_keys(new, wake, width) for new in arrivals.values()]
+        width = max(1, len(next(iter(arrivals.values())).message.roster))
+        true = [_true_entries(new) for new in arrivals.values()]
+        keys = [
+            _keys(new, wake, width, of) for new, of in zip(arrivals.values(), true, strict=True)
+        ]
         union, positions = sorted_union(keys)
         row = union // width
         target = union - row * width
@@ -143,15 +72,39 @@ class PickBest(Fusion):
             }
         else:
             entries = {name: np.full(len(union), -1, dtype=np.int64) for name in arrivals}
-            for entry, at in zip(entries.values(), positions, strict=True):
-                entry[at] = np.arange(len(at))
-        fused = self.combine(wake.instants, row, target, arrivals, entries)
-        if all_true:
-            return fused
-        return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
+            for entry, at, of in zip(entries.values(), positions, true, strict=True):
+                entry[at] = np.arange(len(at)) if of is None else of
+        if any(of is not None for of in true):
+            rows, alone = each_alone(self._false_alarms(arrivals, wake), arrivals)
+            order = np.argsort(np.concatenate([row, rows]), kind="stable")
+            row = np.concatenate([row, rows])[order]
+            target = np.append(target, np.full(len(rows), FALSE_TARGET))[order]
+            entries = {n: np.append(entry, alone[n])[order] for n, entry in entries.items()}
+        return self.combine(wake.instants, row, target, arrivals, entries)
+
+    def _false_alarms(
+        self, arrivals: Mapping[str, Arrivals], wake: Wake
+    ) -> dict[str, tuple[IntArray, IntArray]]:
+        """Return row and entry of the false alarms that came now, by sensor in order of rank."""
+        found = {}
+        for name in (name for name in self.sensors if name in arrivals):
+            new = arrivals[name]
+            at, now = positions_among(wake.instants, new.instants)
+            row = new.message.row_of_entries
+            false = new.message.target == FALSE_TARGET
+            entry = np.flatnonzero(false if now is None else false & now[row])
+            found[name] = at[row[entry]], entry
+        return found
 
 
-def _keys(new: Arrivals, wake: Wake, width: int) -> IntArray:
-    """Return instant · width + target of every detection."""
+def _true_entries(new: Arrivals) -> IntArray | None:
+    """Return the entries that are of a target; None where all are."""
+    true = new.message.target != FALSE_TARGET
+    return None if true.all() else np.flatnonzero(true)
+
+
+def _keys(new: Arrivals, wake: Wake, width: int, of: IntArray | None) -> IntArray:
+    """Return instant · width + target of some entries."""
     row = last_of_run(wake.instants, new.instants)  # they are among them
-    return row.take(new.message.row_of_entries) * width + new.message.target
+    keys = row.take(new.message.row_of_entries) * width + new.message.target
+    return keys if of is None else keys[of]

@@ -1,10 +1,11 @@
 """Level-offs at altitudes of a fixed grid, and which of them meet a volume."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from components.guidance.intervals import limits_of
 from components.guidance.situation import Detector, State, meets
 from components.well_clear.relative_motion import Span, nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
@@ -15,25 +16,29 @@ class Altitudes:
 
     A flight to an altitude accelerates to a climb rate until `accelerated_s`, holds it until
     `held_s`, and is level at `level_s`; it first brakes where it climbs away from the altitude or
-    too fast for it.
-
-    Parameters
-    ----------
-    own : State of (n,)
-    values : mapping
-        Values of a configuration, by key.
+    too fast for it. All follows from the values of a configuration.
     """
 
+    cyclic = False
+
     def __init__(self, own: State, values: Any) -> None:
-        self.own = own.columns()
+        self.own, self.own_value = own.columns(), own.up_m
+        self.least, self.most = limits_of("alt", own.up_m, values)
         least, most, step = values["min_alt"], values["max_alt"], values["step_alt"]
         number = np.arange(math.floor((most - least) / step) + 2)
         self.values = np.broadcast_to(least + number * step, (len(own.up_m), len(number)))
+        self.there = np.ones(self.values.shape, dtype=bool)
         self.instantaneous = values["vertical_accel"] == 0.0 or values["vertical_rate"] == 0.0
         self._plan(values["vertical_accel"], values["vertical_rate"])
+        self.lookahead_s: float = values["lookahead_time"]
+        #: Whether horizons count from time 0, not from the phases of a flight.
+        self.from_now: bool = values["bands_add_time_to_maneuver"]
         # Where horizons count from now, level flights are asked for that begin beyond them.
-        alike_s = math.inf if values["bands_add_time_to_maneuver"] else values["lookahead_time"]
-        self._far_ones_alike(alike_s, step)
+        self._far_ones_alike(math.inf if self.from_now else self.lookahead_s, step)
+
+    def against(self, intruder: State, detector: Detector) -> "AltitudeConflicts":
+        """Return when the flights meet a volume about one intruder of each, (n, 1)."""
+        return AltitudeConflicts(self, intruder, detector)
 
     def _plan(self, acceleration: float, rate: float) -> None:
         """Find the times and rates of the flights to all altitudes."""
@@ -81,17 +86,16 @@ class Altitudes:
         self._stands_for = np.clip(np.arange(count) - first, 0, width - 1)
         chosen = self.chosen
         self._level_m = chosen(self.values)
-        self._phases = tuple(
-            map(chosen, (self.accelerated_s, self.held_s, self.level_s, self._rate))
-        )
-        self._push = chosen(self._acceleration)
+        #: Times at which the flights that are looked at have accelerated, held and are level.
+        self.phases_s = [chosen(t) for t in (self.accelerated_s, self.held_s, self.level_s)]
+        self._speed, self._push = chosen(self._rate), chosen(self._acceleration)
 
     def chosen(self, of_each: FloatArray) -> FloatArray:
         """Return values (n, k) of all altitudes for those that are looked at."""
         return np.take_along_axis(of_each, self._looked_at, axis=1)
 
     def of_all(self, chosen: BoolArray) -> BoolArray:
-        """Return for all altitudes what was found for those that were looked at."""
+        """Return for all altitudes what holds for those that were looked at."""
         return np.take_along_axis(chosen, self._stands_for, axis=1)
 
     def flight_at(self, time_s: FloatArray) -> State:
@@ -102,7 +106,7 @@ class Altitudes:
             level = np.zeros(np.broadcast(time_s, values).shape)
             up, rate = values + level, level
         else:
-            (t1, t2, t3, speed), acceleration = self._phases, self._push
+            (t1, t2, t3), speed, acceleration = self.phases_s, self._speed, self._push
             phase_s = np.minimum(time_s, t1)
             rate = own.climb_mps + acceleration * phase_s
             up = own.up_m + own.climb_mps * phase_s + 0.5 * acceleration * phase_s**2
@@ -116,49 +120,22 @@ class Altitudes:
         return State(own.east_m, own.north_m, up - rate * time_s, own.east_mps, own.north_mps, rate)
 
 
-class _Instants(NamedTuple):
-    """Flights that are inside at an instant: when, and which."""
-
-    time_s: FloatArray
-    inside: BoolArray
-
-
 class AltitudeConflicts:
-    """When the flights to all altitudes meet a volume about one intruder of each ownship.
+    """When the flights to all altitudes meet a volume about one intruder of each ownship."""
 
-    Parameters
-    ----------
-    altitudes : Altitudes
-        Of n ownships.
-    intruder : State of (n, 1)
-    detector : Detector
-    lookahead_s : float
-    from_now : bool
-        Whether horizons count from time 0, not from the phases of a flight.
-    """
-
-    def __init__(
-        self,
-        altitudes: Altitudes,
-        intruder: State,
-        detector: Detector,
-        lookahead_s: float,
-        from_now: bool = False,
-    ) -> None:
-        self._from_now = from_now
-        self._altitudes, self._intruder = altitudes, intruder
-        self._detector, self._lookahead_s = detector, lookahead_s
-        self._seconds: list[_Instants] = []
-        t1, t2, t3 = map(
-            altitudes.chosen, (altitudes.accelerated_s, altitudes.held_s, altitudes.level_s)
-        )
+    def __init__(self, altitudes: Altitudes, intruder: State, detector: Detector) -> None:
+        self._altitudes, self._intruder, self._detector = altitudes, intruder, detector
+        self._lookahead_s, self._from_now = altitudes.lookahead_s, altitudes.from_now
+        #: Whole seconds on the way, and which flights are inside then.
+        self._seconds: list[tuple[FloatArray, BoolArray]] = []
+        t1, t2, t3 = altitudes.phases_s
         self._level_s = np.zeros(t1.shape) if altitudes.instantaneous else t3 + 1.0
         # Inside recovery, who is level beyond the horizon keeps clear of the cylinder all the time.
-        self._late = (self._level_s > lookahead_s) & from_now
+        self._late = (self._level_s > self._lookahead_s) & self._from_now
         self._level = self._over(self._level_s, self._late)
         if altitudes.instantaneous:
             return
-        self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, lookahead_s)
+        self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, self._lookahead_s)
         self._held = self._over(self._held_s, np.zeros(t1.shape, dtype=bool))
         self._at_seconds(np.zeros(t1.shape), t1)
         self._at_seconds(np.ceil(t2), t3 + 1.0)
@@ -179,8 +156,7 @@ class AltitudeConflicts:
             if due.any():
                 flight = self._altitudes.flight_at(time_s)
                 span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
-                begin_s = span.begin_s
-                self._seconds.append(_Instants(time_s, due & nearly_equal(begin_s, time_s)))
+                self._seconds.append((time_s, due & nearly_equal(span.begin_s, time_s)))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which flights meet it."""
@@ -190,8 +166,8 @@ class AltitudeConflicts:
             end_s = np.minimum(self._after(horizon_s, self._held_s), self._held_until_s)
             met |= meets(self._held, np.maximum(from_s, self._held_s), end_s)
         last_s = horizon_s if self._from_now else np.inf
-        for instants in self._seconds:
-            met |= instants.inside & (instants.time_s >= from_s) & (instants.time_s <= last_s)
+        for time_s, inside in self._seconds:
+            met |= inside & (time_s >= from_s) & (time_s <= last_s)
         return self._altitudes.of_all(met & np.asarray(from_s <= horizon_s))
 
     def _after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
@@ -206,10 +182,6 @@ class AltitudeConflicts:
         met = meets(self._level, begin_s, np.where(self._late, self._lookahead_s, end_s))
         if not self._altitudes.instantaneous:
             met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, end_s))
-        for instants in self._seconds:
-            met |= instants.inside & (instants.time_s <= until_s)
+        for time_s, inside in self._seconds:
+            met |= inside & (time_s <= until_s)
         return self._altitudes.of_all(met)
-
-    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell nothing: flights to altitudes are looked at second by second on their way."""
-        return np.zeros(self._altitudes.values.shape, dtype=bool)

@@ -4,7 +4,7 @@ import math
 import struct
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,18 @@ def same_place(one: float, other: float) -> bool:
         return False
     first, second = _AS_WHOLE_NUMBERS.unpack(_DOUBLES.pack(abs(one), abs(other)))
     return abs(int(first) - int(second)) <= _DOUBLES_APART
+
+
+def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the least and most values of a kind, also relative to the own value where set."""
+    below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
+    least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
+    most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
+    if below > 0.0:
+        least = np.maximum(least, own_value - below)
+    if above > 0.0:
+        most = np.minimum(most, own_value + above)
+    return least, most
 
 
 def clear_intervals(

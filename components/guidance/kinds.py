@@ -5,31 +5,50 @@ straight flights apply to it from the manoeuvre's end on.
 """
 
 import math
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
-from components.guidance.intervals import FULL_TURN
+from components.guidance.intervals import FULL_TURN, limits_of
 from components.guidance.situation import Detector, State, meets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
 class Steps(NamedTuple):
-    """Manoeuvres of n ownships from the leftmost or lowest to the rightmost or highest."""
+    """Manoeuvres of n ownships from the leftmost or lowest to the rightmost or highest.
 
-    # (k,) of int: signed number of steps from the own value, ascending; 0 is no manoeuvre
+    `number` (k,) is the signed number of steps from the own value, ascending; 0 is no manoeuvre.
+    """
+
     number: IntArray
-    there: BoolArray  # (n, k) of bool: whether an ownship has that manoeuvre within its limits
+    there: BoolArray  # (n, k): whether an ownship has that manoeuvre within its limits
     time_s: FloatArray  # (n, k) or (1, k): When each manoeuvre ends
     step_time_s: FloatArray  # (n, 1) or (1, 1): Of one step; 0 for those that take no time
     flight: State  # State of (n, k) or (n, 1): The flight after it, run back to time 0
+    values: AnyArray  # (n, k): ascending; directions may lie outside of [0, 2 pi)
+    own_value: FloatArray  # (n,)
+    least: FloatArray
+    most: FloatArray
+    cyclic: bool  # Whether values a full turn apart are the same
+    lookahead_s: float
+    from_now: bool  # Whether horizons count from time 0, not from the end of a manoeuvre
+
+    @property
+    def instantaneous(self) -> bool:
+        """Whether a manoeuvre takes no time."""
+        return not self.step_time_s.any()
+
+    def against(self, intruder: State, detector: Detector) -> "StepConflicts":
+        """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
+        return StepConflicts(self, intruder, detector)
 
 
-def direction_steps(own: State, values: Any) -> Steps:
+def _direction_steps(own: State, values: Any) -> Steps:
     """Return turns by multiples of a step to the left and right."""
-    own = own.columns()
     step = values["step_hdir"]
+    own_value = np.arctan2(own.east_mps, own.north_mps) % FULL_TURN
+    own = own.columns()
     # A flight slower than a step is turned as if it flew that fast.
     least = max(values["step_hs"], values["min_airspeed"])
     speed = np.maximum(np.hypot(own.east_mps, own.north_mps), least)
@@ -51,50 +70,13 @@ def direction_steps(own: State, values: Any) -> Steps:
         radius = np.where(number < 0, -speed / rate, speed / rate)
         east = own.east_m + radius * (np.cos(track) - np.cos(turned)) - v_east * time_s
         north = own.north_m + radius * (np.sin(turned) - np.sin(track)) - v_north * time_s
-    flight = State(east, north, own.up_m, v_east, v_north, own.climb_mps)
-    return Steps(number, np.ones(turned.shape, dtype=bool), time_s, step_time_s, flight)
-
-
-def speed_steps(own: State, values: Any) -> Steps:
-    """Return changes of ground speed along the track; it may pass through zero."""
-    speed = np.hypot(own.east_mps, own.north_mps)
-    limits = limits_of("hs", speed, values)
-    changed = _changes(speed, *limits, values["step_hs"], values["horizontal_accel"])
-    own = own.columns()
-    track = np.arctan2(own.east_mps, own.north_mps)
-    east, north = np.sin(track), np.cos(track)
-    flight = State(
-        own.east_m + changed.back * east,
-        own.north_m + changed.back * north,
-        own.up_m,
-        changed.rate * east,
-        changed.rate * north,
-        own.climb_mps,
-    )
-    return Steps(changed.number, changed.there, changed.time_s, changed.step_time_s, flight)
-
-
-def climb_steps(own: State, values: Any) -> Steps:
-    """Return changes of vertical speed."""
-    limits = limits_of("vs", own.climb_mps, values)
-    changed = _changes(own.climb_mps, *limits, values["step_vs"], values["vertical_accel"])
-    own = own.columns()
-    flight = State(
-        own.east_m, own.north_m, own.up_m + changed.back, own.east_mps, own.north_mps, changed.rate
-    )
-    return Steps(changed.number, changed.there, changed.time_s, changed.step_time_s, flight)
-
-
-def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the least and most values of a kind, also relative to the own value where set."""
-    below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
-    least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
-    most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
-    if below > 0.0:
-        least = np.maximum(least, own_value - below)
-    if above > 0.0:
-        most = np.minimum(most, own_value + above)
-    return least, most
+    return Steps(
+        number, np.ones(turned.shape, dtype=bool), time_s, step_time_s,
+        State(east, north, own.up_m, v_east, v_north, own.climb_mps),
+        own_value[:, np.newaxis] + number * step, own_value,
+        np.zeros(own_value.shape), np.full(own_value.shape, FULL_TURN), True,
+        values["lookahead_time"], values["bands_add_time_to_maneuver"],
+    )  # fmt: skip
 
 
 def _turns(most_rad: float, step: float) -> int:
@@ -102,33 +84,40 @@ def _turns(most_rad: float, step: float) -> int:
     return count - 1 if count * step > math.pi else count
 
 
-class _Changes(NamedTuple):
-    """As `Steps`, with the rate after each manoeuvre and where its flight was at time 0."""
-
-    number: IntArray
-    there: BoolArray
-    time_s: FloatArray
-    step_time_s: FloatArray
-    rate: FloatArray
-    back: FloatArray
-
-
-def _changes(
-    own: FloatArray, least: FloatArray, most: FloatArray, step: float, acceleration: float
-) -> _Changes:
-    down = np.maximum(np.ceil((own - least) / step), 0.0).astype(np.int64)[:, np.newaxis]
-    up = np.maximum(np.ceil((most - own) / step), 0.0).astype(np.int64)[:, np.newaxis]
+def _speed_steps(name: str, own: State, values: Any) -> Steps:
+    """Return changes of ground speed along the track (hs), also through zero, or of climb (vs)."""
+    over_ground = name == "hs"
+    own_value = np.hypot(own.east_mps, own.north_mps) if over_ground else own.climb_mps
+    acceleration = values["horizontal_accel" if over_ground else "vertical_accel"]
+    step, (least, most) = values[f"step_{name}"], limits_of(name, own_value, values)
+    down = np.maximum(np.ceil((own_value - least) / step), 0.0).astype(np.int64)[:, np.newaxis]
+    up = np.maximum(np.ceil((most - own_value) / step), 0.0).astype(np.int64)[:, np.newaxis]
     number = np.arange(-int(down.max(initial=0)), int(up.max(initial=0)) + 1)
-    there = (number >= -down) & (number <= up)
-    now = own[:, np.newaxis]
+    now = own_value[:, np.newaxis]
     rate = now + number * step
-    if acceleration == 0.0:
-        nothing = np.zeros((1, len(number)))
-        return _Changes(number, there, nothing, np.zeros((1, 1)), rate, np.zeros(rate.shape))
-    step_time_s = np.full((1, 1), step / acceleration)
+    step_time_s, back_m = np.zeros((1, 1)), np.zeros(rate.shape)
     time_s = np.abs(number) * step_time_s
-    reached = now * time_s + 0.5 * np.sign(number) * acceleration * time_s**2
-    return _Changes(number, there, time_s, step_time_s, rate, reached - rate * time_s)
+    if acceleration != 0.0:
+        step_time_s = np.full((1, 1), step / acceleration)
+        time_s = np.abs(number) * step_time_s
+        reached_m = now * time_s + 0.5 * np.sign(number) * acceleration * time_s**2
+        back_m = reached_m - rate * time_s  # where the flight after it was at time 0
+    own = own.columns()
+    if over_ground:
+        track = np.arctan2(own.east_mps, own.north_mps)
+        east, north = np.sin(track), np.cos(track)
+        flight = State(
+            own.east_m + back_m * east, own.north_m + back_m * north, own.up_m,
+            rate * east, rate * north, own.climb_mps,
+        )  # fmt: skip
+    else:
+        flight = State(
+            own.east_m, own.north_m, own.up_m + back_m, own.east_mps, own.north_mps, rate
+        )
+    return Steps(
+        number, (number >= -down) & (number <= up), time_s, step_time_s, flight, rate, own_value,
+        least, most, False, values["lookahead_time"], values["bands_add_time_to_maneuver"],
+    )  # fmt: skip
 
 
 _MOST = np.iinfo(np.int64).max
@@ -137,45 +126,22 @@ _MOST = np.iinfo(np.int64).max
 class StepConflicts:
     """When the flights after all steps meet a volume about one intruder of each ownship.
 
-    The times are found once, over all that may be asked; every question only cuts them.
-
-    Parameters
-    ----------
-    steps : Steps
-        Of n ownships.
-    intruder : State of (n, 1)
-    detector : Detector
-    lookahead_s : float
-    from_now : bool
-        Whether horizons count from time 0, not from the end of a manoeuvre.
+    The times are computed once, over all that may be asked; every question only cuts them.
     """
 
-    def __init__(
-        self,
-        steps: Steps,
-        intruder: State,
-        detector: Detector,
-        lookahead_s: float,
-        from_now: bool = False,
-    ) -> None:
-        self._after_s = np.zeros((1, 1)) if from_now else steps.time_s
-        self._from_now = from_now
-        self._steps = steps
-        self._lookahead_s = lookahead_s
+    def __init__(self, steps: Steps, intruder: State, detector: Detector) -> None:
+        self._after_s = np.zeros((1, 1)) if steps.from_now else steps.time_s
+        self._steps, self._lookahead_s = steps, steps.lookahead_s
         self._count = np.abs(steps.number)
         # In recovery, one that ends beyond its horizon keeps clear of the cylinder all the time.
-        self._late = (steps.time_s > lookahead_s) & from_now
+        self._late = (steps.time_s > self._lookahead_s) & steps.from_now
         # Others that end later are not asked for.
-        begin_s = np.where(self._late, 0.0, np.minimum(steps.time_s, lookahead_s))
-        end_s = lookahead_s + steps.step_time_s
+        begin_s = np.where(self._late, 0.0, np.minimum(steps.time_s, self._lookahead_s))
+        end_s = self._lookahead_s + steps.step_time_s
         self._span = detector.span(steps.flight, intruder, begin_s, end_s)
-        self._takes_time = bool(steps.step_time_s.any())
-        lasts_s = steps.time_s + steps.step_time_s
-        self._while_flown = (
-            meets(self._span, steps.time_s, lasts_s) & steps.there
-            if self._takes_time
-            else np.zeros(steps.there.shape, dtype=bool)
-        )
+        if not steps.instantaneous:
+            lasts_s = steps.time_s + steps.step_time_s
+            self._while_flown = meets(self._span, steps.time_s, lasts_s) & steps.there
 
     def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which steps meet it after the manoeuvre."""
@@ -187,21 +153,16 @@ class StepConflicts:
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which steps meet it, or lie beyond one that meets it while it is flown."""
         met = self.soon(from_s, horizon_s)
-        if self._takes_time:
-            met |= self.lost(from_s, horizon_s)
-        return met
-
-    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which steps lie at or beyond the first that meets it while it is flown."""
-        if not self._takes_time:
-            return self._while_flown
+        if self._steps.instantaneous:
+            return met
         first = np.ceil(from_s / self._steps.step_time_s)
         # Where horizons count from now, what is flown after them is not looked at either.
-        last_s = np.minimum(self._lookahead_s, horizon_s) if self._from_now else self._lookahead_s
+        from_now = self._steps.from_now
+        last_s = np.minimum(self._lookahead_s, horizon_s) if from_now else self._lookahead_s
         last = np.floor(last_s / self._steps.step_time_s)
         due = (self._count >= first) & (self._count <= last)
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
-        return self._beyond(self._while_flown & due)
+        return met | self._beyond(self._while_flown & due)
 
     def unsafe_before(self, until_s: FloatArray) -> BoolArray:
         """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
@@ -209,7 +170,7 @@ class StepConflicts:
         end_s = np.where(self._late, self._lookahead_s, np.minimum(self._lookahead_s, until_s))
         met = meets(self._span, begin_s, end_s)
         met &= self._steps.there
-        if self._takes_time:
+        if not self._steps.instantaneous:
             until_s = np.minimum(until_s, self._lookahead_s)
             early = self._count <= np.floor(until_s / self._steps.step_time_s)
             met |= self._beyond(self._while_flown & early)
@@ -229,91 +190,13 @@ class StepConflicts:
 KINDS = ("hdir", "hs", "vs", "alt")
 
 
-class Conflicts(Protocol):
-    """When all manoeuvres of a kind meet a volume; see `StepConflicts`."""
-
-    def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which meet it after the manoeuvre."""
-
-    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which lie beyond one that meets it while it is flown."""
-
-    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which do either."""
-
-    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
-        """Tell which do either until a time."""
-
-
-class ManoeuvreKind(Protocol):
-    """Manoeuvres of one kind, of n ownships, by the k values that they lead to."""
-
-    values: AnyArray  # (n, k): ascending; directions may lie outside of [0, 2 pi)
-    there: BoolArray  # (n, k) of bool: whether an ownship has that value
-    own_value: FloatArray  # (n,)
-    least: FloatArray
-    most: FloatArray
-    cyclic: bool  # Whether values a full turn apart are the same
-    instantaneous: bool  # Whether a manoeuvre takes no time
-
-    def against(self, intruder: State, detector: Detector) -> Conflicts:
-        """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
-
-
-class _StepKind:
-    def __init__(
-        self,
-        steps: Steps,
-        own_value: FloatArray,
-        step: float,
-        limits: tuple[FloatArray, FloatArray],
-        values: Any,
-    ) -> None:
-        self._steps, self._values = steps, values
-        self.own_value = own_value
-        self.values: AnyArray = own_value[:, np.newaxis] + steps.number * step
-        self.there = steps.there
-        self.least, self.most = limits
-        self.cyclic = False
-        self.instantaneous = not steps.step_time_s.any()
-
-    def against(self, intruder: State, detector: Detector) -> Conflicts:
-        from_now = self._values["bands_add_time_to_maneuver"]
-        lookahead_s = self._values["lookahead_time"]
-        return StepConflicts(self._steps, intruder, detector, lookahead_s, from_now)
-
-
-class _AltitudeKind:
-    def __init__(self, own: State, values: Any) -> None:
-        self._altitudes = Altitudes(own, values)
-        self._lookahead_s = values["lookahead_time"]
-        self._from_now = values["bands_add_time_to_maneuver"]
-        self.own_value = own.up_m
-        self.values: AnyArray = self._altitudes.values
-        self.there = np.ones(self.values.shape, dtype=bool)
-        self.least, self.most = limits_of("alt", own.up_m, values)
-        self.cyclic = False
-        self.instantaneous = self._altitudes.instantaneous
-
-    def against(self, intruder: State, detector: Detector) -> Conflicts:
-        return AltitudeConflicts(
-            self._altitudes, intruder, detector, self._lookahead_s, self._from_now
-        )
+#: The manoeuvres of one kind, of n ownships, and when they meet a volume.
+ManoeuvreKind = Steps | Altitudes
+Conflicts = StepConflicts | AltitudeConflicts
 
 
 def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
-    """Return the manoeuvres of one kind."""
+    """Return the manoeuvres of one of `KINDS` for n ownships, by the values of a configuration."""
     if name == "alt":
-        return _AltitudeKind(own, values)
-    if name == "hdir":
-        track = np.arctan2(own.east_mps, own.north_mps) % FULL_TURN
-        whole = np.zeros(track.shape), np.full(track.shape, FULL_TURN)
-        made = _StepKind(direction_steps(own, values), track, values["step_hdir"], whole, values)
-        made.cyclic = True
-        return made
-    if name == "hs":
-        speed = np.hypot(own.east_mps, own.north_mps)
-        limits = limits_of(name, speed, values)
-        return _StepKind(speed_steps(own, values), speed, values["step_hs"], limits, values)
-    limits = limits_of(name, own.climb_mps, values)
-    return _StepKind(climb_steps(own, values), own.climb_mps, values["step_vs"], limits, values)
+        return Altitudes(own, values)
+    return _direction_steps(own, values) if name == "hdir" else _speed_steps(name, own, values)

@@ -31,50 +31,12 @@ __all__ = [
 
 
 def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
-    """Return the share of the beam's disc that a target fills.
-
-    Parameters
-    ----------
-    area_m2 : array_like, m²
-        That the target shows, 0 or more.
-    range_m : array_like, m
-        Above 0.
-    divergence_rad : float
-        Full angle of the beam, above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-    """
+    """Return the share of the beam's disc that a target which shows an area fills."""
     return _filled("area_m2", area_m2, range_m, divergence_rad, 2)
 
 
 def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
-    """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R).
-
-    Parameters
-    ----------
-    diameter_m : array_like, m
-        Of the wire, 0 or more.
-    range_m : array_like, m
-        Above 0.
-    divergence_rad : float
-        Full angle of the beam, above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-    """
+    """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R)."""
     return _filled("diameter_m", diameter_m, range_m, divergence_rad, 1)
 
 
@@ -98,37 +60,11 @@ def laser_power_w(
     reflectivity: ArrayLike = 1.0,
     extinction_per_m: float = 0.0,
 ) -> Any:
-    """Return the peak power that comes back from a target, W.
+    """Return the peak power that comes back from a Lambertian target which takes a share, W.
 
-    Parameters
-    ----------
-    share : array_like
-        Of the beam that the target takes: `target_share`, `wire_share`.
-    range_m : array_like, m
-        Above 0.
-    peak_power_w : float, W
-    aperture_m : float, m
-        Diameter of the receiver.
-    efficiency : float
-        Of transmitter and receiver together.
-    reflectivity : array_like
-        Of a Lambertian surface.
-    extinction_per_m : float, 1/m
-        Of the air, at the laser's wavelength.
-
-    Returns
-    -------
-    array of the broadcast shape, W
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-
-    Notes
-    -----
-    A. V. Jelalian, Laser Radar Systems, 1992, eq. 1.1 with the cross-sections of its chapter 1; R.
-    D. Richmond and S. C. Cain, Direct-Detection LADAR Systems, SPIE 2010, chapter 1.
+    `efficiency` is that of transmitter and receiver together, `extinction_per_m` that of the air.
+    Jelalian, eq. 1.1 with the cross-sections of his chapter 1; R. D. Richmond and S. C. Cain,
+    Direct-Detection LADAR Systems, SPIE 2010, chapter 1.
     """
     shape, (part, distance, bright) = broadcast_flat(
         share=not_negative("share", share),
@@ -150,27 +86,10 @@ def shots_on_target(
 ) -> Any:
     """Return how many shots of a scan meet a target in the mean, each with its whole share.
 
-    The larger of the target and the beam, over the solid angle of a shot. What a beam meets with
-    its edge alone is not counted as a shot of its own: shots times share times the disc is the
-    target's area whatever the beam, so that no light is made.
-
-    Parameters
-    ----------
-    area_rad2 : array_like, sr
-        Solid angle of the target; of a wire, its length by its thickness.
-    beam_area_rad2 : array_like, sr
-        Of the beam's disc, π θ² / 4; along a wire, its length by π θ / 4.
-    spacing_rad2 : array_like, sr
-        From shot to shot, both ways.
-
-    Returns
-    -------
-    array of the broadcast shape
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
+    The larger of the target and the beam, over the solid angle of a shot (sr). What a beam meets
+    with its edge alone is not counted as a shot of its own: shots times share times the disc is the
+    target's area whatever the beam, so that no light is made. Of a wire, the target is its length
+    by its thickness and the beam its length by π θ / 4.
     """
     shape, (target, beam, each) = broadcast_flat(
         area_rad2=not_negative("area_rad2", area_rad2),
@@ -185,32 +104,11 @@ def scan_detection_probability(
 ) -> Any:
     """Return the probability that a scan detects a target.
 
-    Each shot that meets it is detected where its amplitude with Gaussian noise reaches the
-    threshold, Q(threshold - SNR), and `needed` of them must be. Where the mean number of shots is
-    not whole, the pattern's phase says whether there is one more: it is even from scan to scan.
+    Each shot that meets it is detected where its amplitude (over the noise's standard deviation, of
+    optical power) with Gaussian noise reaches the threshold, Q(threshold - SNR), and `needed` of
+    them must be. Where the mean number of shots is not whole, the pattern's phase says whether
+    there is one more: it is even from scan to scan.
 
-    Parameters
-    ----------
-    snr : array_like
-        Amplitude over the noise's standard deviation (of optical power, not of its square).
-    shots : array_like
-        Mean number of shots that meet the target, 0 or more.
-    threshold : float
-        In standard deviations of noise.
-    needed : int
-        Shots that must be detected, 1 or more.
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-
-    Notes
-    -----
     Direct detection of a pulse in the noise of the receiver: Richmond and Cain, chapter 3. Speckle
     is left out: an aperture of many speckles averages it, and so does a wide band.
     """

@@ -22,16 +22,15 @@ from components.optical.detection import detection_probability, deviations_excee
 from components.optical.weather_effects import obscuration
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
-from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
-from components.sensor.ladder_values import over_cells
+from components.sensor.cued_looks import refuse_cues
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
-from dsa_des.block.wake import Wake
 
 _PD = Quantity("detection_probability", "Pd")
 # So many standard deviations of noise are no more than any laser's echo.
@@ -118,25 +117,6 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
 EXTINCTION = Hook("extinction", float, "extinction by the air at the laser's wavelength, 1/m")
 
 
-class LaserExtinction(Effect[float]):
-    """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
-
-    lockstep = True
-    name = "laser extinction"
-    acts_on = EXTINCTION
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather]`` for a visibility, fog or rain."""
-        per_m = _extinction_per_m(block)
-        if not per_m:
-            return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
-        return Verdict(True, f"[weather] takes {per_m * 1e4 / math.log(10.0):.3g} dB/km")
-
-    def build(self, block: Any) -> float:
-        """Return the extinction, 1/m."""
-        return _extinction_per_m(block)
-
-
 def _extinction_per_m(block: Any) -> float:
     haze_m, rain_per_m = obscuration(block.context.sections["weather"])
     if haze_m is None:
@@ -145,17 +125,27 @@ def _extinction_per_m(block: Any) -> float:
     return rain_per_m + KOSCHMIEDER / haze_m * share
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of detection at every (scan, target); a boundary sees all within."""
-    sensor: Any = block
+class LaserExtinction(Effect[float]):
+    """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
 
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        if isinstance(sensor, ScanningLaser):
-            return {_PD.name: sensor.detection_probability(cells)}
-        return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
+    lockstep = True
+    name = "laser extinction"
+    acts_on = EXTINCTION
+    builds = _extinction_per_m
 
-    found: dict[str, AnyArray] = dict(over_cells(sensor, wake, values, out_of_range=0.0))
-    return found
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather]`` for a visibility, fog or rain."""
+        per_m = _extinction_per_m(block)
+        if not per_m:
+            return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
+        return Verdict(True, f"[weather] takes {per_m * 1e4 / math.log(10.0):.3g} dB/km")
+
+
+def _pd(sensor: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return each cell's probability of detection; a boundary sees all within."""
+    if isinstance(sensor, ScanningLaser):
+        return {_PD.name: sensor.detection_probability(cells)}
+    return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
 
 
 def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
@@ -177,7 +167,7 @@ SHOTS = Ladder(
     ),
     "scanned",
     (_PD,),
-    measure,
+    measure_cells(_pd, out_of_range=0.0),
 )
 
 

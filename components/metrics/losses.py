@@ -11,7 +11,7 @@ import numpy as np
 
 from components.flights.closest_approach import (
     Approaches,
-    OwnTimes,
+    KnownTimes,
     RegularTimes,
     SampleTimes,
     closest_approaches,
@@ -180,7 +180,7 @@ def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]
     grids: dict[tuple[float, float], list[int]] = {}
     for number, flight in enumerate(flights):
         grids.setdefault((flight.step_s, flight.grid_end_s), []).append(number)
-    own_samples = OwnTimes([flight.sample_times_s() for flight in flights])
+    own_samples = KnownTimes(*(flight.sample_times_s() for flight in flights))
     ends_s = np.array([flight.grid_end_s for flight in flights])
     every = np.arange(len(flights))
     looks: list[tuple[IntArray, SampleTimes]] = [(every, own_samples)]

@@ -1,8 +1,8 @@
 """The error model of the ownship's own position and attitude, as it believes them.
 
-A constant bias and white noise on what the navigation system reports, as TECVOL simulated it
-(thesis section 2.3.1). Pure functions of standard normal numbers, which the block draws with its
-own keys.
+A constant bias, and noise that is white or lasts, on what the navigation system reports, as TECVOL
+simulated it (thesis section 2.3.1). Errors of attitude are those of the reported angles, as a data
+sheet states them, not of the axes; a pitch beyond ±90° means what its rotation means.
 """
 
 from __future__ import annotations
@@ -42,99 +42,45 @@ from dsa_des.time.gauss_markov import GaussMarkov
 LARGEST_POSITION_ERROR_M = 100_000.0
 
 
-def position_with_error(
+def displaced_position(
     lat_deg: ArrayLike,
     lon_deg: ArrayLike,
     alt_m: ArrayLike,
-    *,
-    bias_north_east_down_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    sigma_north_east_down_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    normals: tuple[ArrayLike, ArrayLike, ArrayLike] = (0.0, 0.0, 0.0),
+    north_m: ArrayLike,
+    east_m: ArrayLike,
+    down_m: ArrayLike,
 ) -> tuple[Any, Any, Any]:
-    """Return the position that the ownship believes it has.
+    """Return positions moved by an error of at most 100 km in each of their own axes.
 
     The displacement is an arc along a sphere with the local radii of the ellipsoid, so it also
     works across a pole. Against a straight displacement in the tangent plane an error of 10 m
     comes out 0.1 µm off horizontally and, as it follows the Earth, 8 µm lower (100 m: 8 µm and
-    0.8 mm), at any latitude.
+    0.8 mm), at any latitude. Where an error is 0 every bit stays.
     """
-    north, east, down = _errors(
-        "north_east_down_m", bias_north_east_down_m, sigma_north_east_down_m, normals
-    )
-    shape, (lat, lon, alt, north, east, down) = broadcast_flat(
-        lat_deg=finite("lat_deg", lat_deg),
-        lon_deg=finite("lon_deg", lon_deg),
-        alt_m=finite("alt_m", alt_m),
-        north=north,
-        east=east,
-        down=down,
+    given = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m,
+             "north_m": north_m, "east_m": east_m, "down_m": down_m}  # fmt: skip
+    shape, (lat, lon, alt, *errors) = broadcast_flat(
+        **{name: finite(name, value) for name, value in given.items()}
     )
     require_between("lat_deg", lat, -90.0, 90.0, "lie in [-90, 90] degrees")
-    require_between(
-        "alt_m",
-        alt,
-        LOWEST_ALTITUDE_M,
-        HIGHEST_ALTITUDE_M,
-        f"lie in [{LOWEST_ALTITUDE_M:g}, {HIGHEST_ALTITUDE_M:g}] metres",
-    )
-    for error in (north, east, down):
-        require_between(
-            "position error",
-            error,
-            -LARGEST_POSITION_ERROR_M,
-            LARGEST_POSITION_ERROR_M,
-            f"be within ±{LARGEST_POSITION_ERROR_M:g} m",
-        )
+    lowest, highest = LOWEST_ALTITUDE_M, HIGHEST_ALTITUDE_M
+    require_between("alt_m", alt, lowest, highest, f"lie in [{lowest:g}, {highest:g}] metres")
+    most = LARGEST_POSITION_ERROR_M
+    for error in errors:
+        require_between("position error", error, -most, most, f"be within ±{most:g} m")
+    north, east, down = errors
     new_lat, new_lon = _displaced(lat, lon, alt - down, north, east)
     stays = (north == 0.0) & (east == 0.0)
     return (
         unflatten(np.where(stays, lat, new_lat), shape),
         unflatten(np.where(stays, lon, new_lon), shape),
-        unflatten(np.where(down == 0.0, alt, alt - down), shape),
+        unflatten(_off(alt, -down), shape),
     )
 
 
-def attitude_with_error(
-    yaw_rad: ArrayLike,
-    pitch_rad: ArrayLike,
-    roll_rad: ArrayLike,
-    *,
-    bias_rad: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    sigma_rad: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    normals: tuple[ArrayLike, ArrayLike, ArrayLike] = (0.0, 0.0, 0.0),
-) -> tuple[Any, Any, Any]:
-    """Return the attitude that the ownship believes it has.
-
-    The error is one of the reported angles, as a data sheet states it, not of the axes; a pitch
-    beyond ±90° means what its rotation means.
-    """
-    errors = _errors("rad", bias_rad, sigma_rad, normals)
-    truth = {"yaw_rad": yaw_rad, "pitch_rad": pitch_rad, "roll_rad": roll_rad}
-    shape, flat = broadcast_flat(
-        **{name: finite(name, value) for name, value in truth.items()},
-        **{f"error of {name}": error for name, error in zip(truth, errors, strict=True)},
-    )
-    yaw, pitch, roll = (
-        unflatten(np.where(error == 0.0, angle, angle + error), shape)
-        for angle, error in zip(flat[:3], flat[3:], strict=True)
-    )
-    return yaw, pitch, roll
-
-
-def _errors(
-    unit: str,
-    bias: tuple[float, float, float],
-    sigma: tuple[float, float, float],
-    normals: tuple[ArrayLike, ArrayLike, ArrayLike],
-) -> list[FloatArray]:
-    errors = []
-    for axis_bias, axis_sigma, normal in zip(bias, sigma, normals, strict=True):
-        offset = float(finite(f"bias_{unit}", axis_bias))
-        spread = float(finite(f"sigma_{unit}", axis_sigma))
-        if spread < 0.0:
-            raise ValueError(f"sigma_{unit} is {spread:g}: it must be 0 or more")
-        errors.append(np.asarray(offset + spread * finite("normals", normal)))
-    return errors
+def _off(value: FloatArray, error: FloatArray) -> FloatArray:
+    """Return values that are off by errors; every bit stays where there is none."""
+    return np.where(error == 0.0, value, value + error)
 
 
 def _displaced(
@@ -171,7 +117,7 @@ OWNSHIP = Hook("ownship", Believing, "what the ownship believes of itself, by na
 Three = tuple[float, float, float]
 
 _SCAN_BITS = 48
-#: Whose processes they are.
+#: Key of the ownship's processes.
 _OWNSHIP = np.uint64(0)
 #: Nearer to the vertical azimuths say nothing.
 _LEAST_COS = 1e-3
@@ -223,9 +169,9 @@ class _Navigation(Effect[Built]):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[navigation]``."""
-        found = _errors_of(block.context)
-        if found:
-            return Verdict(True, f"[navigation] {' and '.join(found)}")
+        errors = _errors_of(block.context)
+        if errors:
+            return Verdict(True, f"[navigation] {' and '.join(errors)}")
         return Verdict(False, "[navigation] has no bias and no noise")
 
 
@@ -242,11 +188,12 @@ class NavigationErrors(_Navigation[Believing]):
         the instant, not by the block.
         """
         navigation = block.context.sections["navigation"]
-        stream = block.context.streams.stream("[navigation]", "errors")
-        attitude_bias = _radians(navigation.attitude_bias_deg)
-        attitude_noise = _radians(navigation.attitude_noise_deg)
+        streams = block.context.streams
+        stream = streams.stream("[navigation]", "errors")
+        bias = (*navigation.position_bias_m, *_radians(navigation.attitude_bias_deg))
+        noise = (*navigation.position_noise_m, *_radians(navigation.attitude_noise_deg))
         lasting = [
-            GaussMarkov(block.context.streams.stream("[navigation]", f"lasting {name}"), lasts_s)
+            GaussMarkov(streams.stream("[navigation]", f"lasting {name}"), lasts_s)
             if lasts_s
             else None
             for name, lasts_s in (
@@ -261,32 +208,20 @@ class NavigationErrors(_Navigation[Believing]):
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
             drawn = stream.of_runs(states.run)
-            draws = [
-                drawn.normal(high, low, draw)
-                if (process := lasting[draw // 3]) is None
-                else process(_OWNSHIP, instant, draw % 3, states.run)
-                for draw in range(6)
-            ]
-            lat, lon, alt = position_with_error(
-                states.own_lat_deg,
-                states.own_lon_deg,
-                states.own_alt_m,
-                bias_north_east_down_m=navigation.position_bias_m,
-                sigma_north_east_down_m=navigation.position_noise_m,
-                normals=(draws[0], draws[1], draws[2]),
+            errors = []
+            for number in range(6):
+                process = lasting[number // 3]
+                if process is None:
+                    normal = drawn.normal(high, low, number)
+                else:
+                    normal = process(_OWNSHIP, instant, number % 3, states.run)
+                errors.append(bias[number] + noise[number] * normal)
+            position = displaced_position(
+                states.own_lat_deg, states.own_lon_deg, states.own_alt_m, *errors[:3]
             )
-            yaw, pitch, roll = attitude_with_error(
-                states.own_yaw_rad,
-                states.own_pitch_rad,
-                states.own_roll_rad,
-                bias_rad=attitude_bias,
-                sigma_rad=attitude_noise,
-                normals=(draws[3], draws[4], draws[5]),
-            )
-            return {
-                "lat_deg": lat, "lon_deg": lon, "alt_m": alt,
-                "yaw_rad": yaw, "pitch_rad": pitch, "roll_rad": roll,
-            }  # fmt: skip
+            attitude = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
+            names = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+            return dict(zip(names, (*position, *map(_off, attitude, errors[3:])), strict=True))
 
         return believed
 

@@ -30,10 +30,10 @@ from components.optical.detector import (
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import DARKNESS, Visibility
-from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
-from components.sensor.look import CUE, Cells, CellValues, Look
+from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
+from components.sensor.look import Cells, CellValues, Look
 from components.sensor.parameters import GlintParameters, SensorParameters
-from components.sensor.sensor import Sensor
+from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
 

@@ -13,12 +13,12 @@ from components.optical.contrast import Background
 from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
-from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.cued_looks import refuse_cues
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look, turned_to_sight
 from components.sensor.marks import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
-from components.sensor.sensor import Sensor
+from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable

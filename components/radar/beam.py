@@ -22,7 +22,7 @@ from components.messages.targets import GatedTargets, RelativeTargets
 from components.sensor.look import Cells, CellValues
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.effect import Effect, Hook, Verdict
+from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.message import Message, per_row
 
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding
@@ -138,56 +138,9 @@ def _into_sweep(angle: FloatArray, width: float) -> FloatArray:
     return np.where(past_the_end, np.where(nearer_to_start, 0.0, width), angle)
 
 
-class BeamSweep(Effect[Reporting]):
-    """A beam that sweeps once per scan lights each target at an instant of its own.
-
-    Everything about a target is then that of this instant: whether it is in reach, its SNR, its
-    measured and true position. A target that the beam does not meet counts as outside the field of
-    view. ``illuminated_s`` is what the radar knows of the instant: when its beam pointed to the
-    azimuth that was measured. The ownship's pose is of that instant too; the error of its
-    navigation is that of the scan's start.
-    """
-
-    name = "beam sweep"
-    acts_on = REPORT
-    lockstep = True
-    outside_the_proof = "it fills a column that is null without it"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``beam_sweep``."""
-        return Verdict.of_flag(block.p, "beam_sweep")
-
-    def build(self, block: Any) -> Sweep:
-        """Return the sweep of this radar's beam."""
-        return Sweep(block)
-
-
 BEAM_SHAPE = Hook(
     "beam shape", CellValues, "share of a target's echo that is left off the beam's axis"
 )
-
-
-class BeamShape(Effect[CellValues]):
-    """Beam-shape loss of a target off the axis: between beam positions, or the mean of a sweep.
-
-    The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
-    target is looked at by the nearest. A beam that sweeps passes over it in azimuth: its pulses
-    then have the mean gain within the half-power width. Both ways, of a Gaussian beam. A cue's
-    beam points at its target.
-    """
-
-    name = "beam shape"
-    acts_on = BEAM_SHAPE
-    lockstep = True
-    outside_the_proof = "no target is amid every beam"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``beam_shape_loss``."""
-        return Verdict.of_flag(block.p, "beam_shape_loss")
-
-    def build(self, block: Any) -> OffAxis:
-        """Return what gives the share of a target's echo that is left."""
-        return OffAxis(block)
 
 
 class OffAxis:
@@ -217,6 +170,23 @@ class OffAxis:
         else:
             left = left * two_way_gain(off_nearest(swept, *self._columns[1:]), self._beam_rad[0])
         return np.where(cells.is_cued(), 1.0, left)
+
+
+class BeamShape(Effect[CellValues]):
+    """Beam-shape loss of a target off the axis: between beam positions, or the mean of a sweep.
+
+    The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
+    target is looked at by the nearest. A beam that sweeps passes over it in azimuth: its pulses
+    then have the mean gain within the half-power width. Both ways, of a Gaussian beam. A cue's
+    beam points at its target.
+    """
+
+    name = "beam shape"
+    acts_on = BEAM_SHAPE
+    flag = "beam_shape_loss"
+    builds = OffAxis
+    lockstep = True
+    outside_the_proof = "no target is amid every beam"
 
 
 @dataclass(eq=False)
@@ -319,6 +289,24 @@ class Sweep:
             known, now = before[name][:, 0], then[name][:, 0]
             moved[column] = np.where(belief == known, now, belief + (now - known))
         return moved
+
+
+class BeamSweep(Effect[Reporting]):
+    """A beam that sweeps once per scan lights each target at an instant of its own.
+
+    Everything about a target is then that of this instant: whether it is in reach, its SNR, its
+    measured and true position. A target that the beam does not meet counts as outside the field of
+    view. ``illuminated_s`` is what the radar knows of the instant: when its beam pointed to the
+    azimuth that was measured. The ownship's pose is of that instant too; the error of its
+    navigation is that of the scan's start.
+    """
+
+    name = "beam sweep"
+    acts_on = REPORT
+    flag = "beam_sweep"
+    builds = Sweep
+    lockstep = True
+    outside_the_proof = "it fills a column that is null without it"
 
 
 class SweepingSensor(Sensor):

@@ -207,23 +207,6 @@ class RangeRates(Protocol):
 RANGE_RATE = Hook("range rate", RangeRates, "rate of some cells' slant range, m/s")
 
 
-class RangeRate(Effect[RangeRates]):
-    """Rate of the slant range between the two aircraft, as they fly."""
-
-    lockstep = True
-    name = "range rate"
-    acts_on = RANGE_RATE
-    outside_the_proof = "it fills columns that are null without it"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``measures_range_rate``."""
-        return Verdict.of_flag(block.p, "measures_range_rate")
-
-    def build(self, block: Any) -> RangeRates:
-        """Return what gives the rates of some cells."""
-        return range_rates
-
-
 def range_rates(cells: Cells, detected: IntArray) -> FloatArray:
     """Return the rate of the slant range of some cells, m/s, positive when it opens.
 
@@ -233,6 +216,20 @@ def range_rates(cells: Cells, detected: IntArray) -> FloatArray:
     """
     (rate,) = _rates_of(cells, detected, lambda seen, times: (seen["range_m"],))
     return rate
+
+
+class RangeRate(Effect[RangeRates]):
+    """Rate of the slant range between the two aircraft, as they fly."""
+
+    lockstep = True
+    name = "range rate"
+    acts_on = RANGE_RATE
+    flag = "measures_range_rate"
+    outside_the_proof = "it fills columns that are null without it"
+
+    def build(self, block: Any) -> RangeRates:
+        """Return what gives the rates of some cells."""
+        return range_rates
 
 
 def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
@@ -347,13 +344,10 @@ class DopplerFilter(Effect[DopplerProcessing]):
     lockstep = True
     name = "moving target filter"
     acts_on = DOPPLER
+    builds = DopplerProcessing
     outside_the_proof = "every filter takes something from a target"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``moving_target_filter``."""
         kind = block.p.moving_target_filter
         return Verdict(kind != "none", f"moving_target_filter is {kind!r}")
-
-    def build(self, block: Any) -> DopplerProcessing:
-        """Return what gives the gains."""
-        return DopplerProcessing(block)

@@ -19,7 +19,7 @@ from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terr
 from components.radar.measurement import FAINTEST
 from components.radar.rain import RainClutter
 from components.radar.resolution import cell_size, cells_of_radar
-from components.sensor.look import CUE
+from components.sensor.cued_looks import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -43,33 +43,6 @@ class Alarms:
     where: Mapping[str, FloatArray]
     snr: FloatArray
     rate: FloatArray
-
-
-class FalseAlarms(Effect[Reporting]):
-    """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
-
-    Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
-    there. Every resolution cell from the minimum range to ``range_km`` may bring one. They are
-    reported as targets are, with no target and nothing true; detections of a scan stand by what
-    was measured of them. Where there are some, ``snr_db`` and ``confidence`` are of the output
-    that crossed the threshold, for targets too (`MeasuredStrength`), and
-    ``detection_probability`` is null for all (``looks`` has it).
-    """
-
-    lockstep = True
-    name = "false alarms"
-    acts_on = REPORT
-    outside_the_proof = "a report without false alarms is what there is without it"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, and whether the radar is switched on."""
-        if block.p.false_alarms and not block.p.enabled:
-            return Verdict(False, "enabled is false")
-        return Verdict.of_flag(block.p, "false_alarms")
-
-    def build(self, block: Any) -> "NoiseReports":
-        """Return what adds false alarms to a report."""
-        return NoiseReports(block)
 
 
 class NoiseReports:
@@ -150,6 +123,30 @@ class NoiseReports:
         return self._block.with_noise_reports(detections, targets, rows, alarms, cued=cued)
 
 
+class FalseAlarms(Effect[Reporting]):
+    """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
+
+    Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
+    there. Every resolution cell from the minimum range to ``range_km`` may bring one. They are
+    reported as targets are, with no target and nothing true; detections of a scan stand by what
+    was measured of them. Where there are some, ``snr_db`` and ``confidence`` are of the output
+    that crossed the threshold, for targets too (`MeasuredStrength`), and
+    ``detection_probability`` is null for all (``looks`` has it).
+    """
+
+    lockstep = True
+    name = "false alarms"
+    acts_on = REPORT
+    builds = NoiseReports
+    outside_the_proof = "a report without false alarms is what there is without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, and whether the radar is switched on."""
+        if block.p.false_alarms and not block.p.enabled:
+            return Verdict(False, "enabled is false")
+        return Verdict.of_flag(block.p, "false_alarms")
+
+
 def _between(uniform: Any, field: tuple[float, float]) -> Any:
     start, width = field
     return start + width * uniform
@@ -157,39 +154,6 @@ def _between(uniform: Any, field: tuple[float, float]) -> Any:
 
 #: Keys of the ground's errors, beyond those of noise.
 _OF_GROUND = np.uint64(2**41)
-
-
-class ClutterAlarms(Effect[Reporting]):
-    """Reports of cells in which the ground crosses the threshold that noise does not.
-
-    With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
-    ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
-    be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
-    where the radar truly looks; behind a moving-target filter none is reported. Rain and what
-    sidelobes meet cross it in every cell.
-    """
-
-    lockstep = True
-    name = "clutter false alarms"
-    acts_on = REPORT
-    outside_the_proof = "a report without the ground is what there is without it"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
-        p = block.p
-        if not (p.false_alarms and p.enabled):
-            return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
-        if terrain_of(block) is None and not RainClutter().verdict(block).simulated:
-            return Verdict(False, "[terrain] height_m is not given, and rain has no echo")
-        if p.clutter_threshold != "noise":
-            return Verdict(False, "clutter_threshold is 'adaptive': they are as many as of noise")
-        if p.moving_target_filter != "none":
-            return Verdict(False, f"moving_target_filter is {p.moving_target_filter!r}")
-        return Verdict(True, "clutter_threshold is 'noise'")
-
-    def build(self, block: Any) -> "GroundReports":
-        """Return what adds the ground's false alarms to a report."""
-        return GroundReports(block)
 
 
 class _CellsWithoutTarget:
@@ -348,6 +312,36 @@ class GroundReports:
             noise_threshold=self._crossing.threshold,
         )
         return pfa, clutter.total
+
+
+class ClutterAlarms(Effect[Reporting]):
+    """Reports of cells in which the ground crosses the threshold that noise does not.
+
+    With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
+    ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
+    be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
+    where the radar truly looks; behind a moving-target filter none is reported. Rain and what
+    sidelobes meet cross it in every cell.
+    """
+
+    lockstep = True
+    name = "clutter false alarms"
+    acts_on = REPORT
+    builds = GroundReports
+    outside_the_proof = "a report without the ground is what there is without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
+        p = block.p
+        if not (p.false_alarms and p.enabled):
+            return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
+        if terrain_of(block) is None and not RainClutter().verdict(block).simulated:
+            return Verdict(False, "[terrain] height_m is not given, and rain has no echo")
+        if p.clutter_threshold != "noise":
+            return Verdict(False, "clutter_threshold is 'adaptive': they are as many as of noise")
+        if p.moving_target_filter != "none":
+            return Verdict(False, f"moving_target_filter is {p.moving_target_filter!r}")
+        return Verdict(True, "clutter_threshold is 'noise'")
 
 
 #: Noise above the threshold in one look of a hundred is more than any radar's operator bears.

@@ -235,9 +235,9 @@ class GroundClutter(Effect[Echo]):
     """Echo of flat terrain in the cell of each target, where the beam meets it.
 
     The beam points at the target and is as wide as a resolution cell, unless the scene gives its
-    beamwidths; clutter more than two beamwidths off its axis is 0. The air takes from the echo of
-    the ground what it takes from the target's. What the threshold does there is said by
-    ``clutter_threshold``.
+    beamwidths; clutter more than two beamwidths off its axis is 0. A range boundary whose cells
+    have no size hears none. The air takes from the echo of the ground what it takes from the
+    target's. What the threshold does there is said by ``clutter_threshold``.
     """
 
     lockstep = True
@@ -249,12 +249,14 @@ class GroundClutter(Effect[Echo]):
         terrain = terrain_of(block)
         if terrain is None:
             return Verdict(False, "[terrain] height_m is not given")
+        if block.boundary and block.p.sizeless_steps:
+            return Verdict(False, f"{block.p.sizeless_steps[0]} is 0: no cell, no ground in it")
         return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
 
     def build(self, block: Any) -> Echo:
         """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
         terrain = terrain_of(block)
-        if terrain is None:
+        if not self.verdict(block).simulated:
             return NoEcho(block)
         if block.p.sizeless_steps:
             raise ValueError(
@@ -278,25 +280,6 @@ class GroundClutter(Effect[Echo]):
                 "fluctuates; leave one of them out"
             )
         return GroundEcho(block, terrain)
-
-
-class BoundaryClutter(GroundClutter):
-    """The same for a range boundary, which hears the ground if its cells have a size."""
-
-    lockstep = True
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] height_m``, and for a cell."""
-        found = super().verdict(block)
-        if found.simulated and block.p.sizeless_steps:
-            return Verdict(False, f"{block.p.sizeless_steps[0]} is 0: no cell, no ground in it")
-        return found
-
-    def build(self, block: Any) -> Echo:
-        """Return each cell's ground clutter; 0 where the verdict was that there is none."""
-        if not self.verdict(block).simulated:
-            return NoEcho(block)
-        return super().build(block)
 
 
 def terrain_of(block: Any) -> Any:

@@ -208,31 +208,6 @@ def _range_rate_resolution_m_s(p: Any) -> float | None:
 FAINTEST = 1e-6
 
 
-class MeasuredStrength(Effect[Strengthening]):
-    """A target's echo is known as noise is: by how strong it came out.
-
-    SNR and confidence of a detection are those of the output that crossed the threshold, by the
-    target's own fluctuation and the noise of that look; errors by signal follow from that output
-    too. The probability of detection, which only the truth gives, is left out; ``looks`` has what
-    decided. Where the draw of a look decides, the same draw says how strong it came out.
-    """
-
-    lockstep = True
-    name = "measured strength"
-    acts_on = STRENGTH
-    outside_the_proof = "a radar always measures strength"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask whether the radar is switched on."""
-        if not block.p.enabled:
-            return Verdict(False, "enabled is false")
-        return Verdict(True, "a radar measures strength as it measures places")
-
-    def build(self, block: Any) -> "Strength":
-        """Return what measures the strength of detections."""
-        return Strength(block)
-
-
 class Strength:
     """Gives the output that crossed the threshold."""
 
@@ -280,6 +255,28 @@ class Strength:
         )
 
 
+class MeasuredStrength(Effect[Strengthening]):
+    """A target's echo is known as noise is: by how strong it came out.
+
+    SNR and confidence of a detection are those of the output that crossed the threshold, by the
+    target's own fluctuation and the noise of that look; errors by signal follow from that output
+    too. The probability of detection, which only the truth gives, is left out; ``looks`` has what
+    decided. Where the draw of a look decides, the same draw says how strong it came out.
+    """
+
+    lockstep = True
+    name = "measured strength"
+    acts_on = STRENGTH
+    builds = Strength
+    outside_the_proof = "a radar always measures strength"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask whether the radar is switched on."""
+        if not block.p.enabled:
+            return Verdict(False, "enabled is false")
+        return Verdict(True, "a radar measures strength as it measures places")
+
+
 def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
     """Return which of some cells are among the chosen ones."""
     inside = np.zeros(count, dtype=bool)
@@ -308,11 +305,8 @@ class OwnVelocity(Effect[Reporting]):
     lockstep = True
     name = "own velocity"
     acts_on = REPORT
+    flag = "measures_range_rate"
     outside_the_proof = "it fills columns that are null without it"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``measures_range_rate``."""
-        return Verdict.of_flag(block.p, "measures_range_rate")
 
     def build(self, block: Any) -> Reporting:
         """Return what adds the velocity to a report."""

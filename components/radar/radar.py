@@ -26,8 +26,8 @@ from components.radar.doppler import (
 )
 from components.radar.ground_clutter import (
     CLUTTER,
-    BoundaryClutter,
     Echo,
+    GroundClutter,
     clutter_as_signal,
     terrain_of,
 )
@@ -45,9 +45,10 @@ from components.radar.weather import (
     weather_without_carrier,
 )
 from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
-from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
+from components.sensor.cued_looks import refuse_cues
 from components.sensor.look import Cells, CellValues, Look
 from components.sensor.marks import RADAR
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -63,7 +64,11 @@ class Radar(SweepingSensor):
     measures_range = True
     #: Of the carrier, m; None where it is not known.
     wavelength_m: float | None = None
-    hooks: ClassVar[tuple[Hook[Any], ...]] = (SNR, DOPPLER, RANGE_RATE, ONE_REPORT)
+    #: Whether a range stands for the link budget; ground is then heard in cells with a size only.
+    boundary: ClassVar[bool] = False
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (
+        SNR, DOPPLER, RANGE_RATE, ONE_REPORT, CLUTTER, REFERENCE_CELLS,
+    )  # fmt: skip
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
 
@@ -78,6 +83,9 @@ class Radar(SweepingSensor):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellValues] = []
+        #: What gives an echo beside the target.
+        self.echoes: list[Echo] = []
+        self.cfar: Averaging | None = None
         self._merging: Merging | None = None
         self.doppler: DopplerProcessing | None = None
 
@@ -85,11 +93,22 @@ class Radar(SweepingSensor):
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built(SNR)
         self.doppler = self.built_one(DOPPLER)
+        self.echoes = self.built(CLUTTER)
+        self.cfar = self.built_one(REFERENCE_CELLS)
         self._merging = self.built_one(ONE_REPORT)
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
+
+    def filtered(
+        self, cells: Cells, signal: FloatArray, beside: list[FloatArray]
+    ) -> tuple[FloatArray, list[FloatArray]]:
+        """Return powers of targets and of the echoes behind the filter, where there is one."""
+        if self.doppler is None:
+            return signal, beside
+        passed, residues = self.doppler(cells, self.echoes)
+        return signal * passed, [power * left for power, left in zip(beside, residues, strict=True)]
 
     def request(self, port: str) -> Any:
         """Ask for the targets in our reach, and how they go on where rates are of interest."""
@@ -257,12 +276,12 @@ class RangeBoundary(Radar):
     Parameters = RangeBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
-    hooks = (CLUTTER, REFERENCE_CELLS)
+    boundary = True
     effects = (
         *WEATHER_EFFECTS,
         BlindRange(),
         LaterAcquisition(),
-        BoundaryClutter(),
+        GroundClutter(),
         RainClutter(),
         SidelobeClutter(),
         DopplerFilter(),
@@ -271,20 +290,16 @@ class RangeBoundary(Radar):
         BeamSweep(),
     )
     ladders = (DETECTION,)
-    _cfar: Averaging | None = None
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         frequency_hz = parameters.frequency_hz
-        self._echoes: list[Echo] = []
         self.wavelength_m = None if frequency_hz is None else float(wavelength(frequency_hz))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""
         super().setup()
         refuse_cues(self)
-        self._echoes = self.built(CLUTTER)
-        self._cfar = self.built_one(REFERENCE_CELLS)
 
     def request(self, port: str) -> Any:
         """Ask how targets go on too, where their speed decides who is acquired."""
@@ -313,7 +328,7 @@ class RangeBoundary(Radar):
             through = through * factor(cells)
         audible = through > 0.0
         lossy = bool((through[audible] != 1.0).any())
-        if lossy or self._echoes or not (self._cfar is self.doppler is None):
+        if lossy or self.echoes or not (self.cfar is self.doppler is None):
             margin_db = self._margin_db(cells, margin_db, np.where(audible, through, 1.0))
             detected = margin_db >= 0.0
         detected &= audible
@@ -327,14 +342,10 @@ class RangeBoundary(Radar):
         """Return the margin over what is in the cell, in dB, from that over noise."""
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
-        signal, alone = through, 10.0 ** (-0.1 * over_noise_db)
-        noise = alone
-        residues: Any = [1.0] * len(self._echoes)
-        if self.doppler is not None:
-            passed, residues = self.doppler(cells, self._echoes)
-            signal = through * passed
-        for echo, residue in zip(self._echoes, residues, strict=True):
-            clutter = through * residue * echo(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
+        noise = alone = 10.0 ** (-0.1 * over_noise_db)
+        signal, beside = self.filtered(cells, through, [through] * len(self.echoes))
+        for echo, left in zip(self.echoes, beside, strict=True):
+            clutter = left * echo(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
             if p.clutter_threshold == "noise":
                 signal = signal + clutter
             else:
@@ -342,6 +353,6 @@ class RangeBoundary(Radar):
         # Where nothing is added, no bit is: that margin is the one over noise.
         same = (signal == 1.0) & (noise == alone)
         margin_db: FloatArray = np.where(same, over_noise_db, 10.0 * np.log10(signal / noise))
-        if self._cfar is not None:
-            margin_db = margin_db - self._cfar.loss_db(p.boundary_pd, "swerling1")
+        if self.cfar is not None:
+            margin_db = margin_db - self.cfar.loss_db(p.boundary_pd, "swerling1")
         return margin_db

@@ -44,18 +44,10 @@ class ResolutionCells:
     @classmethod
     def filling(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
         """Return the grid of cells (rad, rad, m) of a reach, or refuse over 1e15 of them."""
-        across_rad, upward_rad = reach.width_rad
-        depth_m = reach.range_max_m - nearest_m
-        widths = (across_rad, upward_rad, depth_m)
+        firsts = reach.azimuth_rad[0], reach.elevation_rad[0], nearest_m
+        widths = *reach.width_rad, reach.range_max_m - nearest_m
         azimuth, elevation, depth = map(steps_across, widths, cell)
-        cells = cls(
-            azimuth,
-            elevation,
-            depth,
-            azimuth_rad=(reach.azimuth_rad[0], across_rad),
-            elevation_rad=(reach.elevation_rad[0], upward_rad),
-            range_m=(nearest_m, depth_m),
-        )
+        cells = cls(azimuth, elevation, depth, *zip(firsts, widths, strict=True))
         if cells.count > MOST_CELLS:
             raise ValueError(
                 f"the field of view has {cells.count:g} resolution cells: it must have at most "
@@ -231,6 +223,7 @@ class OneReportByCell(Effect[Merging]):
     lockstep = True
     name = "resolution cells"
     acts_on = ONE_REPORT
+    builds = Merging
     outside_the_proof = "without it every target has a report of its own"
 
     def verdict(self, block: Any) -> Verdict:
@@ -241,7 +234,3 @@ class OneReportByCell(Effect[Merging]):
                 return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
             return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
         return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
-
-    def build(self, block: Any) -> Merging:
-        """Return what adds up the echoes of each cell."""
-        return Merging(block)

@@ -27,7 +27,8 @@ from components.radar.rcs import (
 )
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather import WEATHER_EFFECTS
-from components.sensor.look import CUE, Cells, Look
+from components.sensor.cued_looks import CUE
+from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
 from dsa_des.time.randomness import Stream

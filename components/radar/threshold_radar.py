@@ -13,7 +13,7 @@ from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
 from components.radar.beam import BEAM_SHAPE, BeamShape, BeamSweep
-from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
+from components.radar.detection.cfar import CellAveraging
 from components.radar.detection.ladder import DETECTION, RCS
 from components.radar.detection.probability import required_snr
 from components.radar.detection.threshold import Crossing
@@ -26,9 +26,7 @@ from components.radar.false_alarms import (
     unlikely_false_alarms,
 )
 from components.radar.ground_clutter import (
-    CLUTTER,
     Clutter,
-    Echo,
     GroundClutter,
     clutter_as_signal,
     terrain_of,
@@ -46,8 +44,9 @@ from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_
 from components.radar.resolution import OneReportByCell
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
-from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, cue_warnings
-from components.sensor.look import CUE, Cells, CellValues, Look
+from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
+from components.sensor.look import Cells, CellValues, Look
+from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.wake import Wake
@@ -72,9 +71,7 @@ class LinkBudgetRadar(Radar):
 
     Parameters = LinkBudgetParameters
     inputs = CUED_INPUTS
-    hooks: ClassVar[tuple[Hook[Any], ...]] = (
-        MEAN_RCS, LOOK_ENERGY, CLUTTER, BEAM_SHAPE, REFERENCE_CELLS,
-    )  # fmt: skip
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (MEAN_RCS, LOOK_ENERGY, BEAM_SHAPE)
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
@@ -104,10 +101,7 @@ class LinkBudgetRadar(Radar):
         self._echo_budget = self.budget
         #: Each cell's mean RCS, m².
         self.mean_rcs_m2: CellValues = mean_rcs_m2
-        #: What gives an echo beside the target.
-        self.echoes: list[Echo] = []
         self._beam_shape: CellValues | None = None
-        self.cfar: Averaging | None = None
         self._roster: Roster | None = None
 
     def setup(self) -> None:
@@ -115,9 +109,7 @@ class LinkBudgetRadar(Radar):
         super().setup()
         self._echo_budget = self._without_blind_range()
         self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
-        self.echoes = self.built(CLUTTER)
         self._beam_shape = self.built_one(BEAM_SHAPE)
-        self.cfar = self.built_one(REFERENCE_CELLS)
         if self.built(CUE) and self.p.cued_dwell_factor is not None:
             self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
         self._set_threshold()
@@ -173,10 +165,7 @@ class LinkBudgetRadar(Radar):
         snr, beside = self.snr(cells), [self.echo_snr(cells, echo(cells)) for echo in self.echoes]
         if self._beam_shape is not None:
             snr = snr * self._beam_shape(cells)
-        if self.doppler is not None:
-            passed, residues = self.doppler(cells, self.echoes)
-            snr = snr * passed
-            beside = [cnr * left for cnr, left in zip(beside, residues, strict=True)]
+        snr, beside = self.filtered(cells, snr, beside)
         clutter = Clutter.summed(self.echoes, beside, len(cells)) if self.echoes else None
         return self.resolved(cells, snr), clutter
 

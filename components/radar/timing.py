@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -16,42 +16,16 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
-class BeamPositions:
+class BeamPositions(NamedTuple):
     """How many beams fill a field of view, side by side and one above the other."""
 
     azimuth: int
     elevation: int
 
-    @classmethod
-    def searching(
-        cls, width_rad: tuple[float, float], beamwidth_rad: tuple[float, float], spacing: float
-    ) -> Self:
-        """Return the beam positions that search a field of view, `spacing` beamwidths apart.
-
-        The number of beams is the solid angle searched over that of a beam, ``n_B = (Θ_A Θ_E) /
-        (θ_a θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z. Elsherbeni,
-        *MATLAB Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65. Here each
-        axis is rounded up to whole beams, as a radar steps them. A beam that sweeps goes through
-        one column of beams after the other, so that it lights an azimuth once per scan. At an
-        elevation ε beams one step of azimuth apart overlap by 1 - cos ε more; nobody saves beams
-        by it.
-        """
-        axes = zip(width_rad, beamwidth_rad, strict=True)
-        return cls(*(steps_across(width, spacing * beam) for width, beam in axes))
-
     @property
-    def count(self) -> int:
+    def number(self) -> int:
         """Number of beam positions of a scan."""
         return self.azimuth * self.elevation
-
-    def dwell_s(self, scan_rate_hz: float) -> float:
-        """Return the time for each beam where a scan looks at every one once, s."""
-        return 1.0 / (scan_rate_hz * self.count)
-
-    def highest_rate_hz(self, dwell_s: float) -> float:
-        """Return the scan rate at which each beam has so much time and no more, Hz."""
-        return 1.0 / (dwell_s * self.count)
 
 
 def pulses_in(dwell_s: float, prf_hz: float) -> int:
@@ -59,14 +33,9 @@ def pulses_in(dwell_s: float, prf_hz: float) -> int:
     return math.floor(dwell_s * prf_hz * (1.0 + _ROUNDING))
 
 
-def unambiguous_range_m(prf_hz: float) -> float:
-    """Return the range whose echo comes as the next pulse leaves, c / (2 PRF), m."""
-    return SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
-
-
 def check_unambiguous(prf_hz: float, range_km: float) -> None:
     """Raise ValueError if echoes from a range come after the next pulse has left."""
-    reach_m = unambiguous_range_m(prf_hz)
+    reach_m = SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
     if range_km * 1000.0 > reach_m:
         highest_hz = 1.0 / round_trip_s(range_km * 1000.0)
         raise ValueError(
@@ -169,13 +138,23 @@ class TimeBudgetParameters(ResolutionParameters):
 
     @property
     def beams(self) -> BeamPositions | None:
-        """The beam positions of a scan over the field of view, where beamwidths are given."""
+        """The beam positions that search the field of view, where beamwidths are given.
+
+        Their number is the solid angle searched over that of a beam, ``n_B = (Θ_A Θ_E) / (θ_a
+        θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z. Elsherbeni, *MATLAB
+        Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65. Here each axis is
+        rounded up to whole beams, as a radar steps them. A beam that sweeps goes through one column
+        of beams after the other, so that it lights an azimuth once per scan.
+        """
         if self.azimuth_beamwidth_deg is None or self.elevation_beamwidth_deg is None:
             return None
-        beamwidth_rad = (
-            math.radians(self.azimuth_beamwidth_deg), math.radians(self.elevation_beamwidth_deg),
-        )  # fmt: skip
-        return BeamPositions.searching(self.reach().width_rad, beamwidth_rad, self.beam_spacing)
+        beams_deg = self.azimuth_beamwidth_deg, self.elevation_beamwidth_deg
+        axes = zip(self.reach().width_rad, map(math.radians, beams_deg), strict=True)
+        return BeamPositions(*(steps_across(width, self.beam_spacing * one) for width, one in axes))
+
+    def _dwell_s(self, beams: BeamPositions) -> float:
+        """Return the time for each beam where a scan looks at every one once, s."""
+        return 1.0 / (float(self.scan_rate_hz) * beams.number)
 
     @property
     def stated_dwell_s(self) -> float | None:
@@ -199,7 +178,7 @@ class TimeBudgetParameters(ResolutionParameters):
         beams = self.beams
         if self.budget != "dwell" or beams is None:
             return None
-        dwell_s = beams.dwell_s(float(self.scan_rate_hz))
+        dwell_s = self._dwell_s(beams)
         if self.prf_hz is None or self.stated_pulses is None:
             return LookEnergy(beams, dwell_s, None, dwell_s / (self.dwell_s or dwell_s), 1)
         pulses = pulses_in(dwell_s, self.prf_hz)
@@ -248,15 +227,15 @@ class TimeBudgetParameters(ResolutionParameters):
         if (least := self._least_dwell_s()) is None:
             return
         least_s, what = least
-        available_s = beams.dwell_s(float(self.scan_rate_hz))
+        available_s = self._dwell_s(beams)
         if available_s * (1.0 + 1e-9) < least_s:
             free = "" if self.budget == "dwell" else ", or budget 'free' for a scan without cost"
             raise ValueError(
                 f"scan_rate_hz is {float(self.scan_rate_hz):g}: {beams.azimuth} x "
                 f"{beams.elevation} beams of {least_s:.4g} s ({what}) take "
-                f"{least_s * beams.count:.4g} s, and a scan has "
+                f"{least_s * beams.number:.4g} s, and a scan has "
                 f"{1.0 / float(self.scan_rate_hz):.4g} s; it must be at most "
-                f"{_rounded_down(beams.highest_rate_hz(least_s))}{free}"
+                f"{_rounded_down(1.0 / (least_s * beams.number))}{free}"
             )
         look = self.look_energy
         if look is not None and look.summed > MOST_PULSES_SUMMED:
@@ -349,7 +328,7 @@ def time_report(name: str, parameters: Any) -> dict[str, Any]:
     return {
         "time_budgets": {
             name: {
-                "beams": look.beams.count,
+                "beams": look.beams.number,
                 "dwell_s": look.dwell_s,
                 "pulses": look.pulses,
                 "summed": look.summed,

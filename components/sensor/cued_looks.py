@@ -7,38 +7,30 @@ import numpy as np
 
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import axis_in_body
-from components.messages.columns import ORIGIN, STATE
+from components.messages.columns import ORIGIN, POSE, STATE
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
-from components.sensor.look import CUE, Cueing
-from components.sensor.sensor import Sensor, believed_pose
+from dsa_des.arrays.column_values import picked
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Input
-from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
 
 #: The input over which they come.
 PORT = "cues"
 
 
-class CuedLooks(Effect[Cueing]):
-    """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
+_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 
-    lockstep = True
-    name = "cues"
-    acts_on = CUE
 
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for a wire that brings cues."""
-        sources = [one.block for one in block.context.producers if one.port == PORT]
-        if not sources:
-            return Verdict(False, "no wire brings cues")
-        return Verdict(True, f"{' and '.join(sources)} cues it")
-
-    def build(self, block: Any) -> Cueing:
-        """Return what finds targets in cones."""
-        return ConesAhead()
+def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
+    """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
+    believed = targets.believed
+    if believed is None:
+        return {}
+    return {
+        field: picked(believed[name], rows) for name, field in zip(_BELIEVED, POSE, strict=True)
+    }
 
 
 class ConesAhead:
@@ -71,7 +63,7 @@ class ConesAhead:
         if not pose:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
-        place = pose_in_frame(
+        placed = pose_in_frame(
             tuple(getattr(cones, name)[entry] for name in ORIGIN), tuple(own[:3]), tuple(own[3:])
         )
         axis = axis_in_body(
@@ -79,7 +71,7 @@ class ConesAhead:
             np.stack([getattr(cones, name)[entry] for name in STATE]),
             np.stack([cones.azimuth_rad[entry], cones.elevation_rad[entry]]),
             cones.has_range[entry],
-            place,
+            placed,
         )
         azimuth = targets.body_azimuth_rad[rows[scan]]
         elevation = targets.body_elevation_rad[rows[scan]]
@@ -90,9 +82,9 @@ class ConesAhead:
         least = np.cos(cones.half_angle_rad[entry])
         self._cones = scan, axis, least
         inside = along >= least[:, np.newaxis]
-        found = np.zeros((len(rows), azimuth.shape[1]), dtype=bool)
-        np.logical_or.at(found, scan, inside)
-        return found
+        cued = np.zeros((len(rows), azimuth.shape[1]), dtype=bool)
+        np.logical_or.at(cued, scan, inside)
+        return cued
 
     def with_noise(self, detections: Detections) -> Detections:
         """Return a report of the same scans whose false alarms say, too, if they lie in a cone.
@@ -128,21 +120,40 @@ class ConesAhead:
         return inside
 
 
-CUED_LOOKS = CuedLooks()
-#: Inputs of a sensor that can be cued.
-CUED_INPUTS = {
-    **Sensor.inputs,
-    PORT: Input(CueCones, "sampled", "Where to look more closely.", required=False),
-}
+CUE = Hook("cue", ConesAhead, "which targets lie in a cue cone at each scan")
 
+
+class CuedLooks(Effect[ConesAhead]):
+    """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
+
+    lockstep = True
+    name = "cues"
+    acts_on = CUE
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for a wire that brings cues."""
+        sources = _cued_by(block)
+        if not sources:
+            return Verdict(False, "no wire brings cues")
+        return Verdict(True, f"{' and '.join(sources)} cues it")
+
+    def build(self, block: Any) -> ConesAhead:
+        """Return what finds targets in cones."""
+        return ConesAhead()
+
+
+def _cued_by(block: Any) -> list[str]:
+    return [one.block for one in block.context.producers if one.port == PORT]
+
+
+CUED_LOOKS = CuedLooks()
 
 _NO_THRESHOLD = "all inside its range is detected, there is no threshold to lower"
 
 
 def refuse_cues(block: Any, because: str = _NO_THRESHOLD) -> None:
     """Raise ValueError if a sensor that cannot look harder is cued."""
-    sources = [one.block for one in block.context.producers if one.port == PORT]
-    if sources:
+    if sources := _cued_by(block):
         raise ValueError(
             f"{sources[0]} cues it, and it takes no cues: {because}; cue a sensor that has one, or "
             "leave the wire out"
@@ -156,7 +167,7 @@ def cue_warnings(block: Any) -> list[str]:
         for name in type(block.p).model_fields
         if name.startswith("cued_") and getattr(block.p, name) not in (None, False)
     ]
-    cued = any(one.port == PORT for one in block.context.producers)
+    cued = bool(_cued_by(block))
     if cued and not given:
         return [
             "is cued, and nothing says what it then does otherwise: give one of its cued_* keys"

@@ -210,35 +210,6 @@ def _near(
     return near
 
 
-class DeclarationByPlace(Effect[Reporting]):
-    """Marks detections whose place had others in m of the last n scans, targets or false alarms.
-
-    Nothing but measured values decides; places are compared in north-east-down by what the
-    ownship believes of its attitude, so that its own turns move nothing.
-    """
-
-    name = "declaration by place"
-    acts_on = REPORT
-    lockstep = True
-    outside_the_proof = "without it whatever is reported is declared"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``declare_m``, ``declare_n`` and ``declare_by``."""
-        p = block.p
-        if p.declare_m is None:
-            return Verdict(False, "declare_m and declare_n are not given")
-        because = "the sensor has false alarms, and declare_by is not 'target'"
-        if p.declare_by is not None:
-            because = f"declare_by is '{p.declare_by}'"
-        elif p.declares_by == "target":
-            because = "without false alarms all that is detected are targets"
-        return Verdict(p.declares_by == "place", because)
-
-    def build(self, block: Any) -> DeclaredPlaces:
-        """Return what judges the reports of this sensor."""
-        return DeclaredPlaces(block)
-
-
 class DeclaredPlaces:
     """Remembers the last scans' detections, and when each target was first declared."""
 
@@ -313,3 +284,29 @@ class DeclaredPlaces:
         for name, (tick, range_m) in self._first.items():
             found[name] = {"time_s": tick / ticks_per_s, "range_m": range_m}
         return found
+
+
+class DeclarationByPlace(Effect[Reporting]):
+    """Marks detections whose place had others in m of the last n scans, targets or false alarms.
+
+    Nothing but measured values decides; places are compared in north-east-down by what the
+    ownship believes of its attitude, so that its own turns move nothing.
+    """
+
+    name = "declaration by place"
+    acts_on = REPORT
+    builds = DeclaredPlaces
+    lockstep = True
+    outside_the_proof = "without it whatever is reported is declared"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``declare_m``, ``declare_n`` and ``declare_by``."""
+        p = block.p
+        if p.declare_m is None:
+            return Verdict(False, "declare_m and declare_n are not given")
+        because = "the sensor has false alarms, and declare_by is not 'target'"
+        if p.declare_by is not None:
+            because = f"declare_by is '{p.declare_by}'"
+        elif p.declares_by == "target":
+            because = "without false alarms all that is detected are targets"
+        return Verdict(p.declares_by == "place", because)

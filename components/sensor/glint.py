@@ -130,6 +130,7 @@ class Glint(Effect[Wander]):
     lockstep = True
     name = "glint"
     acts_on = APPARENT_PLACE
+    builds = Wander
     outside_the_proof = "every target has an extent"
 
     def verdict(self, block: Any) -> Verdict:
@@ -140,10 +141,6 @@ class Glint(Effect[Wander]):
         if block.p.errors != "signal":
             return Verdict(False, f"errors is {block.p.errors!r}")
         return Verdict(share > 0.0, f"glint_share is {share:g}")
-
-    def build(self, block: Any) -> Wander:
-        """Return what moves targets to where they seem to be."""
-        return Wander(block)
 
 
 def _level_area_m2(roster: Roster, band: str) -> FloatArray:

@@ -9,7 +9,6 @@ from math import copysign, fmod
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from components.geometry import TWO_PI, past, rising_sector, wrap_pi
 from dsa_des.arrays.column_values import nothing_in
@@ -28,21 +27,15 @@ _LARGEST = 1e300
 _FEW = 6
 
 
-def round_to_grid(
-    value: ArrayLike,
-    step: ArrayLike,
-    *,
-    limit_low: ArrayLike | None = None,
-    limit_high: ArrayLike | None = None,
-) -> Any:
-    """Round to the nearest multiple of `step` (0: no rounding), ties to the even multiple.
+class Grid:
+    """The grid of one quantity that a sensor reports: multiples of `step` (0: no rounding).
 
-    The decision is exact for the doubles given: which of two grid points is nearer follows from the
-    exact remainder (fmod), not from value / step, whose own rounding can move a value across a cell
-    edge. Exactly half-way means that 2·value is an odd multiple of `step` as doubles; then the even
-    multiple is taken. The result is that multiple, rounded once. Rounding is symmetric about 0: the
-    grid of -value is minus the grid of value, and 0 is never negative. Values of more than 2^50
-    steps or beyond 1e300 are returned as they are.
+    A value is rounded to the nearest multiple, ties to the even one. The decision is exact for the
+    doubles given: which of two grid points is nearer follows from the exact remainder (fmod), not
+    from value / step, whose own rounding can move a value across a cell edge. Exactly half-way
+    means that 2·value is an odd multiple of `step` as doubles. The result is the multiple, rounded
+    once. Rounding is symmetric about 0: the grid of -value is minus the grid of value, and 0 is
+    never negative. Values of more than 2^50 steps or beyond 1e300 stay as they are.
 
     With limits (the edges of the field of view) a grid point beyond a limit is replaced by the
     outermost one inside, so a report never leaves the field of view; a limit within 4 last places
@@ -50,49 +43,33 @@ def round_to_grid(
     point would stick out. Angles that wrap are the caller's to wrap, before and after. Thesis
     §3.5.1: the vector is rounded to the nearest point in the resolution grid.
     """
-    values = _finite("value", value)
-    steps = _finite("step", step)
-    if np.any(steps < 0.0):
-        raise ValueError(f"step is {float(steps.min())}: it must be 0 or more")
-    lows = None if limit_low is None else _finite("limit_low", limit_low)
-    highs = None if limit_high is None else _finite("limit_high", limit_high)
-    if lows is not None and highs is not None and np.any(lows > highs):
-        raise ValueError(
-            f"limit_low is {float(np.max(lows))}: it must not be above limit_high, "
-            f"{float(np.min(highs))}"
-        )
-    result = np.copysign(_nearest(np.abs(values), steps), values)
-    if highs is not None:
-        highest = _outermost(highs, steps)
-        result = np.minimum(result, highest)
-    if lows is not None:
-        lowest = -_outermost(-lows, steps)
-        result = np.maximum(result, lowest)
-        if highs is not None and np.any(lowest > highest):
-            raise ValueError(
-                f"step is {float(np.max(steps))}: at least one of its multiples must lie between "
-                "limit_low and limit_high"
-            )
-    # Adding 0 turns -0 into 0.
-    return (result + 0.0)[()]
-
-
-class Grid:
-    """The grid of one quantity that a sensor reports, made once and used at every scan."""
 
     def __init__(
         self, step: float, *, limit_low: float | None = None, limit_high: float | None = None
     ) -> None:
-        round_to_grid(0.0, step, limit_low=limit_low, limit_high=limit_high)  # checks them
+        for name, value in (("step", step), ("limit_low", limit_low), ("limit_high", limit_high)):
+            if value is not None and not math.isfinite(value):
+                raise ValueError(f"{name} is {value}: it must be finite (no NaN, no infinity)")
+        if step < 0.0:
+            raise ValueError(f"step is {step}: it must be 0 or more")
         self.step = float(step)
         self._countable = min(self.step, 1e200) / _COUNTABLE
         low = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
         high = None if limit_high is None else _outermost(np.float64(limit_high), step)
         self._lowest = None if low is None else float(low)
         self._highest = None if high is None else float(high)
+        if limit_low is not None and limit_high is not None and limit_low > limit_high:
+            raise ValueError(
+                f"limit_low is {limit_low}: it must not be above limit_high, {limit_high}"
+            )
+        if low is not None and high is not None and low > high:
+            raise ValueError(
+                f"step is {self.step}: at least one of its multiples must lie between "
+                "limit_low and limit_high"
+            )
 
     def round(self, values: FloatArray) -> FloatArray:
-        """Round finite values, bit for bit as `round_to_grid` does; they are not checked."""
+        """Return values on the grid; they are taken as finite and not checked."""
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
@@ -131,19 +108,6 @@ class Grid:
                 result = low
             results.append(result + 0.0)
         return results
-
-
-def _finite(name: str, value: ArrayLike) -> Any:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"{name} is {value!r}: it must be a number or an array of numbers"
-        ) from error
-    if not np.isfinite(array).all():
-        bad = array[~np.isfinite(array)].flat[0]
-        raise ValueError(f"{name} is {bad}: it must be finite (no NaN, no infinity)")
-    return array
 
 
 def _whole_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
@@ -238,6 +202,11 @@ def variance_of_step(step: float) -> float:
     return step**2 / 12.0
 
 
+Values = Mapping[str, FloatArray]
+#: Values by quantity, and variances by column, in the sensor's axes.
+Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
+
+
 class SensorGrid:
     """The grid of what a sensor measures, within its field of view in its own axes.
 
@@ -258,6 +227,19 @@ class SensorGrid:
         #: Of rounding, by the column that it fills.
         self.variances = {VARIANCE_OF[name]: variance_of_step(step) for name, step in steps.items()}
 
+    def __call__(self, cells: Any, detected: Any, look: Any, true: Values) -> Measured:
+        """Return what is measured of true values by quantity, as `ErrorModel` does."""
+        return self.of_noise(true)
+
+    def of_noise(self, where: Values, signal: Any = None, drawn: Any = None) -> Measured:
+        """Return values on the grid, and the variances of their rounding: step²/12."""
+        line = self.round(where["azimuth"], where["elevation"], where["range"])
+        values = dict(zip(("azimuth", "elevation", "range"), line, strict=True))
+        if "range_rate" in where:
+            values["range_rate"] = self._rate_grid.round(where["range_rate"])
+        count = len(values["azimuth"])
+        return values, {name: constant_column(v, count) for name, v in self.variances.items()}
+
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -267,10 +249,6 @@ class SensorGrid:
         if self._range_step is None:
             return azimuth, elevation, nothing_in(len(range_m))
         return azimuth, elevation, self._range_grid.round(range_m)
-
-    def round_rate(self, range_rate_m_s: FloatArray) -> FloatArray:
-        """Round range rates."""
-        return self._rate_grid.round(range_rate_m_s)
 
     @cached_property
     def _elevation_grid(self) -> Grid:

@@ -11,6 +11,8 @@ from components.messages.targets import RelativeTargets
 from components.sensor.look import Cells
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Measure
 from dsa_des.block.wake import Wake
 
 
@@ -57,7 +59,7 @@ def over_cells(
     targets, rows = sensor.seen(*held)
     cells, reason = sensor.cells(targets, rows, wake)
     on_roster = len(targets.roster)
-    found: dict[str, Any] = {}
+    wide_by_name: dict[str, Any] = {}
     for name, of_cell in values(cells).items():
         # Targets that were not even moved were too far away for every sensor.
         wide = np.full((len(wake), on_roster), out_of_range)
@@ -65,5 +67,20 @@ def over_cells(
         part[reason == RANGE] = out_of_range
         wide[:, targets.columns] = part
         wide[cells.row, cells.target] = of_cell
-        found[name] = wide
-    return found
+        wide_by_name[name] = wide
+    return wide_by_name
+
+
+def measure_cells(
+    values: Callable[[Any, Cells], dict[str, FloatArray]], *, out_of_range: float = np.nan
+) -> Measure:
+    """Return what measures a ladder's quantities by a function of a sensor and its cells."""
+
+    def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+        sensor: Any = block
+        given = over_cells(
+            sensor, wake, lambda cells: values(sensor, cells), out_of_range=out_of_range
+        )
+        return dict(given)
+
+    return measure

@@ -8,11 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
-from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 
@@ -260,21 +258,6 @@ class CellValues(Protocol):
         """Return them, (cells,)."""
 
 
-class Cueing(Protocol):
-    """Finds what lies in the cones of cues."""
-
-    def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake, /) -> BoolArray | None:
-        """Return which targets do at each scan, (scans, targets), or None for none."""
-
-    def in_cones(
-        self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
-    ) -> BoolArray:
-        """Return which directions in body axes do at their row in the last call."""
-
-    def with_noise(self, detections: Detections) -> Detections:
-        """Return a report of the same scans whose false alarms say, too, if they do."""
-
-
 class Strengthening(Protocol):
     """Says how strong detections came out."""
 
@@ -289,6 +272,5 @@ class Judging(Protocol):
         """Return the look with a column ``declared``."""
 
 
-CUE = Hook("cue", Cueing, "which targets lie in a cue cone at each scan")
 STRENGTH = Hook("strength", Strengthening, "look: as strong as its detections came out")
 DECLARATION = Hook("declaration", Judging, "look: which detections declare their target")

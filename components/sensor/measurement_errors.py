@@ -11,7 +11,14 @@ import numpy.typing as npt
 
 from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart
-from components.sensor.grid import VARIANCE_OF, Grid, constant_column, variance_of_step
+from components.sensor.grid import (
+    VARIANCE_OF,
+    Grid,
+    Measured,
+    Values,
+    constant_column,
+    variance_of_step,
+)
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
 from dsa_des.arrays.column_values import nothing_in
@@ -102,9 +109,7 @@ class ErrorModel:
             **{name: Grid(self._steps[name]) for name in self._steps if name.startswith("range")},
         }
 
-    def __call__(
-        self, cells: Cells, detected: IntArray, look: Look, true: Mapping[str, FloatArray]
-    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    def __call__(self, cells: Cells, detected: IntArray, look: Look, true: Values) -> Measured:
         """Return what is measured of the `detected` cells, and its variances by column.
 
         `true` is the truth by quantity, in the sensor's axes.
@@ -120,12 +125,12 @@ class ErrorModel:
 
     def _in_cells(
         self,
-        true: Mapping[str, FloatArray],
+        true: Values,
         noise: BoolArray,
         keys: AnyArray,
         scan: IntArray,
         run: IntArray,
-    ) -> Mapping[str, FloatArray]:
+    ) -> Values:
         """Put what noise made anywhere in the target's cell, which says no more of the target.
 
         It errs from there, and states of itself, what any report as strong does: noise does not
@@ -158,9 +163,7 @@ class ErrorModel:
             fields["azimuth"] = (low, high)
         return fields
 
-    def of_noise(
-        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray], drawn: Any
-    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    def of_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
         """Return how something that is not there is reported: as what is there would be.
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
@@ -174,7 +177,7 @@ class ErrorModel:
 
     def _off(
         self,
-        true: Mapping[str, FloatArray],
+        true: Values,
         drawn: Callable[[str, QuantityError], FloatArray],
     ) -> dict[str, FloatArray]:
         """Return values with their errors, which some have as a share of the value."""
@@ -186,9 +189,9 @@ class ErrorModel:
     def _stated(
         self,
         values: dict[str, FloatArray],
-        of_signal: Mapping[str, FloatArray],
-        signal: Mapping[str, FloatArray],
-    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        of_signal: Values,
+        signal: Values,
+    ) -> Measured:
         """Return what is measured, with its variances by column."""
         columns = self._columns(len(values["azimuth"]), of_signal)
         for name, share in self._shares.items():
@@ -199,13 +202,13 @@ class ErrorModel:
                 columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + more
         return values, columns
 
-    def _of_signal(self, signal: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
-        of_signal: Mapping[str, FloatArray] = {}
+    def _of_signal(self, signal: Values) -> Values:
+        of_signal: Values = {}
         if self._signal:
             of_signal = self._block.signal_variances(signal)
         return of_signal
 
-    def _columns(self, count: int, of_signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    def _columns(self, count: int, of_signal: Values) -> dict[str, FloatArray]:
         """Return variances by column: what all detections share, and what their signals add."""
         return {
             VARIANCE_OF[name]: value + of_signal[name]
@@ -214,7 +217,7 @@ class ErrorModel:
             for name, value in self._variances.items()
         }
 
-    def _valid(self, values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    def _valid(self, values: Values) -> dict[str, FloatArray]:
         """Return erring values as they are reported: on the grid, and what their kind can be.
 
         An elevation beyond the vertical is one on its other side; a range is above 0.
@@ -243,6 +246,7 @@ class MeasurementErrors(Effect[ErrorModel]):
     lockstep = True
     name = "measurement errors"
     acts_on = MEASUREMENT
+    builds = ErrorModel
     outside_the_proof = "without it reports are the truth on a grid"
 
     def verdict(self, block: Any) -> Verdict:
@@ -250,10 +254,6 @@ class MeasurementErrors(Effect[ErrorModel]):
         if block.p.errors == "grid":
             return Verdict(False, "errors is 'grid': values are rounded to the grid")
         return Verdict(True, f"errors is '{block.p.errors}'")
-
-    def build(self, block: Any) -> ErrorModel:
-        """Return what measures with errors."""
-        return ErrorModel(block)
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:

@@ -7,17 +7,14 @@ from typing import Any
 
 from components.messages.reach import Reach
 from components.sensor.glint import APPARENT_PLACE, Wander
-from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid, constant_column
+from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
 from components.sensor.look import Cells, Look
 from components.sensor.measurement_errors import MEASUREMENT, ErrorModel
-from components.sensor.mounting import AXES, BodyAxes
+from components.sensor.mounting import AXES, SensorAxes
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 
-_BODY_AXES = BodyAxes()
-
-#: Values by quantity, and variances by column, in the sensor's axes.
-Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
+_BODY_AXES = SensorAxes()
 
 
 class Measuring(Component):
@@ -36,13 +33,14 @@ class Measuring(Component):
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
 
     @cached_property
-    def axes(self) -> BodyAxes:
+    def axes(self) -> SensorAxes:
         """The sensor's axes; known once the scene's effects are."""
         return self.built_one(AXES) or _BODY_AXES
 
     @cached_property
-    def _error_model(self) -> ErrorModel | None:
-        return self.built_one(MEASUREMENT)
+    def _measurement(self) -> ErrorModel | SensorGrid:
+        """What gives measured values and their variances: with errors, or on the grid alone."""
+        return self.built_one(MEASUREMENT) or self.grid
 
     @cached_property
     def wander(self) -> Wander | None:
@@ -53,12 +51,6 @@ class Measuring(Component):
     def pixel_rad(self) -> tuple[float, float] | None:
         """Width and height of a pixel, of a sensor that measures a target's size."""
         return None
-
-    def measure(
-        self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1)."""
-        return self.grid.round(azimuth_rad, elevation_rad, range_m)
 
     def range_rate(self, cells: Cells, detected: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
@@ -96,9 +88,7 @@ class Measuring(Component):
         true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
         if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
-        if self._error_model is not None:
-            return self._in_body(*self._error_model(cells, detected, look, true))
-        return self._in_body(*self._on_grid(true))
+        return self._in_body(*self._measurement(cells, detected, look, true))
 
     def report_noise(
         self,
@@ -113,21 +103,7 @@ class Measuring(Component):
         them a place by the edge of the field of view would never be reported beyond it. The last
         value holds the other measured columns of `Detections`.
         """
-        if self._error_model is not None:
-            return self._in_body(*self._error_model.of_noise(where, signal, drawn))
-        return self._in_body(*self._on_grid(where))
-
-    def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:
-        """Return values on the grid, and their variances: step²/12."""
-        azimuth, elevation, range_m = self.measure(
-            true["azimuth"], true["elevation"], true["range"]
-        )
-        values = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
-        if "range_rate" in true:
-            values["range_rate"] = self.grid.round_rate(true["range_rate"])
-        count = len(azimuth)
-        of_grid = self.grid.variances.items()
-        return values, {name: constant_column(value, count) for name, value in of_grid}
+        return self._in_body(*self._measurement.of_noise(where, signal, drawn))
 
     def _in_body(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]

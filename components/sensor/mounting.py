@@ -1,7 +1,6 @@
 """The mounting of a sensor on the ownship: its own axes, and how well they are known."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,85 +16,44 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
 Angles = tuple[FloatArray, FloatArray]
+Angles3 = tuple[float, float, float]
 
 
-class BodyAxes:
-    """The axes of a sensor that looks along the ownship's nose."""
+@dataclass(frozen=True)
+class SensorAxes:
+    """The axes of a sensor: the ownship's body axes, or turned against them.
+
+    Rotations (azimuth, elevation, roll) from body axes to the sensor's, about z, y and x in that
+    order: as it is, and as the conversion of its measurements believes it to be. None is a sensor
+    that looks along the nose, whose angles keep every bit.
+    """
+
+    true_rad: Angles3 | None = None
+    believed_rad: Angles3 | None = None
 
     def reach(self, reach: Reach) -> Reach:
         """Return the sensor's reach for lines of sight in the ownship's body axes."""
-        return reach
-
-    def __call__(self, body_azimuth_rad: FloatArray, body_elevation_rad: FloatArray) -> Angles:
-        """Return azimuth and elevation in the sensor's axes of directions in body axes."""
-        return body_azimuth_rad, body_elevation_rad
-
-    def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return what the sensor reports in body axes of directions in its own axes."""
-        return azimuth_rad, elevation_rad
-
-    def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return directions in the sensor's own axes of what it reports in body axes."""
-        return azimuth_rad, elevation_rad
-
-    def variances_in_body(
-        self,
-        azimuth_rad: FloatArray,
-        elevation_rad: FloatArray,
-        azimuth_variance_rad2: FloatArray,
-        elevation_variance_rad2: FloatArray,
-    ) -> Angles:
-        """Return variances in body axes of azimuths and elevations in the sensor's axes."""
-        return azimuth_variance_rad2, elevation_variance_rad2
-
-    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return where directions in the sensor's axes truly point, in body axes."""
-        return azimuth_rad, elevation_rad
-
-
-class MountedAxes(BodyAxes):
-    """The axes of a sensor that is turned against the ownship's body axes.
-
-    Rotations (azimuth, elevation, roll) from body axes to the sensor's, about z, y and x in that
-    order: as it is, and as the conversion of its measurements believes it to be.
-    """
-
-    def __init__(
-        self, true_rad: tuple[float, float, float], believed_rad: tuple[float, float, float]
-    ) -> None:
-        self.true_rad = true_rad
-        self.believed_rad = believed_rad
-
-    def __eq__(self, other: object) -> bool:
-        """Tell whether two sensors are mounted alike: what they offer of it must compare."""
-        return isinstance(other, MountedAxes) and self._angles == other._angles
-
-    def __hash__(self) -> int:
-        return hash(self._angles)
-
-    @property
-    def _angles(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        return self.true_rad, self.believed_rad
-
-    def reach(self, reach: Reach) -> Reach:
-        """Return a reach whose field of view lies in the sensor's axes."""
+        if self.true_rad is None:
+            return reach
         return MountedReach(
             reach.azimuth_rad, reach.elevation_rad, reach.range_max_m, reach.enabled, axes=self
         )
 
     def __call__(self, body_azimuth_rad: FloatArray, body_elevation_rad: FloatArray) -> Angles:
-        """Rotate by the true mounting: physics does not know beliefs."""
-        azimuth, elevation = sensor_angles(body_azimuth_rad, body_elevation_rad, *self.true_rad)
-        return azimuth, elevation
+        """Return angles in the sensor's axes by the true mounting: physics knows no beliefs."""
+        return _from_body(body_azimuth_rad, body_elevation_rad, self.true_rad)
+
+    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Return where directions in the sensor's axes truly point, in body axes."""
+        return _to_body(azimuth_rad, elevation_rad, self.true_rad)
 
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Rotate back by the believed mounting."""
+        """Return what the sensor reports in body axes of directions in its own axes."""
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Rotate by the believed mounting: the way back of `to_body`."""
-        azimuth, elevation = sensor_angles(azimuth_rad, elevation_rad, *self.believed_rad)
-        return azimuth, elevation
+        """Return directions in the sensor's own axes of what it reports in body axes."""
+        return _from_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def variances_in_body(
         self,
@@ -104,7 +62,9 @@ class MountedAxes(BodyAxes):
         azimuth_variance_rad2: FloatArray,
         elevation_variance_rad2: FloatArray,
     ) -> Angles:
-        """Turn variances by the believed mounting, as what they are of."""
+        """Return variances of reports in body axes from those in the sensor's axes."""
+        if self.believed_rad is None:
+            return azimuth_variance_rad2, elevation_variance_rad2
         return turned_variances(
             azimuth_rad,
             elevation_rad,
@@ -113,14 +73,21 @@ class MountedAxes(BodyAxes):
             self.believed_rad,
         )
 
-    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Rotate back by the true mounting."""
-        return _to_body(azimuth_rad, elevation_rad, self.true_rad)
+
+def _from_body(
+    azimuth_rad: FloatArray, elevation_rad: FloatArray, mounting_rad: Angles3 | None
+) -> Angles:
+    if mounting_rad is None:
+        return azimuth_rad, elevation_rad
+    azimuth, elevation = sensor_angles(azimuth_rad, elevation_rad, *mounting_rad)
+    return azimuth, elevation
 
 
 def _to_body(
-    azimuth_rad: FloatArray, elevation_rad: FloatArray, mounting_rad: tuple[float, float, float]
+    azimuth_rad: FloatArray, elevation_rad: FloatArray, mounting_rad: Angles3 | None
 ) -> Angles:
+    if mounting_rad is None:
+        return azimuth_rad, elevation_rad
     return body_angles(*body_to_ned(*unit_vector(azimuth_rad, elevation_rad), *mounting_rad))
 
 
@@ -128,15 +95,13 @@ def _to_body(
 class MountedReach(Reach):
     """The reach of a sensor with axes of its own; its bounds are in those axes."""
 
-    axes: BodyAxes = BodyAxes()
+    axes: SensorAxes = SensorAxes()
 
     @property
     def steepest_rad(self) -> float:
         """Largest elevation in either axes: the two verticals lean by the boresight's tilt."""
-        tilt = 0.0
-        if isinstance(self.axes, MountedAxes):
-            _, elevation, roll = self.axes.true_rad
-            tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
+        _, elevation, roll = self.axes.true_rad or (0.0, 0.0, 0.0)
+        tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
         return min(0.5 * math.pi, super().steepest_rad + tilt)
 
     def decide(
@@ -152,10 +117,10 @@ class MountedReach(Reach):
         return super().decide(*angles, range_m, present, hidden)
 
 
-AXES = Hook("axes", BodyAxes, "the sensor's axes in the ownship's")
+AXES = Hook("axes", SensorAxes, "the sensor's axes in the ownship's")
 
 
-class Mounting(Effect[BodyAxes]):
+class Mounting(Effect[SensorAxes]):
     """Boresight and roll of the sensor, and an error of them that is not known to the ownship."""
 
     lockstep = True
@@ -166,27 +131,22 @@ class Mounting(Effect[BodyAxes]):
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``mount_*_deg`` and ``misalignment_deg``."""
         p = block.p
-        found = [f"{key} is {angle:g}" for key, angle in _mount_deg(p).items() if angle]
+        turned = [f"{key} is {getattr(p, key):g}" for key in _MOUNT_KEYS if getattr(p, key)]
         if any(p.misalignment_deg):
-            found.append(f"misalignment_deg is {[float(angle) for angle in p.misalignment_deg]}")
-        if found:
-            return Verdict(True, " and ".join(found))
+            turned.append(f"misalignment_deg is {[float(angle) for angle in p.misalignment_deg]}")
+        if turned:
+            return Verdict(True, " and ".join(turned))
         return Verdict(False, "it looks along the nose and misalignment_deg is 0")
 
-    def build(self, block: Any) -> MountedAxes:
+    def build(self, block: Any) -> SensorAxes:
         """Return the sensor's axes."""
-        true_deg = tuple(_mount_deg(block.p).values())
-        believed = [
-            math.radians(true + error)
-            for true, error in zip(true_deg, block.p.misalignment_deg, strict=True)
-        ]
-        azimuth, elevation, roll = (math.radians(angle) for angle in true_deg)
-        return MountedAxes((azimuth, elevation, roll), (believed[0], believed[1], believed[2]))
+        true_deg = [getattr(block.p, key) for key in _MOUNT_KEYS]
+        errors_deg = block.p.misalignment_deg
+        believed_deg = [true + error for true, error in zip(true_deg, errors_deg, strict=True)]
+        true_rad, believed_rad = (
+            tuple(map(math.radians, angles)) for angles in (true_deg, believed_deg)
+        )
+        return SensorAxes(true_rad, believed_rad)  # type: ignore[arg-type]
 
 
-def _mount_deg(p: Any) -> Mapping[str, float]:
-    return {
-        "mount_azimuth_deg": p.mount_azimuth_deg,
-        "mount_elevation_deg": p.mount_elevation_deg,
-        "mount_roll_deg": p.mount_roll_deg,
-    }
+_MOUNT_KEYS = ("mount_azimuth_deg", "mount_elevation_deg", "mount_roll_deg")

@@ -13,25 +13,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages.columns import POSE
+from components.messages.cues import CueCones
 from components.messages.detections import REPORT, Detections, LastingError, Reporting, SensorOffer
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
+from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_pose
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from components.sensor.glint import APPARENT_PLACE, Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
-from components.sensor.look import (
-    CUE,
-    DECLARATION,
-    STRENGTH,
-    Cells,
-    Cueing,
-    Judging,
-    Look,
-    Strengthening,
-)
+from components.sensor.look import DECLARATION, STRENGTH, Cells, Judging, Look, Strengthening
 from components.sensor.measurement_errors import (
     MEASUREMENT,
     MeasurementErrors,
@@ -42,7 +34,7 @@ from components.sensor.measurement_errors import (
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
 from components.sensor.parameters import SensorParameters
-from dsa_des.arrays.column_values import constant, picked
+from dsa_des.arrays.column_values import constant
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
@@ -96,19 +88,6 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 def _of_each(count: int, rows: int) -> IntArray:
     return constant(count, rows, np.int64)
-
-
-_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
-
-
-def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
-    """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
-    believed = targets.believed
-    if believed is None:
-        return {}
-    return {
-        field: picked(believed[name], rows) for name, field in zip(_BELIEVED, POSE, strict=True)
-    }
 
 
 #: Effects that every sensor has, after its own.
@@ -233,7 +212,7 @@ class Sensor(Measuring):
         return self.built(DECLARATION)
 
     @cached_property
-    def _cueing(self) -> Cueing | None:
+    def _cueing(self) -> ConesAhead | None:
         return self.built_one(CUE)
 
     @cached_property
@@ -386,3 +365,10 @@ class Sensor(Measuring):
             part.hidden,
         )
         return rows, reason
+
+
+#: Inputs of a sensor that can be cued.
+CUED_INPUTS = {
+    **Sensor.inputs,
+    PORT: Input(CueCones, "sampled", "Where to look more closely.", required=False),
+}

@@ -11,16 +11,15 @@ from pydantic import AfterValidator, Field, model_validator
 
 from components.estimation.carried_errors import BEARING, RANGE
 from components.geometry import wrap_pi_unchecked
-from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
 from components.messages.reach import Reach
 from components.navigation.errors import navigation_noise
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import rising_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
-from components.surveillance.broadcast import Altimeters, Who
+from components.surveillance.broadcast import Altimeters, Transponders
 from components.surveillance.cooperative import (
     CooperativeParameters,
     CooperativeSensor,
@@ -43,12 +42,10 @@ from components.surveillance.interrogation import (
     sine_of_elevation,
 )
 from components.surveillance.reports import unreported
-from components.surveillance.stated_errors import ALTIMETER, ROUNDING
+from components.surveillance.stated_errors import ALTIMETER, ROUNDING, unstated_errors
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.gauss_markov import GaussMarkov
 
@@ -126,28 +123,18 @@ class ActiveParameters(CooperativeParameters):
         return reach if self.range_km is not None else replace(reach, range_max_m=_FARTHEST_M)
 
 
-def measure_replies(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of an answer at each (scan, target) if it is asked."""
-    active: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"answers": active.answer_probability(cells)}
-
-    return dict(over_cells(active, wake, values))
+def _answers(active: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return the probability of an answer of each cell if it is asked."""
+    return {"answers": active.answer_probability(cells)}
 
 
-def measure_ranges(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return what is measured of each (scan, target): range, and height above the ownship."""
-    active: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        everybody = np.arange(len(cells))
-        return {
-            "range": active.measured_range_m(cells, everybody),
-            "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
-        }
-
-    return dict(over_cells(active, wake, values))
+def _measurements(active: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return each cell's measured range and reported altitude, m."""
+    everybody = np.arange(len(cells))
+    return {
+        "range": active.measured_range_m(cells, everybody),
+        "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
+    }
 
 
 REPLIES = Ladder(
@@ -158,7 +145,7 @@ REPLIES = Ladder(
     ),
     "rounds",
     (Quantity("answers", ""),),
-    measure_replies,
+    measure_cells(_answers),
 )
 MEASUREMENT = Ladder(
     "active measurement",
@@ -168,7 +155,7 @@ MEASUREMENT = Ladder(
     ),
     "do_365",
     (Quantity("range", "m"), Quantity("altitude", "m")),
-    measure_ranges,
+    measure_cells(_measurements),
 )
 
 
@@ -280,18 +267,13 @@ class Active(CooperativeSensor):
         p = answered_in_round(in_1_s)[:, np.newaxis]
         return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
 
-    def _who(self, cells: Cells, which: AnyArray) -> Who:
-        keys = cells.roster.keys_of(cells.target[which])
-        return Who(keys, cells.run[which], cells.craft[which])
-
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
         """Return what some cells' transponders report of true altitudes, m."""
-        who = self._who(cells, which)
-        mode_s = cells.roster.equipage.mode_s[who.craft]
-        step = np.where(mode_s, float(self.p.mode_s_step_ft), 100.0) if self._errs else 0.0
-        return self._altimeters.reported_ft(who, altitude_m, step, self._errs) * FOOT_M
+        step_ft = self._step_ft(cells, which) if self._errs else 0.0
+        transponders = Transponders.of(cells, which)
+        return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
 
     def _climb(self, cells: Cells, detected: AnyArray, now_m: FloatArray) -> FloatArray:
         """Return how fast reported altitudes changed in the last 5 s; NaN where none was then."""
@@ -309,9 +291,9 @@ class Active(CooperativeSensor):
     ) -> FloatArray:
         if not self._errs:
             return range_m
-        who = self._who(cells, which)
-        drawn = self._ranges(who.keys, instant_ns, run=who.run)
-        bias = np.where(cells.roster.equipage.mode_s[who.craft], *RANGE_BIAS_M)
+        keys = cells.roster.keys_of(cells.target[which])
+        drawn = self._ranges(keys, instant_ns, run=cells.run[which])
+        bias = np.where(cells.roster.equipage.mode_s[cells.craft[which]], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
     def _measured(
@@ -324,7 +306,7 @@ class Active(CooperativeSensor):
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Any]]:
         """Return measured lines of sight in body axes, and their variances."""
-        own = OwnBelief(*(cells.own_belief(name)[detected] for name in OwnBelief.__annotations__))
+        own = OwnBelief.of(cells, detected)
         distance = self.measured_range_m(cells, detected)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
         keys, bearings = cells.roster.keys_of(cells.target[detected]), self._bearings
@@ -337,14 +319,8 @@ class Active(CooperativeSensor):
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
         azimuth, elevation, _ = in_body(own, ned)
-        variances = variances_in_body(
-            own, ned, self._variances(cells, detected, ned, altitude, deviation)
-        )
-        beside: dict[str, Any] = {
-            "azimuth_variance_rad2": variances[0],
-            "elevation_variance_rad2": variances[1],
-            "range_variance_m2": variances[2],
-        }
+        variances = self._variances(cells, detected, ned, altitude, deviation)
+        beside: dict[str, Any] = variances_in_body(own, ned, variances)
         if self._errs:
             beside["told_by_target"] = self._told(cells, detected, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
@@ -353,28 +329,23 @@ class Active(CooperativeSensor):
         self, cells: Cells, detected: AnyArray, altitude_m: FloatArray, deviation: FloatArray
     ) -> dict[str, FloatArray]:
         """Return the deviations of all errors, as `TOLD`."""
-        nothing = np.zeros(len(detected))
+        none = np.zeros(len(detected))
         mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
-        feet = altitude_m / FOOT_M
         position_m, attitude_rad = navigation_noise(self.context)
-        now = np.zeros(len(detected))
-        own = velocity_of(cells, detected, now, cells.seen_at(detected, now), "own")
-        return dict.fromkeys(TOLD, np.full(len(detected), np.nan)) | {
+        own = velocity_of(cells, detected, none, cells.seen_at(detected, none), "own")
+        altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
+        return unstated_errors(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
-            "place_deviation": nothing,
-            "height_deviation": np.sqrt(altimetry_variance_ft2(feet)) * FOOT_M,
-            "rounding_deviation": self._step_ft(mode_s) * FOOT_M / math.sqrt(12.0),
-            "climb_deviation": nothing,
-            "speed_deviation": nothing,
+            "height_deviation": np.sqrt(altimetry_ft2) * FOOT_M,
+            "rounding_deviation": self._step_ft(cells, detected) * FOOT_M / math.sqrt(12.0),
             "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
             "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),
-            "range_deviation": nothing + RANGE_ERROR_M,
-            "age_s": nothing,
-            "velocity_age_s": nothing,
-            "white_variance": nothing + _WHITE_M2 + max(position_m) ** 2,
+            "range_deviation": none + RANGE_ERROR_M,
+            "white_variance": none + _WHITE_M2 + max(position_m) ** 2,
         }  # fmt: skip
 
-    def _step_ft(self, mode_s: BoolArray) -> FloatArray:
+    def _step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
+        mode_s = cells.roster.equipage.mode_s[cells.craft[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
 
     def _variances(
@@ -395,5 +366,6 @@ class Active(CooperativeSensor):
         place_m2 = max(position_m[:2]) ** 2
         across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
         along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
-        feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + self._step_ft(mode_s) ** 2 / 12.0
+        step_ft = self._step_ft(cells, detected)
+        feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + step_ft**2 / 12.0
         return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2

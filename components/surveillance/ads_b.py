@@ -13,16 +13,16 @@ from components.geometry import line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
-from components.sensor.ladder_values import over_cells
+from components.navigation.errors import displaced_position
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
-    carried_on,
     in_body,
     towards,
     variances_in_body,
 )
-from components.surveillance.broadcast import Broadcasts, Sent, Who
+from components.surveillance.broadcast import Broadcasts, Sent, Transponders
 from components.surveillance.cooperative import (
     PLACE,
     STEP_S,
@@ -35,7 +35,6 @@ from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import StatedByAircraft, lasting_errors, told_errors
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
@@ -87,29 +86,14 @@ class AdsBParameters(CooperativeParameters):
         return replace(reach, range_max_m=LAWS[self.reception][1])
 
 
-def measure_reception(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability that a squitter sent at each (scan, target) is received."""
-    receiver: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"reception": receiver.law(cells.range_m)}
-
-    return dict(over_cells(receiver, wake, values))
-
-
-def measure_position(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+def _position_errors(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return how far reports lie off what the aircraft are, north and east, m, at every look."""
-    receiver: Any = block
     receiver.law = LAWS["certain"][0]
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        look = receiver.look(cells)
-        here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
-        said = [look.extras[f"reported_{name}"] for name in PLACE]
-        away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
-        return {"north": away[0], "east": away[1]}
-
-    return dict(over_cells(receiver, wake, values))
+    look = receiver.look(cells)
+    here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
+    said = [look.extras[f"reported_{name}"] for name in PLACE]
+    away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
+    return {"north": away[0], "east": away[1]}
 
 
 RECEPTION = Ladder(
@@ -121,7 +105,7 @@ RECEPTION = Ladder(
     ),
     "fitted",
     (Quantity("reception", ""),),
-    measure_reception,
+    measure_cells(lambda receiver, cells: {"reception": receiver.law(cells.range_m)}),
     clears=("range_km",),
 )
 ERRORS = Ladder(
@@ -138,7 +122,7 @@ ERRORS = Ladder(
     ),
     "gauss_markov",
     (Quantity("north", "m"), Quantity("east", "m")),
-    measure_position,
+    measure_cells(_position_errors),
 )  # fmt: skip
 
 
@@ -199,57 +183,49 @@ class AdsB(CooperativeSensor):
 
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
-        equipage = cells.roster.equipage
-        who = Who(cells.roster.keys_of(cells.target), cells.run, cells.craft)
-        here_ns = cells.state_ns
         extras = unreported(len(cells))
         own_velocity = np.full((3, len(cells)), np.nan)
-        sends = np.flatnonzero(equipage.ads_b[who.craft])
-        told = self._last_received("position", cells, sends, who, here_ns, equipage)
-        found, position, sent_ns = told
+        equipage = cells.roster.equipage
+        sends = np.flatnonzero(equipage.ads_b[cells.craft])
+        reported, number, sent_ns = self._last_received("position", cells, sends)
         detected = np.zeros(len(cells), dtype=bool)
-        detected[found] = True
-        if len(found):
-            self._report(cells, found, position, sent_ns, who, here_ns, equipage, extras)
-            own_velocity[:, found] = self._own_velocity(cells, found)
+        detected[reported] = True
+        if len(reported):
+            self._report(cells, reported, number, sent_ns, extras)
+            own_velocity[:, reported] = self._own_velocity(cells, reported)
         moves = {f"own_{axis}": own_velocity[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, own_velocity
-        confidence = np.where(detected, equipage.nacp[who.craft], 0.0)
+        confidence = np.where(detected, equipage.nacp[cells.craft], 0.0)
         return Look(detected, confidence, extras, signal=moves)
 
     def _last_received(
-        self,
-        kind: str,
-        cells: Cells,
-        asked: IntArray,
-        who: Who,
-        here_ns: IntArray,
-        equipage: Any,
+        self, kind: str, cells: Cells, asked: IntArray
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Return the cells of which a message was received, its number and when it was sent."""
         none = np.zeros(0, dtype=np.int64)
         if not len(asked):
             return none, none, none
-        oldest_ns = here_ns[asked] - self._oldest_age_ns(kind, cells, asked)
-        count = math.ceil(int((here_ns[asked] - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
-        those = who.take(asked)
+        now_ns = cells.state_ns[asked]
+        oldest_ns = now_ns - self._oldest_age_ns(kind, cells, asked)
+        count = math.ceil(int((now_ns - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
+        senders = Transponders.of(cells, asked)
         number, sent_ns, counts = self._clocks[kind].latest(
-            those.keys, those.run, here_ns[asked], count
+            senders.keys, senders.run, now_ns, count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
-        counts &= sent_ns < (equipage.silent_after_s[those.craft] * NANOSECONDS)[:, np.newaxis]
-        row, place = np.nonzero(counts)
+        silent_after_s = cells.roster.equipage.silent_after_s[senders.craft]
+        counts &= sent_ns < (silent_after_s * NANOSECONDS)[:, np.newaxis]
+        row, column = np.nonzero(counts)
         if not len(row):
             return none, none, none
-        each = asked[row]
-        ahead_s = (sent_ns[row, place] - here_ns[each]) / NANOSECONDS
-        then = cells.seen_at(each, ahead_s)
-        stream = self._received[kind].of_runs(those.run[row])
-        drawn = stream.uniform(those.keys[row], number[row, place])
+        ahead_s = (sent_ns[row, column] - now_ns[row]) / NANOSECONDS
+        then = cells.seen_at(asked[row], ahead_s)
+        stream = self._received[kind].of_runs(senders.run[row])
+        drawn = stream.uniform(senders.keys[row], number[row, column])
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:
             came &= ~then["hidden"]
-        counts[row, place] = came
+        counts[row, column] = came
         some = np.flatnonzero(counts.any(axis=1))
         newest = counts[some].argmax(axis=1)
         return asked[some], number[some, newest], sent_ns[some, newest]
@@ -265,56 +241,38 @@ class AdsB(CooperativeSensor):
     def _report(
         self,
         cells: Cells,
-        detected: IntArray,
+        reported: IntArray,
         number: IntArray,
         sent_ns: IntArray,
-        who: Who,
-        here_ns: IntArray,
-        equipage: Any,
         extras: dict[str, AnyArray],
     ) -> None:
         """Fill in what was decoded of some cells."""
-        those = who.take(detected)
-        sent = self._sent(cells, detected, number, sent_ns, those, here_ns, equipage)
-        said = self._broadcasts.position(
-            equipage, those, sent,
-            lambda: self._broadcasts.velocity(equipage, those, sent),
-        )  # fmt: skip
-        for name, values in zip(PLACE, said, strict=True):
-            extras[f"reported_{name}"][detected] = values
-        extras["reported_s"][detected] = sent_ns / NANOSECONDS
+        equipage, craft = cells.roster.equipage, cells.craft
+        sent = self._sent(cells, reported, number, sent_ns)
+        position = self._broadcasts.position(equipage, Transponders.of(cells, reported), sent)
+        for name, values in zip(PLACE, position, strict=True):
+            extras[f"reported_{name}"][reported] = values
+        extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
-            extras[name][detected] = getattr(equipage, name)[those.craft]
-        moving, number, sent_ns = self._last_received(
-            "velocity", cells, detected, who, here_ns, equipage
-        )
+            extras[name][reported] = getattr(equipage, name)[craft[reported]]
+        moving, number, sent_ns = self._last_received("velocity", cells, reported)
         if not len(moving):
             return
-        those = who.take(moving)
-        sent = self._sent(cells, moving, number, sent_ns, those, here_ns, equipage)
-        velocity = self._broadcasts.velocity(equipage, those, sent)
+        sent = self._sent(cells, moving, number, sent_ns)
+        velocity = self._broadcasts.velocity(equipage, Transponders.of(cells, moving), sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
-        extras["nacv"][moving] = equipage.nacv[those.craft]
+        extras["nacv"][moving] = equipage.nacv[craft[moving]]
 
-    def _sent(
-        self,
-        cells: Cells,
-        which: IntArray,
-        number: IntArray,
-        sent_ns: IntArray,
-        who: Who,
-        here_ns: IntArray,
-        equipage: Any,
-    ) -> Sent:
+    def _sent(self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray) -> Sent:
         """Return what was true when what messages say was measured.
 
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
         """
-        latency_s = equipage.latency_s[who.craft]
+        latency_s = cells.roster.equipage.latency_s[cells.craft[which]]
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
-        ahead_s = (instant_ns - here_ns[which]) / NANOSECONDS
+        ahead_s = (instant_ns - cells.state_ns[which]) / NANOSECONDS
         back_s = np.zeros(len(which))
         if latency_s.any():
             known = cells.seen_at(which, ahead_s)["present"]
@@ -322,12 +280,12 @@ class AdsB(CooperativeSensor):
             ahead_s = ahead_s + back_s
         then = cells.seen_at(which, ahead_s)
         velocity = velocity_of(cells, which, ahead_s, then, "target")
-        place = [then[f"target_{name}"] for name in PLACE]
+        position = [then[f"target_{name}"] for name in PLACE]
         if back_s.any():
-            before = carried_on(place, -velocity * back_s)
-            place = [np.where(back_s > 0.0, b, p) for b, p in zip(before, place, strict=True)]
+            before = displaced_position(*position, *(-velocity * back_s))
+            position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
-        lat, lon, alt = place
+        lat, lon, alt = position
         return Sent(lat, lon, alt, velocity, number, instant_ns)
 
     def _own_velocity(self, cells: Cells, detected: IntArray) -> FloatArray:
@@ -345,36 +303,33 @@ class AdsB(CooperativeSensor):
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return lines of sight to what is reported, at the scan, and their variances."""
         said = {name: values[detected] for name, values in look.extras.items()}
-        own = OwnBelief(*(cells.own_belief(name)[detected] for name in OwnBelief.__annotations__))
+        own = OwnBelief.of(cells, detected)
         velocity = np.stack([
             said["reported_north_m_s"], said["reported_east_m_s"], -said["reported_climb_m_s"]
         ])  # fmt: skip
-        age_s = cells.state_ns[detected] / NANOSECONDS - said["reported_s"]
-        place = [said[f"reported_{name}"] for name in PLACE]
-        ned = towards(own, *carried_on(place, np.nan_to_num(velocity) * age_s))
+        now_s = cells.state_ns[detected] / NANOSECONDS
+        age_s = now_s - said["reported_s"]
+        position = [said[f"reported_{name}"] for name in PLACE]
+        carried = np.nan_to_num(velocity)
+        ned = towards(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.
-        ahead = towards(own, *carried_on(place, np.nan_to_num(velocity) * (age_s + STEP_S)))
+        ahead = towards(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = in_body(own, ned)
         stated = StatedByAircraft(
             cells.roster.equipage, cells.craft[detected], said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
         )  # fmt: skip
-        variances = variances_in_body(own, ned, stated.place_m2(age_s))
-        rate_variance = stated.speed_m2_s2
+        variances = variances_in_body(own, ned, stated.position_m2(age_s))
         moves = np.stack(
             [look.signal[f"own_{axis}"][detected] for axis in ("north", "east", "down")]
         )
         rate = ((moving - moves) * ned).sum(axis=0) / distance
         beside = {
-            "azimuth_variance_rad2": variances[0],
-            "elevation_variance_rad2": variances[1],
-            "range_variance_m2": variances[2],
+            **variances,
             "range_rate_m_s": rate,
-            "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, rate_variance),
-            "told_by_target": stated.told(
-                moving, cells.state_ns[detected] / NANOSECONDS - said["velocity_s"], age_s
-            ),
+            "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, stated.speed_m2_s2),
+            "told_by_target": stated.told(moving, now_s - said["velocity_s"], age_s),
         }
         return azimuth, elevation, distance, beside
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from components.geometry import body_angles_unchecked, line_of_sight_ned, ned_to_body_unchecked
-from components.navigation.errors import position_with_error
-from dsa_des.arrays.types import FloatArray
+from components.sensor.grid import VARIANCE_OF
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray, IntArray
 
 # Nearer to the vertical of the body an azimuth says nothing; nearer than this a range is none.
 _LEAST_COS, _NEAREST_M = 1e-3, 1e-3
@@ -26,6 +26,11 @@ class OwnBelief:
     pitch_rad: FloatArray
     roll_rad: FloatArray
 
+    @classmethod
+    def of(cls, cells: Cells, which: IntArray) -> OwnBelief:
+        """Return the belief at some cells' scans."""
+        return cls(*(cells.own_belief(name)[which] for name in cls.__annotations__))
+
     @property
     def attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Yaw, pitch and roll."""
@@ -35,22 +40,11 @@ class OwnBelief:
 def towards(
     own: OwnBelief, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
-    """Return north, east and down of places from where the ownship believes to be, (3, n), m."""
+    """Return north, east and down of positions from the ownship's believed one, (3, n), m."""
     return np.stack(
         line_of_sight_ned(
             own.lat_deg, own.lon_deg, own.alt_m, lat_deg, lon_deg, alt_m, validate=False
         )
-    )
-
-
-def carried_on(
-    place: Sequence[FloatArray], north_east_down_m: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places (latitude, longitude, altitude) moved by (3, n) m in their own axes."""
-    north, east, down = north_east_down_m
-    lat, lon, alt = place
-    return position_with_error(
-        lat, lon, alt, sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, down)
     )
 
 
@@ -64,10 +58,10 @@ def in_body(own: OwnBelief, ned: FloatArray) -> tuple[FloatArray, FloatArray, Fl
 
 def variances_in_body(
     own: OwnBelief, ned: FloatArray, variance: tuple[FloatArray, FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return variances of azimuth and elevation (rad²) and range (m²).
+) -> dict[str, FloatArray]:
+    """Return the variances of azimuth, elevation and range by column.
 
-    `variance` holds those of the place along three directions at right angles, m²: across the
+    `variance` holds those of the position along three directions at right angles, m²: across the
     line of sight in the horizontal, along it in the horizontal, and vertical.
     """
     ground = np.maximum(np.hypot(ned[0], ned[1]), _NEAREST_M)
@@ -81,17 +75,16 @@ def variances_in_body(
     ]
     azimuth, elevation, _ = in_body(own, ned)
     level = np.maximum(np.cos(elevation), _LEAST_COS)
-    along = np.stack(
-        [
-            np.cos(azimuth) * np.cos(elevation),
-            np.sin(azimuth) * np.cos(elevation),
-            -np.sin(elevation),
-        ]
-    )
+    flat = np.cos(elevation)
+    along = np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, -np.sin(elevation)])
     across = np.stack([-np.sin(azimuth), np.cos(azimuth), zero])
     upward = np.cross(across, along, axis=0)
-    found = [zero, zero, zero]
+    turned = [zero, zero, zero]
     for axis, square in zip(body, variance, strict=True):
         for number, direction in enumerate((across, upward, along)):
-            found[number] = found[number] + (axis * direction).sum(axis=0) ** 2 * square
-    return found[0] / (range_m * level) ** 2, found[1] / range_m**2, found[2]
+            turned[number] = turned[number] + (axis * direction).sum(axis=0) ** 2 * square
+    return {
+        VARIANCE_OF["azimuth"]: turned[0] / (range_m * level) ** 2,
+        VARIANCE_OF["elevation"]: turned[1] / range_m**2,
+        VARIANCE_OF["range"]: turned[2],
+    }

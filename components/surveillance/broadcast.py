@@ -5,14 +5,14 @@ The errors belong to the aircraft: all that receive it have the same, and so hav
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
-from components.navigation.errors import position_with_error
+from components.navigation.errors import displaced_position
+from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
@@ -33,23 +33,23 @@ from dsa_des.time.randomness import Streams
 CORRELATION_TIME_S = 300.0
 #: Scale of the Laplace distribution of vertical rates, new with each message (the same source).
 CLIMB_SCALE_M_S = 2.02 * FOOT_M
-#: Whose draws they are: those of aircraft, not of the block that looks.
+#: Draws are those of aircraft, not of the block that looks.
 _OWNER = "[equipage]"
-
-Keys = npt.NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
-class Who:
-    """Aircraft, (n,): their draw keys, runs and places among the roster's aircraft."""
+class Transponders:
+    """Of some aircraft, (n,): draw keys, runs and indices among the roster's aircraft."""
 
-    keys: Keys
+    keys: npt.NDArray[np.uint64]
     run: IntArray
     craft: IntArray
 
-    def take(self, which: IntArray) -> Who:
-        """Return some of them."""
-        return Who(self.keys[which], self.run[which], self.craft[which])
+    @classmethod
+    def of(cls, cells: Cells, which: IntArray) -> Transponders:
+        """Return those of some cells' targets."""
+        keys = cells.roster.keys_of(cells.target[which])
+        return cls(keys, cells.run[which], cells.craft[which])
 
 
 class Altimeters:
@@ -59,57 +59,22 @@ class Altimeters:
         self._stream = streams.stream(_OWNER, "altimetry")
 
     def reported_ft(
-        self, who: Who, altitude_m: FloatArray, step_ft: npt.ArrayLike, errs: bool = True
+        self,
+        transponders: Transponders,
+        altitude_m: FloatArray,
+        step_ft: npt.ArrayLike,
+        errs: bool = True,
     ) -> FloatArray:
         """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing."""
         altitude = altitude_m / FOOT_M
         if errs:
-            stream, first = self._stream.of_runs(who.run), np.zeros(len(who.run), dtype=np.int64)
-            laplace, kind = (stream.uniform(who.keys, first, draw) for draw in (0, 1))
+            stream = self._stream.of_runs(transponders.run)
+            first = np.zeros(len(transponders.run), dtype=np.int64)
+            laplace, kind = (stream.uniform(transponders.keys, first, draw) for draw in (0, 1))
             altitude = altitude + altimetry_error_ft(altitude, standard_laplace(laplace), kind)
         step = np.broadcast_to(np.asarray(step_ft, np.float64), altitude.shape)
         rounded = quantised_altitude_ft(altitude, np.where(step > 0.0, step, 1.0))
         return np.where(step > 0.0, rounded, altitude)
-
-
-class OwnErrors:
-    """Errors of position and velocity of all aircraft, in two axes each.
-
-    Parameters
-    ----------
-    streams : Streams
-    errors : {"none", "white", "gauss_markov"}
-        None at all, new ones with every message, or ones that last `CORRELATION_TIME_S`.
-    """
-
-    def __init__(self, streams: Streams, errors: str) -> None:
-        self._errors = errors
-        self._streams = {name: streams.stream(_OWNER, name) for name in ("position", "velocity")}
-        self._climbs = streams.stream(_OWNER, "climb")
-        self._lasting = {
-            name: GaussMarkov(stream, CORRELATION_TIME_S) for name, stream in self._streams.items()
-        }
-
-    def of(
-        self, name: str, deviation: FloatArray, who: Who, message: IntArray, instant_ns: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the errors north and east of the position or the velocity at instants (n,)."""
-        if self._errors == "none":
-            return np.zeros(len(deviation)), np.zeros(len(deviation))
-        if self._errors == "white":
-            stream = self._streams[name].of_runs(who.run)
-            draws = [stream.normal(who.keys, message, axis + 60_000) for axis in (0, 1)]
-        else:
-            # What is sent before the run begins is of instants before 0.
-            draws = [self._lasting[name](who.keys, instant_ns, axis, who.run) for axis in (0, 1)]
-        return deviation * draws[0], deviation * draws[1]
-
-    def of_climb(self, who: Who, message: IntArray) -> FloatArray:
-        """Return the errors of vertical rates, m/s, of messages (n,)."""
-        if self._errors == "none":
-            return np.zeros(len(message))
-        uniform = self._climbs.of_runs(who.run).uniform(who.keys, message)
-        return CLIMB_SCALE_M_S * standard_laplace(uniform)
 
 
 @dataclass(frozen=True)
@@ -125,48 +90,84 @@ class Sent:
 
 
 class Broadcasts:
-    """What aircraft send of what they are."""
+    """What aircraft send of what they are, with `errors` and `quantised` as in the messages.
+
+    Errors are ``none``, ``white`` (new with every message) or ``gauss_markov``: those of position
+    and velocity then last `CORRELATION_TIME_S`.
+    """
 
     def __init__(self, streams: Streams, errors: str, quantised: bool) -> None:
-        self._own, self._altimeters = OwnErrors(streams, errors), Altimeters(streams)
-        self._errs, self._quantised = errors != "none", quantised
+        self._errors, self._quantised = errors, quantised
+        self._altimeters = Altimeters(streams)
+        self._streams = {name: streams.stream(_OWNER, name) for name in ("position", "velocity")}
+        self._climbs = streams.stream(_OWNER, "climb")
+        self._lasting = {
+            name: GaussMarkov(stream, CORRELATION_TIME_S) for name, stream in self._streams.items()
+        }
 
-    def velocity(self, equipage: Equipage, who: Who, sent: Sent) -> FloatArray:
+    def level_errors(
+        self,
+        name: str,
+        deviation: FloatArray,
+        transponders: Transponders,
+        message: IntArray,
+        instant_ns: IntArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the errors north and east of the position or the velocity at instants (n,)."""
+        keys, run = transponders.keys, transponders.run
+        if self._errors == "none":
+            return np.zeros(len(deviation)), np.zeros(len(deviation))
+        if self._errors == "white":
+            stream = self._streams[name].of_runs(run)
+            draws = [stream.normal(keys, message, axis + 60_000) for axis in (0, 1)]
+        else:
+            # What is sent before the run begins is of instants before 0.
+            draws = [self._lasting[name](keys, instant_ns, axis, run) for axis in (0, 1)]
+        return deviation * draws[0], deviation * draws[1]
+
+    def _climb_errors(self, transponders: Transponders, message: IntArray) -> FloatArray:
+        """Return the errors of vertical rates, m/s, of messages (n,)."""
+        if self._errors == "none":
+            return np.zeros(len(message))
+        uniform = self._climbs.of_runs(transponders.run).uniform(transponders.keys, message)
+        return CLIMB_SCALE_M_S * standard_laplace(uniform)
+
+    def velocity(self, equipage: Equipage, transponders: Transponders, sent: Sent) -> FloatArray:
         """Return velocities north, east and up as decoded, (3, n), m/s."""
-        deviation = equipage.velocity_deviation_m_s[who.craft]
-        north, east = self._own.of("velocity", deviation, who, sent.message, sent.instant_ns)
-        found = sent.north_east_up_m_s + np.stack(
-            [north, east, self._own.of_climb(who, sent.message)]
-        )
+        deviation = equipage.velocity_deviation_m_s[transponders.craft]
+        messages = transponders, sent.message
+        level = self.level_errors("velocity", deviation, *messages, sent.instant_ns)
+        moved = sent.north_east_up_m_s + np.stack([*level, self._climb_errors(*messages)])
         if not self._quantised:
-            return np.asarray(found)
+            return np.asarray(moved)
         return np.stack([
-            quantised_speed_kt(found[0] / KNOT_M_S) * KNOT_M_S,
-            quantised_speed_kt(found[1] / KNOT_M_S) * KNOT_M_S,
-            quantised_climb_ft_min(found[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S,
+            quantised_speed_kt(moved[0] / KNOT_M_S) * KNOT_M_S,
+            quantised_speed_kt(moved[1] / KNOT_M_S) * KNOT_M_S,
+            quantised_climb_ft_min(moved[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S,
         ])  # fmt: skip
 
     def position(
-        self, equipage: Equipage, who: Who, sent: Sent, velocity: Callable[[], FloatArray]
+        self, equipage: Equipage, transponders: Transponders, sent: Sent
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return latitudes, longitudes and altitudes as decoded (deg, deg, m).
 
-        `velocity` gives the aircraft's own velocity (3, n), by which it compensates latency.
+        Latency is compensated by the aircraft's own velocity.
         """
-        craft = who.craft
+        craft = transponders.craft
         deviation = equipage.position_deviation_m[craft]
-        errors = self._own.of("position", deviation, who, sent.message, sent.instant_ns)
+        errors = self.level_errors(
+            "position", deviation, transponders, sent.message, sent.instant_ns
+        )
         spoofed, ahead_s = equipage.spoofed_m[:, craft], equipage.compensated_s[craft]
         north, east, up = errors[0] + spoofed[0], errors[1] + spoofed[1], spoofed[2]
         if ahead_s.any():
-            moved = velocity() * ahead_s
+            moved = self.velocity(equipage, transponders, sent) * ahead_s
             north, east, up = north + moved[0], east + moved[1], up + moved[2]
-        lat, lon, _ = position_with_error(
-            sent.lat_deg, sent.lon_deg, sent.alt_m,
-            sigma_north_east_down_m=(1.0, 1.0, 1.0), normals=(north, east, np.zeros_like(north)),
-        )  # fmt: skip
-        step_ft = 25.0 if self._quantised else 0.0
-        feet = self._altimeters.reported_ft(who, sent.alt_m + up, step_ft, self._errs)
+        lat, lon, _ = displaced_position(
+            sent.lat_deg, sent.lon_deg, sent.alt_m, north, east, np.zeros_like(north)
+        )
+        step_ft, errs = 25.0 if self._quantised else 0.0, self._errors != "none"
+        feet = self._altimeters.reported_ft(transponders, sent.alt_m + up, step_ft, errs)
         if not self._quantised:
             return lat, lon, feet * FOOT_M
         odd: BoolArray = sent.message % 2 == 1

@@ -26,6 +26,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
+_ALTITUDE_STEP_M2 = (25.0 * FOOT_M) ** 2 / 12.0
 #: What an aircraft without a velocity may have, a deviation; and how much another one changes its
 #: own on the way from a message to a scan, where no filter says so by its own motion.
 _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
@@ -63,19 +64,17 @@ def told_errors(position_errors: str) -> tuple[ToldError, ...]:
     return (*found, ALTIMETER, ROUNDING, VERTICAL_RATE)
 
 
+def unstated_errors(count: int) -> dict[str, FloatArray]:
+    """Return the columns `TOLD` of reports without a velocity and without errors."""
+    none, unknown = np.zeros(count), np.full(count, np.nan)
+    return {name: none if name.endswith(("deviation", "age_s")) else unknown for name in TOLD}
+
+
 @dataclass(frozen=True)
 class StatedByAircraft:
-    """What the categories of some aircraft state of their reports.
+    """What the categories of some aircraft, by index, state of what they reported.
 
-    Parameters
-    ----------
-    equipage : Equipage
-    craft : (n,)
-        Places among its aircraft.
-    said : dict of (n,)
-        What they said (`components.surveillance.reports.REPORTED`).
-    errs, rounds : bool
-        Whether what they send has errors, and is rounded.
+    `errs` and `rounds` say whether what they send has errors, and is rounded.
     """
 
     equipage: Equipage
@@ -91,49 +90,48 @@ class StatedByAircraft:
         speed = np.where(self.errs, square, _LEAST_M2)
         return speed + KNOT_M_S**2 / 12.0 if self.rounds else speed
 
-    def place_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return mean square errors of places carried on for a while: two level axes, vertical."""
+    def position_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return mean square errors of positions carried on: of two level axes, and vertical."""
         square = self.equipage.position_deviation_m[self.craft] ** 2
-        place = np.where(self.errs, square, _LEAST_M2)
+        level = np.where(self.errs, square, _LEAST_M2)
         feet = self.said["reported_alt_m"] / FOOT_M
         high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
         if self.rounds:
-            place = place + _COMPACT_M2
-            high = high + (25.0 * FOOT_M) ** 2 / 12.0
+            level = level + _COMPACT_M2
+            high = high + _ALTITUDE_STEP_M2
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         moving = ~np.isnan(self.said["reported_north_m_s"])
-        level = place + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * age_s**2
+        level = level + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * age_s**2
         return level, level, high
 
     def told(
         self, north_east_down_m_s: FloatArray, velocity_age_s: FloatArray, age_s: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return velocities of some age, and what errs of them and of places, as `TOLD`."""
+        """Return velocities of some age, and what errs of them and of positions, as `TOLD`."""
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
-        tells, nothing = self.errs or self.rounds, np.zeros(len(age_s))
+        tells, none = self.errs or self.rounds, np.zeros(len(age_s))
         # Whose errors are told is filtered by one who knows how targets move on the way.
-        turned = nothing if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
-        found = dict.fromkeys(TOLD, np.full(len(age_s), np.nan))
+        turned = none if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
         # Whole knots last while a flight is steady and are new while it is not: counted as both.
         new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)
-        found |= dict(zip(TOLD, [*north_east_down_m_s, new, new, turned + _LEAST_M2], strict=False))
+        variances = new, new, turned + _LEAST_M2
+        velocity = dict(zip(TOLD[:6], (*north_east_down_m_s, *variances), strict=True))
         if not tells:
-            return found
+            return dict.fromkeys(TOLD, np.full(len(age_s), np.nan)) | velocity
         known = ~np.isnan(north_east_down_m_s[0])
-        place = self.equipage.position_deviation_m[self.craft] if self.errs else nothing
-        rounding_m2 = (25.0 * FOOT_M) ** 2 / 12.0 if self.rounds else 0.0
-        _, _, high = self.place_m2(nothing)
+        rounding_m2 = _ALTITUDE_STEP_M2 if self.rounds else 0.0
+        _, _, high = self.position_m2(none)
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * age_s
         white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
-        return found | {
-            "place_deviation": place,
+        position = self.equipage.position_deviation_m[self.craft] if self.errs else none
+        return unstated_errors(len(age_s)) | velocity | {
+            "place_deviation": position,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
-            "rounding_deviation": nothing + math.sqrt(rounding_m2),
-            "climb_deviation": nothing + math.sqrt(climb),
-            "speed_deviation": np.sqrt(self.speed_m2_s2), "bearing_deviation": nothing,
-            "delay_deviation": nothing, "range_deviation": nothing,
+            "rounding_deviation": none + math.sqrt(rounding_m2),
+            "climb_deviation": none + math.sqrt(climb),
+            "speed_deviation": np.sqrt(self.speed_m2_s2),
             "age_s": np.where(known, age_s, 0.0),
             "velocity_age_s": np.where(known, velocity_age_s, 0.0), "white_variance": white,
         }  # fmt: skip

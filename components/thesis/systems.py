@@ -9,7 +9,7 @@ import numpy as np
 from components.display.flights import Flights
 from components.estimation.measurement import range_share
 from components.geometry import line_of_sight_ned, wrap_by_sines
-from components.messages.state_tracks import COVARIANCE
+from components.messages.state_tracks import full_covariance
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
 from components.thesis.drawing import (
@@ -355,7 +355,7 @@ def _parca(printed: Cells) -> list[Row]:
         "state_tracks", track_status="confirmed"
     )
     away = np.stack([tracks[f"{a}_m"] - tracks[f"own_{a}_m"] for a in ("north", "east", "down")])
-    share = range_share(away, {place: tracks[name] for place, name in COVARIANCE.items()})
+    share = range_share(away, full_covariance(tracks, slice(None), 3))
     rows = []
     for cell, when, time_s in (("parca_before", "before", 10.0), ("parca_after", "after", 46.0)):
         at = int(np.searchsorted(tracks["time_s"], time_s))

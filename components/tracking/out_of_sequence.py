@@ -13,10 +13,10 @@ window before any of it is done.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,174 +28,111 @@ from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
 from dsa_des.time.clock import ClockSpec
 
-#: When a look was made, and the first of its sensors: looks of one instant go by sensor.
-Key = tuple[int, int]
 
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
+class Snapshot(NamedTuple):
     """The tracks of a replica before a look was worked on."""
 
     store: TrackStore  # With this replica's tracks among others
     next_number: int
 
 
-@dataclass
-class Memory:
-    """The looks of one replica that may still have to be worked on again, in order."""
-
-    keys: list[Key] = field(default_factory=list)  # When each was made, and by whom
-    looks: list[int] = field(default_factory=list)  # Its number among the looks of the wake
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The order in which looks are worked on."""
+    """The order in which looks are worked on, a row for each work."""
 
-    look: IntArray
-    back_to: IntArray  # (works,), look before which the tracks are gone back to first; -1 for none
-    # (works,), of a look that is worked on in one step, the first look of those made since; -1
-    # of others
-    since: IntArray
-    # (works,), newest look by then: where tracks are seen from when they are reported
-    seen_from: IntArray
-    # (works,) of bool, whether tracks are reported after it: it is the last work that a row brings
-    reports: BoolArray
-    of: IntArray  # (works,), index of the replica
-    row: IntArray  # (works,), row of the wake that brings it about
     forgotten: list[list[int]]  # Looks that need not be remembered after each
+    look: IntArray
+    of: IntArray  # Index of the replica
+    row: IntArray  # Of the wake, that brings it about
+    # Newest look by then: where tracks are seen from when they are reported
+    seen_from: IntArray
+    back_to: IntArray  # Look before which the tracks are gone back to first; -1 for none
+    # Of a look that is worked on in one step, the first look of those made since; -1 of others
+    since: IntArray
+
+    @property
+    def reports(self) -> BoolArray:
+        """Whether tracks are reported after each: it is the last work that a row brings."""
+        return np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
 
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """The looks of a run that later ones may still come before, with snapshots of its tracks."""
+    """Looks that later ones may still come before, those of a run in the order they were made."""
 
-    replica: int
     scans: Scans
-    before: dict[int, Snapshot]
+    before: list[Snapshot]  # Of each look
+
+    def __len__(self) -> int:
+        return len(self.before)
+
+    def split(self, runs: IntArray, first_run: int) -> tuple["Past", "Past"]:
+        """Return the looks of some runs, and those of the others that go on."""
+        run = self.scans.run
+        mine = np.isin(run, runs)
+        parts = [np.flatnonzero(which) for which in (mine, ~mine & (run >= first_run))]
+        one, other = (Past(self.scans.take(p), [self.before[i] for i in p.tolist()]) for p in parts)
+        return one, other
 
     @classmethod
-    def of(cls, scans: Scans, memory: Memory, before: dict[int, Snapshot], replica: int) -> "Past":
-        """Return the looks in memory, numbered anew in their order."""
-        kept = {
-            new: Snapshot(
-                before[old].store.take(before[old].store.replica == replica),
-                before[old].next_number,
-            )
-            for new, old in enumerate(memory.looks)
-        }
-        return cls(replica, scans.take(np.array(memory.looks, dtype=np.int64)), kept)
-
-    def memory(self, first: int) -> Memory:
-        """Return the looks in memory, numbered from `first` on."""
-        return Memory(keys_of(self.scans), list(range(first, first + len(self.scans))))
-
-    def numbered(self, first: int) -> dict[int, Snapshot]:
-        """Return how tracks were before each of its looks, numbered from `first` on."""
-        return {first + look: before for look, before in self.before.items()}
+    def of(
+        cls, scans: Scans, looks: list[int], before: Mapping[int, Snapshot], others: "Past | None"
+    ) -> "Past":
+        """Return some looks, each with the tracks of its own run alone, and after them others."""
+        kept = []
+        for look in looks:
+            store, next_number = before[look]
+            kept.append(Snapshot(store.take(store.replica == scans.run[look]), next_number))
+        mine = scans.take(np.array(looks, dtype=np.int64))
+        if others is None or not len(others):
+            return cls(mine, kept)
+        return cls(Scans.joined([mine, others.scans]), kept + others.before)
 
 
-def keys_of(scans: Scans) -> list[Key]:
-    """Return when each look was made, and the first of its sensors."""
-    first = scans.sensors & -scans.sensors
-    return list(zip(scans.tick.tolist(), first.tolist(), strict=True))
+def plan_of_late(
+    scans: Scans, of: IntArray, begin: int, lag_ticks: int, *, rerun: bool
+) -> tuple[Plan, list[int], list[int]]:
+    """Return the order of work, looks that come too late, and those that are remembered after it.
 
-
-def rerun_plan(
-    scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
-) -> tuple[Plan, list[int]]:
-    """Return the order of work where late looks have all since them worked on again."""
-    keys = keys_of(scans)
-    row = scans.row.tolist()
-    look: list[int] = []
-    back_to: list[int] = []
-    brought_by: list[int] = []
-    replica: list[int] = []
-    forgotten: list[list[int]] = []
-    left_out: list[int] = []
-    for new, number in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
-        known = memory.setdefault(number, Memory())
-        key = keys[new]
-        if known.keys and key[0] < known.keys[-1][0] - lag_ticks:
-            left_out.append(new)
-            continue
-        here = bisect_left(known.keys, key)
-        again = known.looks[here:]
-        known.keys.insert(here, key)
-        known.looks.insert(here, new)
-        oldest = known.keys[-1][0] - lag_ticks
-        gone = 0
-        while known.keys[gone][0] < oldest:
-            gone += 1
-        # The look itself may be forgotten at once, though not before what it changes is done.
-        past, known.keys, known.looks = known.looks[:gone], known.keys[gone:], known.looks[gone:]
-        works = [new, *again]
-        look += works
-        back_to += [again[0] if again else -1, *([-1] * len(again))]
-        brought_by += [row[new]] * len(works)
-        replica += [number] * len(works)
-        forgotten += [[] for _ in again] + [past]
-    return _planned(look, back_to, None, look, brought_by, replica, forgotten), left_out
-
-
-def one_step_plan(
-    scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
-) -> tuple[Plan, list[int]]:
-    """Return the order of work where late looks are worked on in one step.
-
-    Parameters and what is returned are those of `rerun_plan`.
+    Looks before `begin` are those remembered; `of` is the index of each one's replica. With `rerun`
+    late looks have all since them worked on again, else they are worked on in one step.
     """
-    keys = keys_of(scans)
-    look: list[int] = []
-    since: list[int] = []
-    seen_from: list[int] = []
-    replica: list[int] = []
+    # When each look was made, and the first of its sensors: looks of one instant go by sensor.
+    first: list[int] = (scans.sensors & -scans.sensors).tolist()
+    keys: list[tuple[int, int]] = list(zip(scans.tick.tolist(), first, strict=True))
+    key_of: Callable[[int], tuple[int, int]] = keys.__getitem__
+    row = scans.row.tolist()
+    remembered: dict[int, list[int]] = {}
+    works: list[tuple[int, int, int, int, int, int]] = []
     forgotten: list[list[int]] = []
-    left_out: list[int] = []
-    for new, number in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
-        known = memory.setdefault(number, Memory())
-        key, first, gone = keys[new], -1, 0
-        newest = known.keys[-1][0] if known.keys else key[0]
-        if key[0] < newest - lag_ticks:
-            left_out.append(new)
+    left_out = []
+    for look, number in enumerate(of.tolist()):
+        known, key = remembered.setdefault(number, []), keys[look]
+        if look < begin:
+            known.append(look)
             continue
-        if key[0] < newest:
-            first = known.looks[bisect_left(known.keys, (key[0] + 1, 0))]
+        newest = keys[known[-1]][0] if known else key[0]
+        if key[0] < newest - lag_ticks:
+            left_out.append(look)
+            continue
+        again = known[bisect_left(known, key, key=key_of) :] if rerun else []
+        since = -1
+        if key[0] < newest and not rerun:
+            since = known[bisect_left(known, (key[0] + 1, 0), key=key_of)]
         else:
-            known.keys.append(key)
-            known.looks.append(new)
-            while known.keys[gone][0] < key[0] - lag_ticks:
-                gone += 1
-        past, known.keys, known.looks = known.looks[:gone], known.keys[gone:], known.looks[gone:]
-        look.append(new)
-        since.append(first)
-        seen_from.append(known.looks[-1])
-        replica.append(number)
-        forgotten.append(past)
-    row = scans.row[look].tolist()
-    return _planned(look, None, since, seen_from, row, replica, forgotten), left_out
-
-
-def _planned(
-    look: list[int],
-    back_to: list[int] | None,
-    since: list[int] | None,
-    seen_from: list[int],
-    row: list[int],
-    replica: list[int],
-    forgotten: list[list[int]],
-) -> Plan:
-    none = np.full(len(look), -1)
-    rows, replica_of = np.array(row, dtype=np.int64), np.array(replica, dtype=np.int64)
-    reports = np.ones(len(look), dtype=bool)
-    if len(look):
-        reports[:-1] = (rows[1:] != rows[:-1]) | (replica_of[1:] != replica_of[:-1])
-    return Plan(
-        np.array(look, dtype=np.int64),
-        none if back_to is None else np.array(back_to, dtype=np.int64),
-        none if since is None else np.array(since, dtype=np.int64),
-        np.array(seen_from, dtype=np.int64), reports, replica_of, rows, forgotten,
-    )  # fmt: skip
+            known.insert(len(known) - len(again), look)
+        # The look itself may be forgotten at once, though not before what it changes is done.
+        oldest = keys[known[-1]][0] - lag_ticks
+        gone = bisect_left(known, (oldest, 0), key=key_of)
+        forgotten += [[] for _ in again] + [known[:gone]]
+        del known[:gone]
+        back_to = again[0] if again else -1
+        for work in (look, *again):
+            works.append((work, number, row[look], work if rerun else known[-1], back_to, since))
+            back_to = -1
+    columns = list(np.array(works, dtype=np.int64).reshape(-1, 6).T)
+    kept = [look for known in remembered.values() for look in known]
+    return Plan(forgotten, *columns), left_out, kept
 
 
 def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
@@ -203,31 +140,20 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, l
     so_far = RunTicks(of, scans.tick).newest().tick
     keep = (scans.tick >= so_far) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
-    row = scans.row[look]
-    reports = np.append(row[1:] != row[:-1], True)[: len(look)]
     none = np.full(len(look), -1)
-    plan = Plan(look, none, none, look, reports, of[look], row, [])
+    plan = Plan([], look, of[look], scans.row[look], look, none, none)
     return plan, np.flatnonzero(~keep).tolist()
 
 
-def tracks_before(before: dict[int, Snapshot], looks: list[int], replicas: list[int]) -> TrackStore:
+def tracks_before(
+    before: Mapping[int, Snapshot], looks: list[int], replicas: list[int]
+) -> TrackStore:
     """Return how tracks of some replicas (ascending) were, each before a look of its own."""
-    return TrackStore.joined(
-        [
-            before[look].store.take(before[look].store.replica == replica)
-            for look, replica in zip(looks, replicas, strict=True)
-        ]
-    ).in_order()
-
-
-def restored(store: TrackStore, back: dict[int, Snapshot], replicas: Any) -> TrackStore:
-    """Return tracks with those of some replicas as they were."""
     by_store: dict[int, tuple[TrackStore, list[int]]] = {}
-    for number in replicas:
-        before = back[number].store
-        by_store.setdefault(id(before), (before, []))[1].append(number)
-    parts = [store.take(~np.isin(store.replica, replicas))]
-    parts += [old.take(np.isin(old.replica, mine)) for old, mine in by_store.values()]
+    for look, replica in zip(looks, replicas, strict=True):
+        store = before[look].store
+        by_store.setdefault(id(store), (store, []))[1].append(replica)
+    parts = [store.take(np.isin(store.replica, mine)) for store, mine in by_store.values()]
     return TrackStore.joined(parts).in_order()
 
 
@@ -298,18 +224,17 @@ def warning(name: str, share: float, why: str) -> str:
 class LookCount:
     """Counts of each sensor's looks, and of those that came too late."""
 
-    came: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor
-    left_out: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor
+    # Both by name of the sensor
+    came: Mapping[str, int] = field(default_factory=dict)
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     def of(self, sensors: tuple[str, ...], came: IntArray, left_out: IntArray) -> "LookCount":
         """Return the count with more looks, each a mask of its sensors."""
-        return LookCount(
-            {n: self.came.get(n, 0) + int((came >> i & 1).sum()) for i, n in enumerate(sensors)},
-            {
-                n: self.left_out.get(n, 0) + int((left_out >> i & 1).sum())
-                for i, n in enumerate(sensors)
-            },
+        counts = (
+            {n: known.get(n, 0) + int((masks >> i & 1).sum()) for i, n in enumerate(sensors)}
+            for known, masks in ((self.came, came), (self.left_out, left_out))
         )
+        return LookCount(*counts)
 
     def late(self) -> dict[str, dict[str, float]]:
         """Return looks, those left out and their share, by sensor; of those that lost any."""

@@ -17,21 +17,18 @@ from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.ladder import LADDERS
 from components.tracking.out_of_sequence import (
     LookCount,
-    Memory,
     Past,
     Plan,
     Snapshot,
     latest_s,
     left_out,
     may_come_late,
-    one_step_plan,
-    rerun_plan,
-    restored,
+    plan_of_late,
     straight_plan,
     tracks_before,
     warning,
 )
-from components.tracking.report import Reported, state_tracks
+from components.tracking.report import state_tracks, tracks_after
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
@@ -108,8 +105,7 @@ class Tracker(Component):
         self._sensors: tuple[str, ...] = ()
         self._store = self._no_tracks(0)
         self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
-        #: By run.
-        self._past: dict[int, Past] = {}
+        self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
@@ -176,32 +172,27 @@ class Tracker(Component):
             return None
         records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
-        begin = 0
-        before: dict[int, Snapshot] = {}
-        memory: dict[int, Memory] = {}
-        remembered = [
-            (number, past)
-            for number, run in enumerate(records.replica.tolist())
-            if (past := self._past.get(run)) is not None
-        ]
-        for number, past in remembered:
-            memory[number] = past.memory(begin)
-            before |= past.numbered(begin)
-            begin += len(past.scans)
-        scans = Scans.joined([*(past.scans for _, past in remembered), scans])
+        begin, before, waiting = 0, dict[int, Snapshot](), None
+        if self._past is not None:
+            past, waiting = self._past.split(records.replica, wake.first_run)
+            begin, before = len(past), dict(enumerate(past.before))
+            scans = Scans.joined([past.scans, scans])
         of = np.searchsorted(records.replica, scans.run)
+        kept: list[int] = []
         if not self._remembers:
             plan, left_out = straight_plan(scans, of, records.tick)
         else:
-            planned = rerun_plan if self.p.late == "rerun" else one_step_plan
-            plan, left_out = planned(scans, of, begin, memory, self._lag_ticks)
+            plan, left_out, kept = plan_of_late(
+                scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
+            )
         self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(records.origin, of)
         poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of, self.rules.carried is not None)
         turned = scans.in_frame(origin)
-        reported: list[Reported] = []
+        reported: list[TrackStore] = []
+        reports = plan.reports
         for works in turns(plan.of):
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
@@ -225,22 +216,16 @@ class Tracker(Component):
                     records.next_number[mine],
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]
-            reports = plan.reports[works]
-            if len(store) and reports.any():
+            shown = works[reports[works]]
+            if len(store) and len(shown):
+                replicas = records.replica[plan.of[shown]]
                 reported.append(
-                    Reported.of(
-                        store,
-                        records.replica[plan.of[works[reports]]],
-                        plan.seen_from[works[reports]],
-                        plan.row[works[reports]],
-                    )
+                    tracks_after(store, replicas, plan.seen_from[shown], plan.row[shown])
                 )
         self._records = self._records.after(records.replica, records, wake.first_run)
         self._store = store
-        self._past = {run: old for run, old in self._past.items() if run >= wake.first_run} | {
-            int(records.replica[number]): Past.of(scans, known, before, records.replica[number])
-            for number, known in memory.items()
-        }
+        if self._remembers:
+            self._past = Past.of(scans, kept, before, waiting)
         if len(plan.look) == 0:
             return None
         rows = np.unique(plan.row)
@@ -257,16 +242,14 @@ class Tracker(Component):
         before: dict[int, Snapshot],
     ) -> TrackStore:
         """Go back where late looks ask for it, and note how things are before each look."""
-        back = plan.back_to[works]
-        late = np.flatnonzero(back >= 0)
+        late = works[plan.back_to[works] >= 0]
         if len(late):
-            replicas = records.replica[plan.of[works[late]]].tolist()
-            states = {
-                number: before[look]
-                for number, look in zip(replicas, back[late].tolist(), strict=True)
-            }
-            store = restored(store, states, replicas)
-            records.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
+            of, back = plan.of[late], plan.back_to[late].tolist()
+            replicas = records.replica[of]
+            others = store.take(~np.isin(store.replica, replicas))
+            old = tracks_before(before, back, replicas.tolist())
+            store = TrackStore.joined([others, old]).in_order()
+            records.next_number[of] = [before[look].next_number for look in back]
         for work in works.tolist():
             number = int(records.next_number[plan.of[work]])
             before[int(plan.look[work])] = Snapshot(store, number)

@@ -1,8 +1,7 @@
 """Recorded traffic: flights read from files of DAIDALUS, CSV tables and ASTERIX."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
-from components.flights.closest_approach import OwnTimes, SampleTimes, SharedTimes
+from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
@@ -23,6 +22,7 @@ from components.traffic.source import SourceParameters, TrafficSource, roster_of
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
+from dsa_des.files.input_files import read_once
 
 #: Beyond any aircraft: m/s along the path and upward, m/s², and metres above the ellipsoid.
 FASTEST_MPS, CLIMB_MPS, ACCELERATION_MPS2, HIGHEST_M = 1000.0, 200.0, 150.0, 25_000.0
@@ -223,10 +223,10 @@ class RecordedTraffic(TrafficSource):
 
     def sample_times(self) -> list[SampleTimes]:
         """Return the sample times of the ownship, and those of each target."""
+        own = KnownTimes(self.content.ownship.sample_times_s)
         if not self.targets:
-            return [SharedTimes(self.content.ownship.sample_times_s)]
-        each = OwnTimes([target.sample_times_s for target in self.content.intruders])
-        return [SharedTimes(self.content.ownship.sample_times_s), each]
+            return [own]
+        return [own, KnownTimes(*(target.sample_times_s for target in self.content.intruders))]
 
     def warnings(self) -> list[str]:
         """Say what no aircraft does, and which error of units it looks like."""
@@ -244,6 +244,12 @@ class RecordedTraffic(TrafficSource):
         return {**super().report(), "traffic": source}
 
 
+@read_once(4)
+def _read(path: Path, reader: Callable[..., TrafficFile], *options: Any) -> TrafficFile:
+    """Read a file; the replicas of a study read the same one over and over."""
+    return reader(path, *options)
+
+
 class DaaFile(RecordedTraffic):
     """Traffic from a DAIDALUS .daa or .xyz file; the first aircraft named is the ownship."""
 
@@ -252,21 +258,8 @@ class DaaFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        reference = (self.p.reference_lat_deg, self.p.reference_lon_deg, self.p.reference_alt_m)
-        try:
-            state = self.p.file.stat()
-        except (OSError, ValueError):  # the reader says what is wrong with it
-            return _read_daa(self.p.file, None, reference)
-        return _read_daa(self.p.file, (state.st_mtime_ns, state.st_size), reference)
-
-
-@lru_cache(maxsize=4)
-def _read_daa(path: Path, state: Any, reference: tuple[float, float, float]) -> TrafficFile:
-    """Read a file; the replicas of a study read the same one over and over."""
-    lat_deg, lon_deg, alt_m = reference
-    return read_daa(
-        path, reference_lat_deg=lat_deg, reference_lon_deg=lon_deg, reference_alt_m=alt_m
-    )
+        p = self.p
+        return _read(p.file, read_daa, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
 
 
 class CsvFile(RecordedTraffic):
@@ -277,7 +270,7 @@ class CsvFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return read_csv(self.p.file, self.p.ownship)
+        return _read(self.p.file, read_csv, self.p.ownship)
 
 
 class AsterixFile(RecordedTraffic):
@@ -288,4 +281,4 @@ class AsterixFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return read_asterix(self.p.file, self.p.ownship)
+        return _read(self.p.file, read_asterix, self.p.ownship)

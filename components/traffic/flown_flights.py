@@ -35,18 +35,9 @@ class FlightsOfRuns(NamedTuple):
 class FlownFlights:
     """The flights of all runs with the manoeuvres that came so far; see `messages.known_flights`.
 
-    Parameters
-    ----------
-    own : SteeredFleet
-        The ownship of each run.
-    targets : Fleet
-        Numbered through: those of run 0, then those of run 1, and so on.
-    crabbing : sequence of Crabbing
-        What turns noses into the wind, if anything.
-    intervals : NearIntervals, optional
-        For who asks for other instants: targets are there while they may be near.
-    rates_hz : (runs,), optional
-        And positions are those of the last publication.
+    An ownship for each run, and the targets of run 0, those of run 1, and so on. For other instants
+    than those of rows, targets are there while `intervals` say that they may be near, and positions
+    are those of the last publication at `rates_hz` (runs,).
     """
 
     own: SteeredFleet
@@ -73,9 +64,8 @@ class FlownFlights:
     def own_at(
         self, run: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
-        """Return the states of the ownships of runs (n,), each at a time (n,) of its own.
-
-        `known` says how many of the ownship's manoeuvres count; all by default.
+        """Return the states of the ownships of runs (n,), each at a time (n,) of its own, by the
+        first `known` of their manoeuvres, or all.
         """
         state = self.own.each(run, time_s, known)
         for crabbing in self.crabbing:
@@ -86,9 +76,8 @@ class FlownFlights:
     def targets_at(
         self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None = None
     ) -> TrajectoryState:
-        """Return the states of targets (n,), each at a time (n,) of its own.
-
-        `state` is what is known of them already, but for the wind.
+        """Return the states of targets (n,), each at a time (n,) of its own; `state` is what is
+        known of them but for the wind.
         """
         state = self.targets.each(target, time_s) if state is None else state
         for crabbing in self.crabbing:

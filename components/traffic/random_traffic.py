@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.closest_approach import RegularTimes, SampleTimes
-from components.flights.many_flights import Starts
+from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
@@ -86,9 +86,12 @@ class RandomTraffic(TrafficSource):
         )
         altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
         speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
-        zero, free = np.zeros(len(names)), np.full((3, len(names)), np.nan)
-        starts = (names, lat, lon, altitude, 360.0 * heading, speed, zero, zero, zero + np.inf)
-        self.targets = Starts(*starts, fixed_deg=free).fleet()
+        zero = np.zeros(len(names))
+        self.targets = straight_fleet(
+            names, lat_deg=lat, lon_deg=lon, alt_m=altitude, heading_deg=360.0 * heading,
+            speed_mps=speed, climb_mps=zero, start_time_s=zero, end_time_s=zero + np.inf,
+            fixed_deg=np.full((3, len(names)), np.nan),
+        )  # fmt: skip
         aircraft = [p.aircraft] * len(names)
         if p.equipage_shares != EquipageShares():
             aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))

@@ -12,7 +12,7 @@ from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.legs import AnyLeg
-from components.flights.many_flights import Starts
+from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import enu_to_geodetic
 from components.traffic.flown_flights import FlightsOfRuns
@@ -137,8 +137,8 @@ class ScriptedTraffic(TrafficSource):
         places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         starts = _start_positions(crafts, references)
-        ownships, targets = _starts(own, places, self.wind), _starts(crafts, starts, self.wind)
-        return FlightsOfRuns(ownships.fleet(), targets.fleet(), roster)
+        ownships, targets = _straight(own, places, self.wind), _straight(crafts, starts, self.wind)
+        return FlightsOfRuns(ownships, targets, roster)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""
@@ -179,7 +179,7 @@ def _intruders(
     """Return the flights of all intruders; starts given as offsets are converted together."""
     known = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
     if not any(craft.legs for craft in crafts):
-        return _starts(crafts, known, wind).fleet()
+        return _straight(crafts, known, wind)
     return ScriptedFleet(
         [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
     )
@@ -209,22 +209,22 @@ def _start_positions(
     return [next(converted) if start is None else start for start in starts]
 
 
-def _starts(
+def _straight(
     crafts: Sequence[Flight], known: list[tuple[float, float, float]], wind: Wind | None
-) -> Starts:
-    """Return flights without legs as columns."""
+) -> ScriptedFleet:
+    """Return flights without legs from where they start."""
     lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).reshape(-1, 3).T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:
         values = [getattr(craft, name, None) for craft in crafts]
         return np.array([default if v is None else v for v in values], dtype=np.float64)
 
-    return Starts(
-        [_name(craft) for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
-        np.array([over_the_ground_mps(craft, _name(craft), wind) for craft in crafts]),
-        column("climb_mps"), column("start_time_s"),
-        column("end_time_s", np.inf),
-        np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
+    return straight_fleet(
+        [_name(craft) for craft in crafts], lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m,
+        speed_mps=np.array([over_the_ground_mps(craft, _name(craft), wind) for craft in crafts]),
+        **{name: column(name) for name in ("heading_deg", "climb_mps", "start_time_s")},
+        end_time_s=column("end_time_s", np.inf),
+        fixed_deg=np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from components.geometry import (
     sensor_angles,
 )
 from components.high_precision.multiprecision import multiprecision
-from components.sensor.grid import round_to_grid
+from components.sensor.grid import Grid
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
 
 DIGITS = 12
@@ -179,20 +179,24 @@ def _pitch_astern() -> NumericalCase:
     )
 
 
+def _rounded(value: float, step: float, **limits: float) -> float:
+    return float(Grid(step, **limits).round(np.array([value]))[0])
+
+
 def rounding_cases() -> list[NumericalCase]:
     """Return the hard cases of rounding to a sensor's grid."""
     value, step = math.nextafter(3.5 * 1.1, 0.0), 1.1
     return [
         NumericalCase("a last place below the edge 3.85, grid 1.1", "round(x/step)·step",
-             round(value / step) * step, float(round_to_grid(value, step)),
+             round(value / step) * step, _rounded(value, step),
              round(Fraction(value) / Fraction(step)) * step, "rational numbers"),
         NumericalCase("110 at a field of view of ±110, grid 4", "round(x/step)·step",
              round(110.0 / 4.0) * 4.0,
-             float(round_to_grid(110.0, 4.0, limit_low=-110.0, limit_high=110.0)),
+             _rounded(110.0, 4.0, limit_low=-110.0, limit_high=110.0),
              108.0, "outermost point inside"),
         NumericalCase("2.5 and -2.5, grid 1: sum of the two", "floor(x + ½)",
              float(math.floor(2.5 + 0.5) + math.floor(-2.5 + 0.5)),
-             float(round_to_grid(2.5, 1.0) + round_to_grid(-2.5, 1.0)), 0.0, "symmetry"),
+             _rounded(2.5, 1.0) + _rounded(-2.5, 1.0), 0.0, "symmetry"),
     ]  # fmt: skip
 
 

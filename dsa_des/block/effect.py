@@ -86,6 +86,11 @@ class Effect(Generic[Built]):
     #: of different replicas may come in one call. A subclass says it again for itself.
     lockstep: ClassVar[bool] = False
 
+    #: Parameter of the block that is true where the effect is asked for, if that is all.
+    flag: ClassVar[str] = ""
+    #: What makes, from the block, what the block calls at run time, if that is all.
+    builds: ClassVar[Any] = None
+
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
@@ -94,8 +99,13 @@ class Effect(Generic[Built]):
 
     def verdict(self, block: Any) -> Verdict:
         """Say whether the scene calls for this effect in this block (a `Component`)."""
+        if self.flag:
+            return Verdict.of_flag(block.p, self.flag)
         raise TypeError(f"{type(self).__name__} gives no verdict")
 
     def build(self, block: Any) -> Built:
         """Return what the block (a `Component`) calls at run time."""
-        raise TypeError(f"{type(self).__name__} builds nothing")
+        if self.builds is None:
+            raise TypeError(f"{type(self).__name__} builds nothing")
+        built: Built = type(self).builds(block)
+        return built

@@ -6,6 +6,7 @@ when they run in a look-ahead window. Physics written over rows serves both.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from operator import attrgetter
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -53,25 +54,20 @@ __all__ = [
 #: Numbers and truth values; no objects, no text.
 _NUMBERS = frozenset("biuf")
 
-#: Row and entry fields of every message type seen so far.
-_LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+#: Row, entry and static fields of every message type seen so far.
+_LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {}
 #: What each class records by its fields.
 _DERIVED: dict[type, DerivedColumns] = {}
 
 
-def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    if message_type in _LAYOUTS:
-        return _LAYOUTS[message_type]
-    rows, entries = [], []
-    for item in fields(message_type):
-        kind = item.metadata.get("per", PER_ROW)
-        if item.name in ("offsets", "run"):
-            continue
-        if kind == PER_ROW:
-            rows.append(item.name)
-        elif kind == PER_ENTRY:
-            entries.append(item.name)
-    _LAYOUTS[message_type] = tuple(rows), tuple(entries)
+def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    if message_type not in _LAYOUTS:
+        names: dict[str, list[str]] = {PER_ROW: [], PER_ENTRY: [], STATIC: []}
+        for item in fields(message_type):
+            if item.name not in ("offsets", "run"):
+                names[item.metadata.get("per", PER_ROW)].append(item.name)
+        rows, entries, statics = map(tuple, names.values())
+        _LAYOUTS[message_type] = rows, entries, statics
     return _LAYOUTS[message_type]
 
 
@@ -151,6 +147,12 @@ class Message(_Found):
     def __len__(self) -> int:
         return len(self.tick)
 
+    @property
+    def size(self) -> int:
+        """How many rows and entries there are."""
+        offsets = getattr(self, "offsets", None)
+        return len(self.tick) + (0 if offsets is None else int(offsets[-1]))
+
     def _runs(self) -> IntArray:
         """Return of which run each row is, also where a class has a `__post_init__` of its own."""
         return no_runs(len(self.tick)) if self.run is None else self.run
@@ -199,7 +201,7 @@ class Message(_Found):
         TypeError, ValueError
             With the class, the field, its length and that which it must have.
         """
-        rows, (row_names, entry_names) = len(self.tick), _layout(type(self))
+        rows, (row_names, entry_names, _) = len(self.tick), _layout(type(self))
         self.run = self._runs()
         if len(self.run) != rows:
             raise ValueError(f"{_of(self, 'run')} has {len(self.run)} of {rows} rows")
@@ -224,17 +226,17 @@ class Message(_Found):
                 return self.take(np.arange(start, stop, step))
             if start == 0 and stop == len(self):
                 return self
-        row_names, entry_names = _layout(type(self))
+        row_names, entry_names, _ = _layout(type(self))
         result = self._copy()
+        values = result.__dict__
         for name in row_names:
-            setattr(result, name, _pick(getattr(self, name), rows))
+            values[name] = _pick(values[name], rows)
         run = self._runs()
         result.run = no_runs(len(result.tick)) if says_no_runs(run) else run[rows]
-        if entry_names or hasattr(self, "offsets"):
-            offsets, index = entries_of(self.offsets, rows)  # type: ignore[attr-defined]
-            result.offsets = offsets  # type: ignore[attr-defined]
+        if entry_names or "offsets" in values:
+            values["offsets"], index = entries_of(values["offsets"], rows)
             for name in entry_names:
-                setattr(result, name, _pick(getattr(self, name), index))
+                values[name] = _pick(values[name], index)
         return result
 
     def reordered(self, order: IntArray) -> Self:
@@ -256,6 +258,20 @@ class Message(_Found):
         result.run = run
         return result
 
+    def alike(self, other: "Message") -> bool:
+        """Return whether another message differs in nothing but its rows and their values."""
+        if self.__class__ is not other.__class__:
+            return False
+        mine, others = self.__dict__, other.__dict__
+        kinds = [*map(type, mine.values())]
+        if kinds != [*map(type, others.values())] or [*mine] != [*others]:
+            return False
+        if dict in kinds:
+            names = [name for name, kind in zip(mine, kinds, strict=True) if kind is dict]
+            if any(mine[name].keys() != others[name].keys() for name in names):
+                return False
+        return all(mine.get(name) is others.get(name) for name in _layout(type(self))[2])
+
     def tables(self) -> dict[str, Columns]:
         """Return the rows to record: table → column → values, as declared in `recorded`.
 
@@ -268,13 +284,13 @@ class Message(_Found):
         """Return one message with the rows of all parts, in the order given."""
         if len(parts) == 1:
             return parts[0]
-        row_names, entry_names = _layout(type(parts[0]))
+        row_names, entry_names, _ = _layout(type(parts[0]))
         # Static fields come from the last part: what a wire held before its first message may
         # know less than a real one.
         result = parts[-1]._copy()
         rows = [len(part) for part in parts]
         for name in row_names:
-            setattr(result, name, _join([getattr(part, name) for part in parts], rows))
+            setattr(result, name, _join([*map(attrgetter(name), parts)], rows))
         result.run = joined_runs([part._runs() for part in parts])
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
@@ -283,7 +299,7 @@ class Message(_Found):
             result.offsets = np.concatenate([*joined, starts[-1:]])  # type: ignore[attr-defined]
             entries = np.diff(starts).tolist()
             for name in entry_names:
-                setattr(result, name, _join([getattr(part, name) for part in parts], entries))
+                setattr(result, name, _join([*map(attrgetter(name), parts)], entries))
         return result
 
     @classmethod
@@ -365,8 +381,8 @@ def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> N
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:
-    if value is None:
-        return None
+    if value is None or value.__class__ is np.ndarray:
+        return None if value is None else value[rows]
     if isinstance(value, dict):
         return {key: _pick(item, rows) for key, item in value.items()}
     if hasattr(value, "take_rows"):

@@ -6,7 +6,10 @@ found out before a byte is read.
 
 import os
 import stat
+from collections.abc import Callable
+from functools import lru_cache, wraps
 from pathlib import Path
+from typing import Any
 
 #: Files of tables and traffic; a day of dense traffic is a tenth of it.
 LARGEST_BYTES = 512 * 1024 * 1024
@@ -85,6 +88,29 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     if "\0" in text:
         raise InputFileError("is not a text file: it holds NUL characters")
     return text.replace("\r\n", "\n")
+
+
+def read_once(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make a reader of a file keep what it returned for the files that were read last.
+
+    A file is read again when its size or the time of its last change is another; one without
+    status is read, so that the reader says what is wrong with it.
+    """
+
+    def keeping(read: Callable[..., Any]) -> Callable[..., Any]:
+        kept = lru_cache(most)(lambda state, path, *more, **named: read(path, *more, **named))
+
+        @wraps(read)
+        def again(path: Path, *more: Any, **named: Any) -> Any:
+            try:
+                status = path.stat()
+            except (OSError, ValueError):
+                return read(path, *more, **named)
+            return kept((status.st_mtime_ns, status.st_size), path, *more, **named)
+
+        return again
+
+    return keeping
 
 
 def is_regular_file(path: Path) -> bool:

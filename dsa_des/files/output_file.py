@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_names import reason_of, why_no_name
@@ -28,13 +28,20 @@ def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
     A link that stands there is replaced; what it points to stays as it is. `to_disk` has the
     content on the disk before it takes its name, so that it is whole even after a loss of power.
     """
+    with streamed(path) as stream:
+        stream.write(content)
+        if to_disk:
+            stream.flush()
+            os.fsync(stream.fileno())
+
+
+@contextmanager
+def streamed(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write to, which takes its name when the block ends well; see `write_file`."""
     temporary = temporary_beside(path)
     try:
         with open(temporary, "xb") as stream:
-            stream.write(content)
-            if to_disk:
-                stream.flush()
-                os.fsync(stream.fileno())
+            yield stream
         os.replace(temporary, path)
     except BaseException as error:
         with suppress(OSError):

@@ -1,7 +1,7 @@
 """The recorder: what blocks send, checked against what messages declare, in canonical order."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -94,9 +94,27 @@ def _nearest_and_all(name: str, declared: Iterable[str]) -> str:
     return f"{asked} (declared: {shown or 'nothing'})"
 
 
+class _Group(NamedTuple):
+    """Messages of one block that differ in nothing but their rows, and the tables they fill."""
+
+    block: str
+    tables: frozenset[str]
+    messages: list[Message]
+    #: The tables, while there is one message only.
+    first: list[tuple[str, Columns]]
+
+
 # So many rows, or pieces of them, are handed on at a time: a few would cost as much.
 _ROWS_AT_ONCE, _PIECES_AT_ONCE = 16_384, 2048
 _LEADING: Schema = {name: column.kind for name, column in LEADING.items()}
+
+
+class NotRecordedError(Exception):
+    """A message cannot be recorded; its cause says why."""
+
+    def __init__(self, block: str, ticks: IntArray) -> None:
+        super().__init__(block, ticks)
+        self.block, self.ticks = block, ticks
 
 
 class Recorder:
@@ -127,6 +145,9 @@ class Recorder:
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
+        #: What came since `_read`, and of it what more messages of a block may join.
+        self._groups: list[_Group] = []
+        self._open: dict[str, list[_Group]] = {}
         self._texts: dict[tuple[str, str], _TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
@@ -190,12 +211,49 @@ class Recorder:
         wanted = self._pending.keys()
         if self._wanted is not None and wanted.isdisjoint({*message.recorded, *message.may_hold}):
             return
-        for table, columns in self._tables(message):
+        groups = self._open.get(block, [])
+        group = next((one for one in groups if one.messages[0].alike(message)), None)
+        if group is None:
+            first = self._checked(block, message)
+            if not (tables := frozenset(table for table, _ in first)):
+                return
+            group = _Group(block, tables, [], first)
+            self._groups.append(group)
+            # Rows of one instant stay in the order in which their block sent them.
+            still = [one for one in groups if one.tables.isdisjoint(tables)]
+            self._open[block] = [*still, group]
+        else:
+            group.first.clear()
+        group.messages.append(message)
+        self._noted[0] += message.size
+        self._noted[1] += 1
+
+    def _checked(self, block: str, message: Message) -> list[tuple[str, Columns]]:
+        """Return the tables of a message, all of whose columns are declared."""
+        tables = list(self._tables(message))
+        for table, columns in tables:
             self._declared.check(block, table, columns, type(message).__name__)
-            if table in self._pending and len(columns["tick"]):
-                self._pending[table].append((block, columns))
-                self._noted[0] += len(columns["tick"])
-                self._noted[1] += 1
+        return tables
+
+    def _read(self) -> None:
+        """Make pieces of tables of what came: a few long ones, whatever the messages' lengths."""
+        groups, self._groups, self._open = self._groups, [], {}
+        for block, _, messages, first in groups:
+            for table, columns in first or self._together(block, messages):
+                if table in self._pending and len(columns["tick"]):
+                    self._pending[table].append((block, columns))
+
+    def _together(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
+        """Return the tables of several messages; of them, the one that fails is found."""
+        try:
+            return self._checked(block, type(messages[0]).concatenate(messages))
+        except Exception:
+            for message in messages:
+                try:
+                    self._checked(block, message)
+                except Exception as error:
+                    raise NotRecordedError(block, message.tick) from error
+            raise
 
     def _tables(self, message: Message) -> Iterator[tuple[str, Columns]]:
         """Give the tables of a message; of one that does not say it there, run by run."""
@@ -210,14 +268,15 @@ class Recorder:
                 run = np.full(len(columns["tick"]), part.run[0], dtype=np.int64)
                 yield table, {**columns, "replica": run}
 
-    def mark(self) -> dict[str, int]:
+    def mark(self) -> int:
         """Return how much was noted since the last `advance`, for `rewind`."""
-        return {table: len(pieces) for table, pieces in self._pending.items()}
+        self._open = {}
+        return len(self._groups)
 
-    def rewind(self, mark: dict[str, int]) -> None:
+    def rewind(self, mark: int) -> None:
         """Forget what was noted since `mark`."""
-        for table, count in mark.items():
-            del self._pending[table][count:]
+        self._open = {}
+        del self._groups[mark:]
 
     def advance(self, run: int, tick: int) -> None:
         """Hand on the rows before a tick of a run, of which no more come, once there are enough."""
@@ -226,6 +285,7 @@ class Recorder:
 
     def _hand_on_before(self, run: int, tick: int) -> None:
         self._noted = [0, 0]
+        self._read()
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []

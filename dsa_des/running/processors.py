@@ -186,8 +186,9 @@ class Processor:
         self._line: deque[_Job] = deque()
         self._working: _Job | None = None
         self._free_from = 0
-        #: What became of jobs, and entries of which something leaves, since `_hand_on`.
-        self._notes: list[tuple[_Job, int, int, int]] = []
+        #: What became of jobs since `close_window`: block, and the numbers of `_record_all`.
+        self._notes: list[tuple[str, tuple[int, ...]]] = []
+        #: Entries of which something leaves, since `_hand_on`.
         self._leaving: dict[_Entry, None] = {}
         #: In closed form, jobs that are done after the last window: entered, started, done, block.
         self._under_way = (*[np.empty(0, dtype=np.int64)] * 3, np.empty(0, dtype=object))
@@ -198,7 +199,6 @@ class Processor:
             return False
         now = int(self._env.now)
         self._note(_Job(block, now), now, SKIPPED)
-        self._hand_on()
         return True
 
     def open_window(self, start: int, end: int) -> None:
@@ -268,14 +268,17 @@ class Processor:
             self._begin(now)
 
     def _note(self, job: _Job, tick: int, outcome: int) -> None:
-        self._notes.append((job, tick, len(self._line), outcome))
+        numbers = (tick, job.entered, job.started, len(self._line), outcome)
+        self._notes.append((job.block, numbers))
 
-    def _hand_on(self) -> None:
-        """Record what became of jobs, and send those whose end is known."""
+    def close_window(self) -> None:
+        """Record what became of the jobs of a window."""
         if notes := self._notes:
             self._notes = []
-            columns = [(t, j.entered, j.started, behind, what) for j, t, behind, what in notes]
-            self._record_all([job.block for job, *_ in notes], *np.array(columns).T)
+            self._record_all([block for block, _ in notes], *np.array([n for _, n in notes]).T)
+
+    def _hand_on(self) -> None:
+        """Send the jobs whose end is known."""
         leaving, self._leaving = self._leaving, {}
         for entry in leaving:
             entry.send()

@@ -20,7 +20,7 @@ from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import Recorder
+from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
@@ -140,9 +140,9 @@ class Simulation:
         #: How the runs lie in time, and when they end.
         self.runs = self.timeline.runs
         self._check_ends()
-        processors = build_processors(scene, grain, self.env, self._record)
+        self._processors = build_processors(scene, grain, self.env, self._record)
         self.nodes = build_nodes(
-            self, self.timeline, self.components, grain, processors, shuffle_ties
+            self, self.timeline, self.components, grain, self._processors, shuffle_ties
         )
         connect(scene, self.nodes, self.timeline)
         check_reach(scene, self.nodes, self.runs.run_ticks)
@@ -214,13 +214,13 @@ class Simulation:
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self.recorder.advance(*self.runs.final_before(final, going))
+                self._recorded(self.recorder.advance, *self.runs.final_before(final, going))
             if pacer is not None:
                 pacer(final / self.ticks_per_s)
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
-            self.recorder.close()
+            self._recorded(self.recorder.close)
         if self.runs.early and self.runs.count == 1:
             self.duration_s = Fraction(int(self.runs.ends[0]), self.ticks_per_s)
             for component in self.components.values():
@@ -278,6 +278,16 @@ class Simulation:
                 replicas=self.timeline.says_replica,
             )  # fmt: skip
 
+    def _recorded(self, call: Callable[..., None], *arguments: Any) -> None:
+        """Let the recorder hand on rows; what it cannot record is its block's failure."""
+        try:
+            call(*arguments)
+        except NotRecordedError as error:
+            cause = error.__cause__ or error
+            component = self.nodes[error.block].component
+            said = block_failure(component, int(error.ticks[0]) / self.ticks_per_s, cause)
+            self._raise(Failure(said, cause, error.ticks[:1]))
+
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
             self.recorder.record(block, message)
@@ -293,6 +303,8 @@ class Simulation:
         except Abort:
             if self.failure is None:
                 raise
+        for processor in self._processors.values():
+            processor.close_window()
         return self.failure
 
     def fail(

@@ -12,7 +12,7 @@ from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.reach import FarthestLook, Reach, farthest_look
-from components.sensor.mounting import MountedAxes
+from components.sensor.mounting import SensorAxes
 
 
 def flight(draw: Random, name: str) -> ScriptedTrajectory:
@@ -103,8 +103,8 @@ def test_requests_add_up_and_the_silent_want_everything() -> None:
 
 def test_a_tilted_sensor_sees_steeper_body_elevations() -> None:
     level = Reach((-1, 1), (-0.2, 0.3), 5000.0)
-    turned = MountedAxes((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).reach(level)
+    turned = SensorAxes((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).reach(level)
     assert turned.steepest_rad == pytest.approx(0.3)
-    tilted = MountedAxes((0.0, 0.4, 0.0), (0.0, 0.4, 0.0))
+    tilted = SensorAxes((0.0, 0.4, 0.0), (0.0, 0.4, 0.0))
     _, elevation = tilted.to_body(np.linspace(-1, 1, 201), np.full(201, 0.3))
     assert np.abs(elevation).max() <= tilted.reach(level).steepest_rad == pytest.approx(0.7)

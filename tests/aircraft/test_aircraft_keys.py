@@ -13,6 +13,7 @@ from covering import covers
 from wired import Row, chain, decided, rows, run, sensor
 
 import dsa_des
+from components.encounters.encounter_traffic import MadeTogether
 from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
 from components.formats.csv_file import read_csv
 from components.formats.set_file import read_set
@@ -128,7 +129,8 @@ def modelled_one(craft: dict, folder) -> dict:
 def a_model_that_gives_the_two(monkeypatch):
     """What a model makes cannot be put at one place: here it gives what stands in its file."""
     monkeypatch.setattr(
-        "components.encounters.encounter_traffic._made", lambda key, _: read_set(key[0])
+        "components.encounters.encounter_traffic._PAIRS",
+        MadeTogether(lambda keys: [read_set(model[0]) for model, _ in keys], 9),
     )
 
 

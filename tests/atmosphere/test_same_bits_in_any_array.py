@@ -20,7 +20,7 @@ from components.atmosphere.visibility import (
     fog_visibility_m,
     rain_visibility_m,
 )
-from components.navigation.errors import attitude_with_error, position_with_error
+from components.navigation.errors import displaced_position
 from components.optical.detection import detection_probability, false_alarm_direction
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
@@ -98,12 +98,9 @@ CASES = {
         lowest_elevation_rad=-0.3,
         highest_elevation_rad=0.1,
     )[0],
-    "position": lambda a, b, c: position_with_error(
-        180 * a - 90, 9.0, 100.0, sigma_north_east_down_m=(9.0, 7.0, 3.0), normals=(b, c, b)
+    "position": lambda a, b, c: displaced_position(
+        180 * a - 90, 9.0, 100.0, 9.0 * b, 7.0 * c, 3.0 * b
     )[1],
-    "attitude": lambda a, b, c: attitude_with_error(
-        a, b, c, sigma_rad=(0.01, 0.01, 0.01), normals=(b, c, a)
-    )[2],
 }
 ONE_ARGUMENT = {"count", "alarm_snr", "alarm_snr_1", "frame"}
 SLOW = {"clutter_steady": 1000}

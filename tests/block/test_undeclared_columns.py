@@ -75,6 +75,20 @@ def test_a_table_without_instants_is_refused(lab, monkeypatch):
     assert "without a column 'tick'" in failure_of(lab, Timeless, monkeypatch)
 
 
+@dataclass(eq=False)
+class LaterTypo(Beat):
+    """Records a column with a slip in its name, from the third instant on."""
+
+    def tables(self):
+        late = self.tick[-1] >= 500_000_000
+        return {"beats": {"tick": self.tick, "valeu" if late else "value": self.value}}
+
+
+def test_what_is_undeclared_later_on_only_names_its_block_and_instant_too(lab, monkeypatch):
+    said = failure_of(lab, LaterTypo, monkeypatch, window=1)
+    assert "block 'a'" in said and "'valeu'" in said and "t = 0.500 s" in said
+
+
 def test_columns_are_looked_up_once_for_a_block_and_its_names():
     recorder = Recorder([ColumnSink()])
     recorder.open([Beat], 10)

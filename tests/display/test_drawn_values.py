@@ -19,7 +19,7 @@ from components.display.map_view import draw_outline, outline_of
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
-from components.sensor.mounting import BodyAxes
+from components.sensor.mounting import SensorAxes
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ObserverSink
@@ -471,7 +471,7 @@ def test_how_wrong_tracks_are_and_say(drawn):
 def test_a_field_of_view_without_end_is_its_two_edges(everywhere):
     azimuth_rad = (-math.pi, math.pi) if everywhere else (math.radians(-30), math.radians(50))
     reach = Reach(azimuth_rad, (-1.0, 1.0), math.inf)
-    outline = outline_of(math.radians(217), reach, BodyAxes())
+    outline = outline_of(math.radians(217), reach, SensorAxes())
     axes = Figure().add_subplot()
     draw_outline(axes, outline, {"a": RADAR, "eo": EO}, "eo", 40.0)
     wanted = [] if everywhere else [187, 267]
@@ -486,7 +486,7 @@ def test_a_field_of_view_without_end_is_its_two_edges(everywhere):
 
 def test_a_field_of_view_all_around_is_a_ring_without_a_corner_at_the_ownship():
     around = Reach((-math.pi, math.pi), (-1.0, 1.0), 5000.0)
-    corners = outline_of(1.0, around, BodyAxes()).corners_km
+    corners = outline_of(1.0, around, SensorAxes()).corners_km
     assert np.hypot(*corners.T) == pytest.approx(5.0)
     most = Reach((-math.radians(170), math.radians(170)), (-1.0, 1.0), 5000.0)
-    assert outline_of(1.0, most, BodyAxes()).corners_km[-1] == pytest.approx((0.0, 0.0))
+    assert outline_of(1.0, most, SensorAxes()).corners_km[-1] == pytest.approx((0.0, 0.0))

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from components.flights import closest_approach
 from components.flights.closest_approach import (
-    OwnTimes,
+    KnownTimes,
     RegularTimes,
-    SharedTimes,
     closest_approaches,
 )
 from components.flights.legs import Straight, Turn
@@ -103,7 +102,7 @@ def recorded(steps_and_places):
 @given(own=samples.map(recorded), targets=st.lists(samples.map(recorded), min_size=1, max_size=4),
        end_s=st.sampled_from([10.0, 500.0]))  # fmt: skip
 def test_recorded_flights_as_by_looking_at_every_sample_of_the_two(own, targets, end_s):
-    times = [SharedTimes(own.sample_times_s), OwnTimes([t.sample_times_s for t in targets])]
+    times = [KnownTimes(own.sample_times_s), KnownTimes(*(t.sample_times_s for t in targets))]
     halved = found(own, targets, SampledFleet(targets), times, end_s)
     for one, target in zip(halved, targets, strict=True):
         every = np.union1d(own.sample_times_s, target.sample_times_s)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_parameters
-from components.flights.many_flights import Starts
+from components.flights.geodesic_motion import geodesic_parameters
+from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 
 latitudes = st.floats(-90, 90) | st.sampled_from([90.0, -90.0, 0.0, -0.0, 52.0])
@@ -25,7 +25,7 @@ flights = st.tuples(rows, st.tuples(optional, optional, optional),
 def test_tables_are_equal_to_the_bit(given_rows):
     columns = np.array(given_rows).T
     columns[3] = np.radians(columns[3])
-    together = geodesic_parameter_table(*columns)
+    together = geodesic_parameters(*columns)
     alone = np.stack([geodesic_parameters(*row) for row in columns.T.tolist()], axis=1)
     assert together.tobytes() == alone.tobytes()
 
@@ -36,7 +36,11 @@ def starts_of(drawn):
     ends = [np.inf if end is None else end for *_, end in drawn]
     names = [f"t{i}" for i in range(len(drawn))]
     start_s = np.array([start for _, _, start, _ in drawn])
-    return Starts(names, *columns, start_time_s=start_s, end_time_s=np.array(ends), fixed_deg=fixed)
+    of = ("lat_deg", "lon_deg", "alt_m", "heading_deg", "speed_mps", "climb_mps")
+    return straight_fleet(
+        names, **dict(zip(of, columns, strict=True)), start_time_s=start_s,
+        end_time_s=np.array(ends), fixed_deg=fixed,
+    )  # fmt: skip
 
 
 @settings(max_examples=60, deadline=None)
@@ -50,9 +54,10 @@ def test_flights_together_fly_as_each_alone(drawn, data):
         )
         for i, (row, (yaw, pitch, roll), start, end) in enumerate(drawn)
     ]  # fmt: skip
-    starts = starts_of(drawn)
-    assert starts.are_plain()
-    together, each = starts.fleet(), ScriptedFleet(alone)
+    with pytest.MonkeyPatch.context() as patch:  # none is made by itself
+        patch.setattr("components.flights.many_flights.ScriptedTrajectory", None)
+        together = starts_of(drawn)
+    each = ScriptedFleet(alone)
     assert [flight.name for flight in together] == [flight.name for flight in alone]
     assert together.max_speeds_mps.tolist() == [f.max_speed_mps for f in alone]
     assert together.intervals_present_s.tolist() == [[*f.interval_present()] for f in alone]
@@ -73,7 +78,7 @@ def plain(**changes):
     columns = {"lat_deg": 52.0, "lon_deg": 4.0, "alt_m": 100.0, "heading_deg": 10.0,
                "speed_mps": 50.0, "climb_mps": 0.0, "start_time_s": 0.0,
                "end_time_s": np.inf} | changes  # fmt: skip
-    return Starts(
+    return straight_fleet(
         ["a", "b"], **{k: np.array([v, v]) for k, v in columns.items()},
         fixed_deg=np.full((3, 2), np.nan),
     )  # fmt: skip
@@ -87,10 +92,9 @@ def plain(**changes):
 )  # fmt: skip
 def test_what_one_flight_refuses_is_refused_of_many(changes, said):
     with pytest.raises(ValueError, match=said):
-        plain(**changes).fleet()
+        plain(**changes)
 
 
 def test_flights_that_stand_still_are_made_one_by_one():
     still = plain(speed_mps=0.0)
-    assert not still.are_plain()
-    assert [flight.segments[0].kind for flight in still.fleet()] == ["hold"] * 2
+    assert [flight.segments[0].kind for flight in still] == ["hold"] * 2

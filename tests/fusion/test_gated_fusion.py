@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.fusion.gated import nearest_in_gate
+from components.fusion.gated import Entries, Gates, nearest_in_gate
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -26,10 +26,15 @@ def report(azimuth_deg, range_m=None):
 
 
 def match(one, ticks, other, other_ticks, gate_ticks=10, angle_deg=2.0, range_gate_m=100.0):
-    return nearest_in_gate(
-        one, np.arange(len(ticks)), np.array(ticks), other, np.array(other_ticks),
-        gate_ticks=gate_ticks, angle_gate_rad=np.radians(angle_deg), range_gate_m=range_gate_m,
-    ).tolist()  # fmt: skip
+    mine, others = (
+        Entries(
+            message, np.zeros(len(when), int), np.array(when, int), np.array(when, int),
+            np.full((6, len(when)), np.nan),
+        )
+        for message, when in ((one, ticks), (other, other_ticks))
+    )  # fmt: skip
+    gates = Gates(gate_ticks, 1 << 40, np.radians(angle_deg), range_gate_m, 1)
+    return nearest_in_gate(mine, np.arange(len(ticks)), others, gates).tolist()
 
 
 def test_gates_of_time_are_inclusive_and_look_back_only():

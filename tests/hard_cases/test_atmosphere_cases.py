@@ -17,7 +17,7 @@ from components.atmosphere.slant_path import (
 )
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
-from components.navigation.errors import position_with_error
+from components.navigation.errors import displaced_position
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.detection.output import false_alarm_count
@@ -139,7 +139,7 @@ EDGES = [
     ),
     (
         "an error at the pole itself",
-        lambda: position_with_error(90.0, 0.0, 0.0, bias_north_east_down_m=(0.0, 0.0, 5.0))[0],
+        lambda: displaced_position(90.0, 0.0, 0.0, 0.0, 0.0, 5.0)[0],
         90.0,
         0.0,
     ),

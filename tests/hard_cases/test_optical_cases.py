@@ -13,7 +13,7 @@ from components.optical.signature import (
     total_signature,
 )
 from components.optical.silhouette import visible_area
-from components.sensor.grid import round_to_grid
+from components.sensor.grid import Grid
 
 PI = np.pi
 DEG = np.pi / 180.0
@@ -257,7 +257,7 @@ ROUNDING = [
     ("source", "value", "step", "low", "high", "expected"), ROUNDING, ids=[r[0] for r in ROUNDING]
 )
 def test_rounding(source, value, step, low, high, expected):
-    assert round_to_grid(value, step, limit_low=low, limit_high=high) == expected
+    assert Grid(step, limit_low=low, limit_high=high).round(np.array([value])) == expected
 
 
 def _table_with_a_hole():
@@ -284,7 +284,7 @@ BAD_INPUT = [
     ("table with a hole", _table_with_a_hole, "hole: no value at az_deg 90, el_deg 0"),
     ("mesh not closed", _open_mesh, "the mesh is not closed"),
     ("negative range", lambda: pixels_covered(1, -1, **AFRL, sensor_pixels=9), "range_m is -1"),
-    ("negative step", lambda: round_to_grid(1.0, -0.1), "step is -0.1"),
+    ("negative step", lambda: Grid(-0.1), "step is -0.1"),
 ]
 
 

@@ -9,7 +9,7 @@ from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
 from components.optical.signature import detection_range, line_of_sight_rate, pixels_covered
 from components.optical.silhouette import visible_area
-from components.sensor.grid import round_to_grid
+from components.sensor.grid import Grid
 
 COUNT = 10_000
 AREAS = {"front_m2": 12.0, "side_m2": 30.0, "horizontal_m2": 90.0}
@@ -46,7 +46,7 @@ CASES = {
         range_m=5e3 * np.abs(a),
         visibility_m=2e4,
     ),
-    "grid": lambda a, b, c, d: round_to_grid(a, 6.25e-4, limit_low=-1.9, limit_high=1.9),
+    "grid": lambda a, b, c, d: Grid(6.25e-4, limit_low=-1.9, limit_high=1.9).round(a),
 }
 TABLE = table()
 

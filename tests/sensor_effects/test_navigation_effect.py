@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components.environment.tables import Navigation
-from components.navigation.errors import NavigationErrors, position_with_error
+from components.navigation.errors import NavigationErrors, displaced_position
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 
@@ -64,7 +64,7 @@ def test_position_bias(scene, runs):
     run = runs.run(scene(tables=BIASED))
     first = min(runs.detections(run, "radar").values(), key=lambda row: row["tick"])
     assert first["time_s"] == 0.0
-    lat, lon, alt = position_with_error(*OWN.values(), bias_north_east_down_m=(30, -20, 5))
+    lat, lon, alt = displaced_position(*OWN.values(), 30, -20, 5)
     assert first["own_lat_deg"] == pytest.approx(float(lat), abs=1e-12)
     assert first["own_lon_deg"] == pytest.approx(float(lon), abs=1e-12)
     assert first["own_alt_m"] == pytest.approx(float(alt), abs=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from components.display.map_view import outline_of, reach_text
 from components.messages.reach import Reach
-from components.sensor.mounting import MountedAxes
+from components.sensor.mounting import SensorAxes
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 
@@ -36,7 +36,7 @@ def test_axes_are_those_of_the_rotation_matrices():
     p, q = rng.uniform(-3.1, 3.1, 50), rng.uniform(-1.5, 1.5, 50)
     for mount in ((90.0, 0.0, 0.0), (0.0, -30.0, 0.0), (0.0, 0.0, 45.0), (-120.0, 20.0, 170.0)):
         rad = tuple(math.radians(angle) for angle in mount)
-        axes = MountedAxes(rad, rad)
+        axes = SensorAxes(rad, rad)
         seen = vector(*axes(p, q))
         np.testing.assert_allclose(seen, rotation(*mount) @ vector(p, q), atol=1e-14)
         back = vector(*axes.to_body(*axes(p, q)))
@@ -58,14 +58,14 @@ def test_a_mounting_in_azimuth_turns_the_field_of_view(scene, runs):
 def test_fields_of_view_are_drawn_as_they_are_mounted():
     reach = Reach((-math.radians(20), math.radians(20)), (-0.5, 0.5), 6000.0)
     true, believed = (math.radians(90), 0.0, 0.0), (0.0, 0.0, 0.0)
-    beside = outline_of(math.radians(30), reach, MountedAxes(true, believed))
+    beside = outline_of(math.radians(30), reach, SensorAxes(true, believed))
     expected = 6 * np.array([[math.sin(b), math.cos(b)] for b in np.radians([100, 140])])
     np.testing.assert_allclose(beside.corners_km[[0, 180]], expected, atol=1e-12)
     np.testing.assert_array_equal(beside.corners_km[181], [0.0, 0.0])
-    assert reach_text(reach, MountedAxes(true, believed)).startswith(
+    assert reach_text(reach, SensorAxes(true, believed)).startswith(
         "field of view ±20°\nround 90°,"
     )
-    up = MountedAxes((0.0, math.radians(60), 0.0), believed)
+    up = SensorAxes((0.0, math.radians(60), 0.0), believed)
     middle = outline_of(0.0, reach, up).corners_km[90]
     np.testing.assert_allclose(middle, [0.0, 3.0], atol=1e-12)
     assert "60° up" in reach_text(reach, up)

@@ -15,7 +15,7 @@ from components.surveillance.altimetry import (
     altimetry_variance_ft2,
     standard_laplace,
 )
-from components.surveillance.broadcast import CORRELATION_TIME_S, OwnErrors, Who
+from components.surveillance.broadcast import CORRELATION_TIME_S, Broadcasts, Transponders
 from components.surveillance.reception import DO_365_IN_1_S, LAWS, do_365, fitted
 from components.surveillance.squitter_clock import SquitterClocks
 from dsa_des.time.randomness import Stream, Streams
@@ -28,7 +28,7 @@ NS = 10**9
 
 def who(count, replica=0):
     keys = np.random.default_rng(5).integers(0, 2**63, count).astype(np.uint64)
-    return Who(keys, np.full(count, replica), np.zeros(count, dtype=np.int64))
+    return Transponders(keys, np.full(count, replica), np.zeros(count, dtype=np.int64))
 
 
 @pytest.mark.parametrize("name", ["position", "velocity"])
@@ -36,10 +36,12 @@ def who(count, replica=0):
 def test_errors_have_the_stated_deviation_and_last(errors, name):
     them, number = who(N), np.arange(N) % 300
     instant = number * NS // 2
-    own = OwnErrors(Streams(7), errors)
-    now = np.stack(own.of(name, np.full(N, 12.3), them, number, instant))
+    own = Broadcasts(Streams(7), errors, False)
+    now = np.stack(own.level_errors(name, np.full(N, 12.3), them, number, instant))
     lag_s = 90.0
-    later = np.stack(own.of(name, np.full(N, 12.3), them, number + 180, instant + int(lag_s * NS)))
+    later = np.stack(
+        own.level_errors(name, np.full(N, 12.3), them, number + 180, instant + int(lag_s * NS))
+    )
     lasts = errors == "gauss_markov"
     pairs = [(now[0], later[0], lasts), (now[1], later[1], lasts), (now[0], now[1], False)]
     for one, other, lasting in pairs:
@@ -52,9 +54,9 @@ def test_errors_have_the_stated_deviation_and_last(errors, name):
 
 def test_nacp_is_the_radius_that_holds_95_percent():
     them = who(N)
-    own = OwnErrors(Streams(8), "gauss_markov")
+    own = Broadcasts(Streams(8), "gauss_markov", False)
     sigma = np.full(N, POSITION_RADIUS_M[8] / RADIUS_IN_DEVIATIONS)
-    inside = np.hypot(*own.of("position", sigma, them, np.arange(N), np.arange(N))) < 92.6
+    inside = np.hypot(*own.level_errors("position", sigma, them, np.arange(N), np.arange(N))) < 92.6
     assert abs(inside.mean() - 0.95) < Z * (0.95 * 0.05 / N) ** 0.5
 
 

@@ -244,11 +244,11 @@ def _required(wanted: float, cells: int, pfa: float, pulses: int, model: str) ->
 class Averaging:
     """A cell-averaging detector with one radar's pulses and probability of false alarm."""
 
-    def __init__(self, parameters: Any) -> None:
+    def __init__(self, block: Any) -> None:
         self._settings = {
-            "reference_cells": parameters.cfar_reference_cells,
-            "false_alarm_probability": parameters.false_alarm_probability,
-            "pulses": parameters.pulses_summed,
+            "reference_cells": block.p.cfar_reference_cells,
+            "false_alarm_probability": block.p.false_alarm_probability,
+            "pulses": block.p.pulses_summed,
         }
 
     def probability(self, snr: FloatArray, model: str) -> FloatArray:
@@ -281,6 +281,7 @@ class CellAveraging(Effect[Averaging]):
     lockstep = True
     name = "CFAR"
     acts_on = REFERENCE_CELLS
+    builds = Averaging
     outside_the_proof = "no number of cells is as good as a threshold that is known"
 
     def verdict(self, block: Any) -> Verdict:
@@ -289,7 +290,3 @@ class CellAveraging(Effect[Averaging]):
         if cells is None:
             return Verdict(False, "cfar_reference_cells is not given")
         return Verdict(True, f"cfar_reference_cells is {cells}")
-
-    def build(self, block: Any) -> Averaging:
-        """Return the detector of this radar."""
-        return Averaging(block.p)

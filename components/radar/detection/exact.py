@@ -56,21 +56,6 @@ def geometric_miss(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArra
     return _polynomial(missed, q) * r
 
 
-def chain_gain(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArray:
-    """Return Pd for any K (None: Poisson), meant for n + echo < V_T; `echo` is n·SNR (flat)."""
-    return noise.false_alarm_probability + _chain(noise, noise.gained, shape, echo, gain=True)
-
-
-def chain_miss(
-    noise: NoiseTerms, shape: int | None, echo: FloatArray, *, negligible: float
-) -> FloatArray:
-    """Return 1 - Pd for any K (None: Poisson), meant for n + echo >= V_T; `echo` is n·SNR.
-
-    Sums that are bound to stay below `negligible` are returned as 0 and not worked out.
-    """
-    return _chain(noise, noise.missed, shape, echo, gain=False, negligible=negligible)
-
-
 def _odds(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return q = c/(1+c) and 1 - q, both to full accuracy, for c from 0 to infinity."""
     r = 1.0 / (1.0 + scale)
@@ -99,20 +84,23 @@ def _polynomial(coefficients: FloatArray, x: FloatArray) -> FloatArray:
 
 def _chain(
     noise: NoiseTerms,
-    weight: FloatArray,
     shape: int | None,
     echo: FloatArray,
     *,
     gain: bool,
-    negligible: float = -1.0,
+    negligible: float,
 ) -> FloatArray:
-    """Sum Pr(N = j) · weight_j over a window around the largest term, for each element.
+    """Sum Pr(N = j) · weight_j over a window around the largest term, for each n·SNR.
+
+    With the weights `gained` (meant for n + echo < V_T) or `missed` (for the others), and any K
+    (None: Poisson). Sums that are bound to stay below `negligible` are 0 and not worked out.
 
     The sum is Pr(N = a) · (below + above), with `below` running up from the window's low end to
     the anchor a and `above` running down from its high end, each step one ratio of neighbouring
     probabilities (Horner's rule with changing factors). Sorting makes the elements that are at
     work in a step neighbours; no element's arithmetic depends on another's.
     """
+    weight = noise.gained if gain else noise.missed
     anchor = _anchor(noise, shape, echo)
     if not gain:
         anchor = np.minimum(anchor, float(weight.size - 1))
@@ -262,7 +250,12 @@ def _sides(pulses: int, pfa: float, model: str, negligible: float) -> tuple[Side
     # An echo of 1e15 is missed with probability 0 (Poisson), and 1e100 is as good as infinite for
     # a negative binomial with K >= 3; the cap keeps the anchor's arithmetic finite.
     cap = 1e15 if shape is None else 1e100
+
+    def chain(snr: FloatArray, gain: bool, negligible: float) -> FloatArray:
+        echo = np.minimum(pulses * snr, cap)
+        return _chain(noise, shape, echo, gain=gain, negligible=negligible)
+
     return (
-        lambda snr: chain_gain(noise, shape, np.minimum(pulses * snr, cap)),
-        lambda snr: chain_miss(noise, shape, np.minimum(pulses * snr, cap), negligible=negligible),
+        lambda snr: pfa + chain(snr, True, -1.0),
+        lambda snr: chain(snr, False, negligible),
     )

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from components.aircraft.known_targets import known_targets
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells, over_cells
 from components.sensor.look import Cells
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
@@ -26,16 +26,6 @@ def _pd_of(radar: Any, cells: Cells) -> FloatArray:
         )
         return echo
     return np.where(look.detected, 1.0, 0.0)
-
-
-def measure_pd(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of detection at every (scan, target)."""
-    radar: Any = block
-    # What is too far away to be looked at is detected with probability 0.
-    found: dict[str, AnyArray] = dict(
-        over_cells(radar, wake, lambda cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0)
-    )
-    return found
 
 
 def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
@@ -70,15 +60,9 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
     return {_PD.name: np.array(errors)}
 
 
-def measure_rcs(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the mean RCS and the probability of detection at every (scan, target)."""
-    radar: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"rcs": radar.mean_rcs_m2(cells), _PD.name: _pd_of(radar, cells)}
-
-    found: dict[str, AnyArray] = dict(over_cells(radar, wake, values))
-    return found
+def _rcs(radar: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return the mean RCS and the probability of detection of each cell."""
+    return {"rcs": radar.mean_rcs_m2(cells), _PD.name: _pd_of(radar, cells)}
 
 
 def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +102,8 @@ DETECTION = Ladder(
     ),
     "exact",
     (_PD,),
-    measure_pd,
+    # What is too far away to be looked at is detected with probability 0.
+    measure_cells(lambda radar, cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0),
     pd_truth,
     clears=("model",),
     applies=_averages,
@@ -132,7 +117,7 @@ RCS = Ladder(
     ),
     "aspect",
     (Quantity("rcs", "m²"), _PD),
-    measure_rcs,
+    measure_cells(_rcs),
     applies=_tables,
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,14 @@ from components.radar.detection.exact import exact_probability
 Rung = Callable[[FloatArray, int, float, str], FloatArray]
 
 _RUNGS: dict[str, Rung] = {
+    "exact": partial(exact_probability, miss=False),
     "table": table_probability,
     "gram_charlier": gram_charlier_probability,
     "shnidman": shnidman_probability,
     "albersheim": albersheim_probability,
 }
 
-METHODS = ("exact", *_RUNGS)
+METHODS = tuple(_RUNGS)
 
 
 def detection_probability(
@@ -127,8 +128,6 @@ def probability_of_cells(
     snr: FloatArray, pulses: int, false_alarm_probability: float, model: str, method: str
 ) -> FloatArray:
     """`detection_probability` for a flat contiguous SNR and one radar, all of it checked."""
-    if method == "exact":
-        return exact_probability(snr, pulses, false_alarm_probability, model, miss=False)
     with np.errstate(under="ignore"):
         return _RUNGS[method](snr, pulses, false_alarm_probability, model)
 
@@ -150,11 +149,11 @@ def _probability(
     with np.errstate(under="ignore"):
         for chosen, count, alarm in groups:
             part, radar = ratio[chosen], (int(count), float(alarm), name)
-            if method == "exact":
-                result[chosen] = exact_probability(part, *radar, miss=miss)
+            if miss and method == "exact":
+                result[chosen] = exact_probability(part, *radar, miss=True)
             else:
-                found = _RUNGS[method](part, *radar)
-                result[chosen] = 1.0 - found if miss else found
+                pd = _RUNGS[method](part, *radar)
+                result[chosen] = 1.0 - pd if miss else pd
     return unflatten(result, shape)
 
 

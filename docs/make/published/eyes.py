@@ -14,7 +14,7 @@ import dsa_des
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import Pairs, PairSampler, set_of_pairs
-from components.formats.set_file import set_writer
+from components.formats.set_file import write_set
 from components.visual.acquisition import VISUAL_RANGE_DEPTH, closing_opportunity, round_share
 from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from docs.make.published.rows import PublishedRow, table
@@ -161,8 +161,8 @@ def sets_of_both(folder: Path, pairs: Pairs) -> tuple[Path, Path]:
     turned = {name: getattr(pairs, name)[::-1] for name in _OF_BOTH}
     paths = folder / "own.parquet", folder / "other.parquet"
     for path, some in zip(paths, (pairs, replace(pairs, **turned)), strict=True):
-        with set_writer(path, {"made_by": "docs.make.published.eyes"}) as writer:
-            writer.write(set_of_pairs(some, PairingRules().closest_s, (41.0, -88.0), str(path)))
+        made = set_of_pairs(some, PairingRules().closest_s, (41.0, -88.0), str(path))
+        write_set(path, {"made_by": "docs.make.published.eyes"}, [made])
     return paths
 
 

@@ -12,7 +12,7 @@ from wired import chain, first_look, rows, run, sensor
 
 from components.flights.attitude import Wind, ground_speed_mps, heading_and_airspeed
 from components.flights.legs import Climb, Straight, Turn
-from components.flights.many_flights import Starts, SteeredFleet
+from components.flights.many_flights import SteeredFleet, straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.traffic.flown_flights import FlownFlights
 from components.traffic.wind_effect import Crabbing
@@ -240,11 +240,13 @@ def test_a_replayed_ownship_turns_into_the_wind_where_it_is_steered(tmp_path):
 def test_many_flights_together_by_differences_of_their_positions():
     wind = Wind(9.0, -14.0)
     rng = np.random.default_rng(4)
-    straight = Starts(
-        [str(i) for i in range(20)], rng.uniform(-60, 60, 20), rng.uniform(-180, 180, 20),
-        rng.uniform(0, 5e3, 20), rng.uniform(0, 360, 20), rng.uniform(30, 120, 20),
-        rng.uniform(-8, 8, 20), np.zeros(20), np.full(20, np.inf), np.full((3, 20), np.nan),
-    ).fleet()  # fmt: skip
+    straight = straight_fleet(
+        [str(i) for i in range(20)], lat_deg=rng.uniform(-60, 60, 20),
+        lon_deg=rng.uniform(-180, 180, 20), alt_m=rng.uniform(0, 5e3, 20),
+        heading_deg=rng.uniform(0, 360, 20), speed_mps=rng.uniform(30, 120, 20),
+        climb_mps=rng.uniform(-8, 8, 20), start_time_s=np.zeros(20), end_time_s=np.full(20, np.inf),
+        fixed_deg=np.full((3, 20), np.nan),
+    )  # fmt: skip
     turning = ScriptedTrajectory(
         "t", lat_deg=50, lon_deg=8, alt_m=500, heading_deg=80, speed_mps=55,
         legs=[Straight(duration_s=10), Turn(rate_deg_s=-2, duration_s=20), Climb(climb_mps=4)],
