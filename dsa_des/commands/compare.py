@@ -75,17 +75,17 @@ class _OfAll:
         scenes = [load_scene(path, sets=self.sets)]
         for block, types in swaps:
             scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
-        found = []
+        result = []
         for name in registered(METRICS):
             try:
                 for scene in scenes:
                     MetricSpec(name).build(scene)
             except ValueError:
                 continue
-            found.append(name)
-        if not found:
+            result.append(name)
+        if not result:
             raise UsageError(f"{path}: no metric can be measured of this scene")
-        return found
+        return result
 
 
 def compare_command(
@@ -106,8 +106,8 @@ def compare_command(
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        found = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
-        report_crashes(found, _ANEW)
+        result = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
+        report_crashes(result, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results, _first(results))
@@ -119,17 +119,16 @@ def compare_command(
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         result_names(record.results, results)
-    by_place: dict[Path, Tables] = {}  # what is named twice is run once
+    by_path: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
-            place = file.resolve()
-            if place not in by_place:
-                by_place[place] = _tables(file, study, workers, home)
-        found = [by_place[file.resolve()] for file in files]
-        for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
-            stem = "scatter" if len(found) == 2 else f"scatter-{number}"
-            _compare(found[0], other, (paths[0], path), results, home / stem)
-    report_crashes(list(by_place.values()), _ANEW)
+            if file.resolve() not in by_path:
+                by_path[file.resolve()] = _tables(file, study, workers, home)
+        result = [by_path[file.resolve()] for file in files]
+        for number, (other, path) in enumerate(zip(result[1:], paths[1:], strict=True), start=2):
+            stem = "scatter" if len(result) == 2 else f"scatter-{number}"
+            _compare(result[0], other, (paths[0], path), results, home / stem)
+    report_crashes(list(by_path.values()), _ANEW)
 
 
 def _compare_swap(

@@ -122,8 +122,8 @@ def completing(what: str) -> Callable[[click.Context, click.Parameter, str], lis
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         from dsa_des.commands import completion
 
-        found: list[Any] = getattr(completion, what)(ctx, incomplete)
-        return found
+        result: list[Any] = getattr(completion, what)(ctx, incomplete)
+        return result
 
     return complete
 
@@ -231,9 +231,9 @@ class PluginGroup(click.Group):
             return own
         from dsa_des.block.foreign import installed
 
-        found: Any = installed(registered(COMMANDS)[cmd_name])
-        if not isinstance(found, click.Command):
+        result: Any = installed(registered(COMMANDS)[cmd_name])
+        if not isinstance(result, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"
             )
-        return found
+        return result

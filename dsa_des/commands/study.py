@@ -135,11 +135,11 @@ def _stopped(reason: str, again: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def report_crashes(found: Sequence[Tables], again: str) -> None:
+def report_crashes(result: Sequence[Tables], again: str) -> None:
     """Say how many runs crashed, and end with exit code 1 if there are any."""
-    crashed = sum(tables.rows.crashed for tables in found)
+    crashed = sum(tables.rows.crashed for tables in result)
     if crashed:
-        runs = sum(_count(tables) for tables in found)
+        runs = sum(_count(tables) for tables in result)
         say(
             f"{crashed} of {runs} runs crashed: the process that ran them died each time; "
             "try them again with",

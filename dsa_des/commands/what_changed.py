@@ -158,13 +158,13 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
         return
     axis, baseline = tables.baseline
     names_of = [shortened(name) for name in tables.rows.axes if name != axis]
-    found: dict[Any, list[tuple[str, Pair]]] = {}
+    matches: dict[Any, list[tuple[str, Pair]]] = {}
     for value, others, base, rows in tables.rows.against(axis, baseline):
         where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
         pair = Units(tables, base), Units(tables, rows)
-        found.setdefault(value, []).append((", ".join(where), pair))
+        matches.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")
-    for value, places in found.items():
+    for value, places in matches.items():
         names = [short(item) if swap else f"{axis} = {short(item)}" for item in (baseline, value)]
         say_what_changed((names[0], names[1]), places, results)

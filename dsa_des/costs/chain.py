@@ -89,8 +89,8 @@ def _most_expendable(group: Group) -> RungCost:
     ordered = sorted(group, key=lambda c: c.cpu_us_per_target_scan)
 
     def gap(cost: RungCost) -> float:
-        place = ordered.index(cost)
-        beside = [ordered[i] for i in (place - 1, place + 1) if 0 <= i < len(ordered)]
+        index = ordered.index(cost)
+        beside = [ordered[i] for i in (index - 1, index + 1) if 0 <= i < len(ordered)]
         mine = cost.cpu_us_per_target_scan
         return min(abs(other.cpu_us_per_target_scan / mine - 1.0) for other in beside)
 
@@ -110,11 +110,11 @@ def _recorded(scene: Scene) -> dict[str, Any]:
 def _timed(scenes: Sequence[Scene]) -> list[float]:
     best = [float("inf")] * len(scenes)
     for _ in range(_REPEATS):
-        for place, scene in enumerate(scenes):
+        for index, scene in enumerate(scenes):
             simulation = Simulation(scene)
             started = time.process_time()
             simulation.run()
-            best[place] = min(best[place], time.process_time() - started)
+            best[index] = min(best[index], time.process_time() - started)
     return best
 
 

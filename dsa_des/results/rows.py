@@ -69,8 +69,8 @@ class StoredRows:
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN, missing texts None."""
         if name not in self._held:
-            place = self.names.index(name)
-            others = [n for n in self.names[place:] if n not in self._held]
+            index = self.names.index(name)
+            others = [n for n in self.names[index:] if n not in self._held]
             self._read(others[: self._at_once], look=False)
         self._held.move_to_end(name)
         return self._held[name]
@@ -86,8 +86,8 @@ class StoredRows:
             if look:
                 self._look(table, good)
             kept = table if good.all() else table.filter(good)
-            for name, found in pieces.items():
-                found.append(_codes(kept[name].combine_chunks()))
+            for name, result in pieces.items():
+                result.append(_codes(kept[name].combine_chunks()))
         if look:
             cell, replica = (_joined(pieces[name]) for name in _PLACE)
             self._count = len(cell)
@@ -190,9 +190,9 @@ class Rows:
         """Return the units in some rows and each one's mean value (over its replicas)."""
         values = self.column(name)[rows].astype(float)
         known = ~np.isnan(values)
-        units, place = np.unique(self.units[rows], return_inverse=True)
-        total = np.bincount(place[known], weights=values[known], minlength=len(units))
-        many = np.bincount(place[known], minlength=len(units))
+        units, index = np.unique(self.units[rows], return_inverse=True)
+        total = np.bincount(index[known], weights=values[known], minlength=len(units))
+        many = np.bincount(index[known], minlength=len(units))
         with np.errstate(invalid="ignore", divide="ignore"):
             return units, np.where(many > 0, total / many, np.nan)
 
@@ -216,9 +216,9 @@ class Rows:
         if result.kind == SHARE:
             trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))
         trials = np.where(np.isnan(values), 0.0, trials)
-        units, place = np.unique(self.units[rows], return_inverse=True)
-        won = np.bincount(place, weights=np.nan_to_num(values) * trials, minlength=len(units))
-        tried = np.bincount(place, weights=trials, minlength=len(units))
+        units, index = np.unique(self.units[rows], return_inverse=True)
+        won = np.bincount(index, weights=np.nan_to_num(values) * trials, minlength=len(units))
+        tried = np.bincount(index, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
     def ratio(
@@ -228,8 +228,8 @@ class Rows:
 
         Runs of the same encounter, and of the same unit, hang together.
         """
-        found, used, missing = self._paired(result, rows)
-        below, above, weight, cluster = found
+        matches, used, missing = self._paired(result, rows)
+        below, above, weight, cluster = matches
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
@@ -293,10 +293,10 @@ class Rows:
         if len(parts) < 2:
             none = Estimate(np.nan, np.nan, np.nan, 0, True)
             return EstimatedDifference(none, none, *alone)
-        _, place = np.unique(cluster, return_inverse=True)
-        each = np.array([np.bincount(place, weights=part) for part in parts])
+        _, index = np.unique(cluster, return_inverse=True)
+        each = np.array([np.bincount(index, weights=part) for part in parts])
         value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
-        events = np.bincount(place, weights=weight * below).astype(float)
+        events = np.bincount(index, weights=weight * below).astype(float)
         more = 2.0 * unseen_variance(events)
         joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
         # A ratio whose runs all agree has no such error; its interval tells another.
@@ -375,11 +375,11 @@ def paired_units(
 
     A run without a value has NaN.
     """
-    found, place = np.unique(units, return_inverse=True)
+    result, index = np.unique(units, return_inverse=True)
 
     def means(values: FloatArray, used: AnyArray) -> FloatArray:
-        many = np.bincount(place[used], minlength=len(found))
-        total = np.bincount(place[used], weights=values[used], minlength=len(found))
+        many = np.bincount(index[used], minlength=len(result))
+        total = np.bincount(index[used], weights=values[used], minlength=len(result))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(many > 0, total / many, np.nan)
 
@@ -389,4 +389,4 @@ def paired_units(
     alone = np.where(without, means(first, here), np.nan)
     one = np.where(without, alone, one)
     two = np.where(without & np.isnan(alone), means(second, there), two)
-    return found, one, two
+    return result, one, two

@@ -303,12 +303,12 @@ def read_blocks(
             continue
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
-        for place, lost in scene_file.replaced.items():
-            if place[:2] == key:
-                source, gone = scene_file.source_of(place), ", ".join(lost)
+        for index, lost in scene_file.replaced.items():
+            if index[:2] == key:
+                source, gone = scene_file.source_of(index), ", ".join(lost)
                 notes.append(
-                    f"blocks.{name}: {dotted(place[2:])} of {source} takes the place of the whole "
-                    f"list, {gone} too; a table [{dotted(place)}.NAME] changes one item or adds one"
+                    f"blocks.{name}: {dotted(index[2:])} of {source} takes the place of the whole "
+                    f"list, {gone} too; a table [{dotted(index)}.NAME] changes one item or adds one"
                 )
         extra, given = split_options(table, cls.Parameters)
         given = _as_written(scene_file, key, given, cls.Parameters)

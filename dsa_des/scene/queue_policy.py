@@ -63,11 +63,11 @@ def find_policy(name: Any) -> type[QueuePolicy]:
         hint, allowed = did_you_mean(str(name), POLICIES), ", ".join(map(repr, POLICIES))
         raise ValueError(f"must be one of {allowed}, or module:Class{hint}")
     try:
-        found = load_named(name, "processors")
+        result = load_named(name, "processors")
     except NotAllowed:
         return QueuePolicy
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
-    if not (isinstance(found, type) and issubclass(found, QueuePolicy)):
+    if not (isinstance(result, type) and issubclass(result, QueuePolicy)):
         raise ValueError(f"{name} is not a dsa_des.scene.queue_policy.QueuePolicy")
-    return found
+    return result

@@ -169,8 +169,8 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
                 rows["error"][done + k] = outcome.error
-        found, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
-        for name, column in found.items():
+        result, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+        for name, column in result.items():
             nothing = _nothing(len(numbers), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
         for k, text in errors.items():
@@ -213,24 +213,24 @@ def _measured(
     group = Group(
         scene, [replica for replica, _ in runs], [run for _, run in runs], wanted_by(metrics)
     )
-    found: dict[str, AnyArray] = {}
+    result: dict[str, AnyArray] = {}
     for metric in metrics:
         try:
-            found.update(metric.measure(group))
+            result.update(metric.measure(group))
         except BaseException as error:
             if must_pass(error):
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
             return _one_by_one(scene, metrics, runs)
-    return found, {}
+    return result, {}
 
 
 def _one_by_one(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
-    found: dict[str, AnyArray] = {}
+    result: dict[str, AnyArray] = {}
     errors: dict[int, str] = {}
     for k, run in enumerate(runs):
         values, wrong = _measured(scene, metrics, [run])
@@ -238,5 +238,5 @@ def _one_by_one(
             errors[k] = wrong[0]
         for name, column in values.items():
             nothing = _nothing(len(runs), text=column.dtype == object)
-            found.setdefault(name, nothing)[k] = column[0]
-    return found, errors
+            result.setdefault(name, nothing)[k] = column[0]
+    return result, errors

@@ -57,8 +57,8 @@ class Draw:
             return first + step * replica
         u = _uniform(seed, self.key, replica)
         if self.stratified:
-            block, place = divmod(replica, batch)
-            u = (int(_strata(seed, self.key, block, batch)[place]) + u) / batch
+            block, index = divmod(replica, batch)
+            u = (int(_strata(seed, self.key, block, batch)[index]) + u) / batch
         if self.kind == "choice":
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         low, high = self.values

@@ -32,8 +32,8 @@ class MetricSpec:
 
     name: str
     keys: Mapping[str, Any] = field(default_factory=dict)
-    #: Its place in the study's list, for messages.
-    place: int = 0
+    #: Its position in the study's list, for messages.
+    index: int = 0
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene."""

@@ -127,18 +127,18 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
         refused: dict[int, str] = {}
         for spec in study.metrics:
             try:
-                if wrong is None or spec.place in wrong:
+                if wrong is None or spec.index in wrong:
                     metric = spec.build(scene)
                     check_recorded(metric, blocks)
                     metric.check(blocks)
             except ValueError as error:
-                refused[spec.place] = str(error)
+                refused[spec.index] = str(error)
         wrong = refused
         if not wrong:
             break
     if wrong is None:
         return broken
-    names = {spec.place: spec.name for spec in study.metrics}
+    names = {spec.index: spec.name for spec in study.metrics}
     return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
 
 
@@ -234,34 +234,34 @@ def _build_metrics(
         try:
             built.append(spec.build(scene))
         except ValueError as error:
-            add(("metrics", spec.place), f"{error}{where}", spec.name)
+            add(("metrics", spec.index), f"{error}{where}", spec.name)
     return built
 
 
 def _tables_read(study: Study, scene: Scene) -> set[str]:
     """Return the tables that the metrics read; what is wrong with one is said elsewhere."""
-    found: set[str] = set()
+    result: set[str] = set()
     for spec in study.metrics:
         with contextlib.suppress(ValueError):
-            found.update(spec.build(scene).tables)
-    return found
+            result.update(spec.build(scene).tables)
+    return result
 
 
 def one_per_value(study: Study) -> list[int]:
     """Return cells that together hold every value of every axis; the first cell comes first."""
     wanted = [(0,) * len(study.axes)]
-    for place, axis in enumerate(study.axes):
+    for position, axis in enumerate(study.axes):
         for index in range(1, len(axis.labels)):
-            wanted.append(tuple(index if k == place else 0 for k in range(len(study.axes))))
+            wanted.append(tuple(index if k == position else 0 for k in range(len(study.axes))))
     return [study.cell_at(indices) for indices in wanted]
 
 
 def _different(scenes: list[Scene]) -> list[Scene]:
     """Return one scene for every set of block types."""
-    found: dict[tuple[Any, ...], Scene] = {}
+    result: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:
-        found.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
-    return list(found.values())
+        result.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
+    return list(result.values())
 
 
 def _types(scene: Scene, other: Scene) -> str:

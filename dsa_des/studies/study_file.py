@@ -245,24 +245,24 @@ class _StudyReader:
     # -- axes and draws --------------------------------------------------------------------
 
     def axes(self, scene: Scene, swaps: Iterable[tuple[str, list[str]]]) -> tuple[Axis, ...]:
-        found: list[Axis] = []
+        result: list[Axis] = []
         specs = flatten_axes(self.table("axes")) | {f"swap.{b}": types for b, types in swaps}
         for key, spec in specs.items():
             try:
-                found.append(parse_axis(key, spec, scene))
+                result.append(parse_axis(key, spec, scene))
             except ValueError as error:
                 self.add(("axes", key), str(error))
                 self.unread.append(key.removeprefix("blocks."))
-        return tuple(found)
+        return tuple(result)
 
     def draws(self) -> tuple[Draw, ...]:
-        found = []
+        result = []
         for key, spec in flatten_draws(self.table("draws")).items():
             try:
-                found.append(parse_draw(key, spec))
+                result.append(parse_draw(key, spec))
             except ValueError as error:
                 self.add(("draws", key), str(error))
-        return tuple(found)
+        return tuple(result)
 
     def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
         """Return the column of the axis that `name` means."""
@@ -326,7 +326,7 @@ class _StudyReader:
             shown = ", ".join(registered(METRICS))
             self.add(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
-        found: list[MetricSpec] = []
+        result: list[MetricSpec] = []
         for number, item in enumerate(items):
             key: Key = ("metrics", number)
             table = {"metric": item} if isinstance(item, str) else item
@@ -344,8 +344,8 @@ class _StudyReader:
             except ValueError as error:
                 self.add(key, str(error), name)
                 continue
-            found.append(MetricSpec(name, keys, number))
-        return tuple(found)
+            result.append(MetricSpec(name, keys, number))
+        return tuple(result)
 
     def stop_when(self, replicas: int) -> StopWhen | None:
         table = self.data.get("stop_when")
