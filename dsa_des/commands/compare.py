@@ -21,7 +21,7 @@ from dsa_des.commands.study import (
     run_into,
     show_study,
 )
-from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_what_changed
+from dsa_des.commands.what_changed import Pair, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
@@ -162,8 +162,7 @@ def _compare_swap(
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
         for metric in tables.notable_results(results):
-            units = Units(tables, base), Units(tables, rows)
-            _farthest_apart(metric, units, (own, str(value)))
+            _farthest_apart(metric, Pair(tables, base, tables, rows), (own, str(value)))
     return [tables]
 
 
@@ -208,30 +207,26 @@ def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
-def _farthest_apart(
-    metric: str,
-    units: tuple[Units, Units],
-    names: tuple[str, str],
-) -> None:
+def _farthest_apart(metric: str, pair: Pair, names: tuple[str, str]) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
-    first, second = units[0].values(metric), units[1].values(metric)
-    both = [key for key in first if key in second and not np.isnan(first[key] - second[key])]
-    pairs = (np.array([side[key] for key in both]) for side in (first, second))
-    changes = dict(zip(both, changes_of(*pairs).tolist(), strict=True))
-    both.sort(key=lambda key: (-abs(changes[key]), key))
-    both = [key for key in both if changes[key] != 0.0][:_MOST_SHOWN]
-    if not both:
+    first, second = pair.values(metric)
+    known = np.flatnonzero(~np.isnan(first - second))
+    changes = changes_of(first[known], second[known])
+    changed = [
+        (-abs(change), pair.keys[run], run)
+        for change, run in zip(changes.tolist(), known.tolist(), strict=True)
+        if change != 0.0
+    ]
+    if not changed:
         return
     say()
     say(f"{metric}: where {names[1]} differs most from {names[0]}")
-    rows = [dict(zip(side.keys, side.rows.tolist(), strict=True)) for side in units]
-    for key in both:
+    for _, key, run in sorted(changed)[:_MOST_SHOWN]:
         where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
-        change = f"{short(first[key])} -> {short(second[key])}"
+        change = f"{short(float(first[run]))} -> {short(float(second[run]))}"
         say(f"  {where}replica {key[-1]}: {change}")
-        for side, numbers in zip(units, rows, strict=True):
-            row = side.tables.rows.row(numbers[key])
-            say(f"    {side.tables.record.command(row)}")
+        for tables, rows in zip(pair.tables, pair.rows, strict=True):
+            say(f"    {tables.record.command(tables.rows.row(rows[run]))}")
 
 
 def _compare(
@@ -260,19 +255,14 @@ def _compare(
     for at, rows in one.rows.each_place():
         if at not in theirs:
             continue
-        sides = Units(one, rows), Units(other, theirs[at])
+        runs = Pair(one, rows, other, theirs[at])
         where = ", ".join(f"{n} = {short(v)}" for n, v in zip(one.rows.axes, at, strict=True))
-        places.append((where, sides))
+        places.append((where, runs))
+        names_of = [key[:-1] if one.rows.over else key for key in runs.keys]
+        codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
+        units = np.array([codes[name] for name in names_of], dtype=np.int64)
         for metric in metrics:
-            first, second = sides[0].values(metric), sides[1].values(metric)
-            keys = [key for key in first if key in second]
-            names_of = [key[:-1] if one.rows.over else key for key in keys]
-            codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
-            pair = paired_units(
-                np.array([codes[name] for name in names_of], dtype=np.int64),
-                np.array([first[k] for k in keys]),
-                np.array([second[k] for k in keys]),
-            )[1:]
+            pair = paired_units(units, *runs.values(metric))[1:]
             d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             lines.append(
                 [*map(short, at), metric, *rounded(d.paired), str(d.paired.count),
@@ -287,9 +277,9 @@ def _compare(
             say(f"only {shortened(who)} has {shortened(', '.join(alone), 300)}")
     title = f"{names[1]} less {names[0]}, pair by pair"
     print_table(console(160), title, headings, lines, group=len(one.rows.axes))
-    for _, sides in places:
+    for _, runs in places:
         for metric in metrics:
-            _farthest_apart(metric, sides, names)
+            _farthest_apart(metric, runs, names)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():

@@ -145,26 +145,26 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
 def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
     names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.summed_up]
+
+    def missing(key: Key, name: str) -> None:
+        add(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
+
     if study.stop_when and study.stop_when.metric not in names:
-        message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
-        add(("stop_when", "metric"), message, study.stop_when.metric)
+        missing(("stop_when", "metric"), study.stop_when.metric)
     weight = study.compare_weight
     if weight is not None and (weight not in results or results[weight].kind != NUMBER):
         message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
         add(("compare", "weight"), message, weight)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
-            message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
-            add(("requirements", number, "metric"), message, wanted.metric)
+            missing(("requirements", number, "metric"), wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure.kind == "series":
             if not of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
                 add(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
-            message = "no metric of the study gives it"
-            message += did_you_mean(str(figure.metric), names)
-            add(("figures", number, "metric"), message, str(figure.metric))
+            missing(("figures", number, "metric"), str(figure.metric))
         elif figure.kind in ("histogram", "cdf") and (
             results[str(figure.metric)].kind not in (NUMBER, FRACTION, SHARE)
         ):
