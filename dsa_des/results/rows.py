@@ -7,6 +7,7 @@ and a place of the summary joins all of them; otherwise the replicas are.
 from collections import Counter, OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,6 +149,12 @@ class Rows:
         self.places = self._codes(self.axes)
         self.units = self._codes(self.over if self.over else ["replica"])
 
+    @cached_property
+    def runs(self) -> IntArray:
+        """What rows share that are of the same replica of the same unit."""
+        replica: IntArray = self.column("replica")
+        return self.units * (int(replica.max(initial=0)) + 1) + replica
+
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN."""
         return self.stored.column(name)
@@ -275,10 +282,8 @@ class Rows:
         as Bonett and Price do for events without weights (`statistics.difference`), so that runs
         which all agree still leave as much open as so many can.
         """
-        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
-        runs = runs + self.column("replica")
         sides = [self._paired(result, rows) for rows in (first, second)]
-        one, two = (runs[side[1]] for side in sides)
+        one, two = (self.runs[side[1]] for side in sides)
         _, here, there = np.intersect1d(one, two, return_indices=True)
         parts, ratios, cluster = [], [], sides[0][0][3][here]
         for (columns, _, _), common in zip(sides, (here, there), strict=True):
@@ -320,15 +325,13 @@ class Rows:
         Rows `first` are below the line, `second` above; runs that only one has do not count. The
         result `weight` says how often each unit happens.
         """
-        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
-        runs = runs + self.column("replica")
         sides = []
         for rows in (first, second):
             known = ~np.isnan(self.column(name)[rows].astype(float))
             if weight is not None:
                 known &= ~np.isnan(self.column(weight)[rows].astype(float))
             sides.append(rows[known])
-        one, two = (runs[rows] for rows in sides)
+        one, two = (self.runs[rows] for rows in sides)
         _, here, there = np.intersect1d(one, two, return_indices=True)
         below, above = sides[0][here], sides[1][there]
         weights = None if weight is None else self.column(weight)[below].astype(float)
@@ -358,8 +361,7 @@ def paired(
     rows: Rows, name: str, first: IntArray, second: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the units that both sets of rows have, and the values of each in both."""
-    values, replica = rows.column(name), rows.column("replica")
-    runs = rows.units * (int(replica.max(initial=0)) + 1) + replica
+    values, runs = rows.column(name), rows.runs
     _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
     one, two = first[here], second[there]
     return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
