@@ -228,7 +228,7 @@ def _copy(target: Path) -> None:
 
 
 def _copy_files(source: Path, into: Path) -> int:
-    """Copy what is in the files, not who may read and write them."""
+    """Copy the content of files, not their permissions."""
     files = [path for path in sorted(source.rglob("*")) if path.is_file()]
     files = [path for path in files if _CODE not in path.parts]
     for path in files:

@@ -22,7 +22,7 @@ from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_lines
 from dsa_des.text.safe_text import printable
 
-# What may end a command; all else is a stranger's code in a place not foreseen.
+# Packages whose code may end a command; an exit from any other is an error.
 _OURS = ("dsa_des", "components", "click", "rich")
 
 
@@ -62,7 +62,7 @@ def plain_output() -> Iterator[None]:
         try:
             yield
         finally:
-            sys.stdout.flush()  # now, where it can be said, and not when Python ends
+            sys.stdout.flush()  # now, where an error can be reported, and not when Python ends
     except OSError as error:
         # What is left in the buffer is written when Python ends, and must not fail again.
         with suppress(OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What changed between two conditions, in sentences: who does what earlier, later or no longer."""
+"""Changes between two conditions in sentences: events earlier, later, or no longer."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 
-#: Places that are told one by one, and results that a line names.
+#: Combinations of axis values that are listed, and results that a line names.
 _MOST_PLACES, _MOST_NAMED = 12, 8
 
 
@@ -65,7 +65,7 @@ class _Change:
         return bool(self.fell or self.rose or self.gone or self.come)
 
     def clauses(self) -> list[str]:
-        """Return what is to be said of it, in the result's own words."""
+        """Return its clauses in the result's own words."""
         of, told = f" of {self.pairs} runs", self.result.told
         assert told is not None
         parts = [

@@ -1,7 +1,7 @@
 """Combinations of rungs over all blocks: what the whole chain costs and how much it finds.
 
 All ladders multiplied are too many, and most are pointless: a rung that another one of its own
-ladder beats on both axes has no place in a good chain. So only rungs on their ladder's front are
+ladder beats on both axes does not belong in a good chain. So only rungs on their ladder's front are
 combined, with the scene's own.
 """
 

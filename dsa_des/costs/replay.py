@@ -32,7 +32,7 @@ _PASSES = 10
 
 @dataclass
 class RungRun:
-    """A run of the scene with one rung in place."""
+    """A run of the scene with one rung."""
 
     scene: Scene
     block: str
@@ -57,7 +57,7 @@ class RungRun:
             self._pristine = self.fresh()
         try:  # a copy is made ten times faster than a scene is set up
             run = copy.deepcopy(self._pristine).run
-        except Exception:  # whatever a stranger's block holds that cannot be copied
+        except Exception:  # a foreign block may hold what cannot be copied
             run = self.fresh().run
         wakes = self.wakes
         collecting = gc.isenabled()

@@ -1,4 +1,4 @@
-"""Problems and errors, each said once and completely.
+"""Problems and errors, each reported once and completely.
 
 Every error of a scene is a `Problem`; a scene with any raises one `SceneError` that lists them
 all. An exception inside a block becomes a `BlockFailure` that says which block, when.

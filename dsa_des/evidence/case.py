@@ -343,6 +343,6 @@ def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
 
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
-    """Return where a parameter's value is from: what is said of the key, or else of its block."""
+    """Return where a parameter's value is from: that of the key, or else of its block."""
     known = {name.removeprefix("blocks."): str(text) for name, text in flat(sources).items()}
     return known.get(f"{block}.{key}", known.get(block))

@@ -1,4 +1,4 @@
-"""The pack of a case: one folder with what was asked, what was found, and all that repeats it."""
+"""The pack of a case: one folder with requirements, results, and all that repeats them."""
 
 from collections.abc import Mapping
 from typing import Any

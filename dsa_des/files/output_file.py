@@ -82,7 +82,7 @@ def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> N
 
 
 def _why_no_file(path: Path) -> str | None:
-    """Return why a file must not take this place, if so; devices would be replaced by it."""
+    """Return why no file may be written here, if so; devices would be replaced by it."""
     folder = Path(os.path.realpath(path.parent))
     above = {str(one) for one in (folder, *folder.parents)}
     if above.intersection(_SYSTEM) and not above.intersection(_ORDINARY):

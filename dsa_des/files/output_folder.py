@@ -26,7 +26,7 @@ from dsa_des.files.output_names import (
 )
 from dsa_des.terminal.interruption import deferred
 
-#: What a folder of results holds beside its tables: who made it, of what, and all its files.
+#: A run folder's own description: its version, its scene, and all its files.
 RUN_JSON = "run.json"
 _FILES = "files"
 _MOST_READ = 1 << 20

@@ -1,7 +1,7 @@
 """Names for results: what the user wrote after ``--out``, or the next free number.
 
 Everything about a name that can be known is found out before a run begins: a run that has taken
-an hour must not fail because there is no place for it.
+an hour must not fail because it cannot be written.
 """
 
 import errno
@@ -53,7 +53,7 @@ def reason_of(error: OSError) -> str:
 
 
 def why_not_written(error: OSError, path: Path) -> str:
-    """Return what an error of the system says of a place that was to be made or written into.
+    """Return the reason of a system error at a path that was to be made or written into.
 
     Some file systems (``/proc``) take no folder and call it missing: what is there is named.
     """
@@ -99,7 +99,7 @@ def location_of(folder: Path) -> Path:
 
 
 def check_place(folder: Path, option: str = "--out") -> None:
-    """Raise UsageError unless a folder can be made at this place, or one is there to be used.
+    """Raise UsageError unless a folder can be made at this path, or one is there to be used.
 
     What is in a folder that is there is not looked at.
     """

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _PLACE = re.compile(r"(.*) \((at (?:line \d+, column \d+|end of document))\)", re.DOTALL)
-# What the parser says with what it found in the text: only the kind of it is told.
+# Messages of the parser that quote the file: only the kind of error is shown.
 _WITH_CONTENT = (
     ("Cannot declare", "a table or key is given twice"),
     ("Cannot mutate", "a table or key is given twice"),

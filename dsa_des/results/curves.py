@@ -15,7 +15,7 @@ from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
 
-#: Okabe and Ito's colours and markers, told apart with any kind of colour vision.
+#: Okabe and Ito's colours and markers, distinct with any kind of colour vision.
 STYLES = (
     ("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D"), ("#E69F00", "^"), ("#CC79A7", "v"),
     ("#56B4E9", "P"), ("#000000", "X"),
@@ -23,7 +23,7 @@ STYLES = (
 _MOST_LINES = 12
 #: Letters of a title.
 _TITLE = 80
-#: More texts than this below an axis cannot be told apart.
+#: Most texts below an axis that can be read.
 _MOST_NAMES = 60
 #: With room for the legend beside the axes, and between series at one value.
 _WIDE_IN, _APART_PT = 9.0, 5.0
@@ -329,7 +329,7 @@ def draw_series(
     freedom: float | None,
     limits: Sequence[float] = (),
 ) -> None:
-    """Draw the means of a series with their intervals, one line for each place of the axes.
+    """Draw the means of a series with their intervals, one line per combination of axis values.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
     `limits` are one for all, or one for each number of the series.

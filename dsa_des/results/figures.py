@@ -130,7 +130,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
 
 
 def _series_of(tables: Tables, metric: str) -> list[Series]:
-    """Return the results whose names differ in a number, one series per place of the axes."""
+    """Return the results that differ in a number, one series per combination of axis values."""
     known = of_series(metric, [line.result.name for line in tables.lines])
     by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
     for line in tables.lines:

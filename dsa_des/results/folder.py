@@ -173,7 +173,7 @@ class StudyFolder:
     def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
         """Return the rows of a part; None if it is not there, damaged, or of another study.
 
-        Only some `columns` are read of a part that was found good before.
+        Only some `columns` are read of a part that was checked before.
         """
         table = self._sealed(self.parts / f"{name}.parquet", name, columns)
         whole = table is None or columns is not None or _fits(table, self.record)
@@ -219,7 +219,7 @@ class StudyFolder:
     ) -> Iterator["pa.Table"]:
         """Give the rows of each part, in order of their names.
 
-        Only those of rounds before one, and only some columns of parts found good before.
+        Only those of rounds before one, and only some columns of parts checked before.
         """
         names = self.part_names()
         if before_round is not None:

@@ -105,7 +105,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
 
 
 def _show_answers(console: Any, tables: Tables) -> None:
-    """Print the cheapest value that meets each requirement, at every place of the other axes."""
+    """Print the cheapest value that meets each requirement, by the values of the other axes."""
     rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_SHOWN]]
     sure = f"{100 * one_sided(tables.record.confidence):g} %"
     print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)

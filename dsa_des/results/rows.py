@@ -1,7 +1,8 @@
 """The rows of a study's parts, read part by part, and how they fall into places and units.
 
-Where a study runs over a sample of encounters (`over`), the encounters are the independent units
-and a place of the summary joins all of them; otherwise the replicas are.
+A *place* is a combination of values of the summary's axes. Where a study runs over a sample of
+encounters (`over`), the encounters are the independent units and a place of the summary joins all
+of them; otherwise the replicas are.
 """
 
 from collections import Counter, OrderedDict
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 #: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
 _MOST_HELD_BYTES = 2**27
-#: Of rows without result, the first ones are told.
+#: Rows without result that are listed, the first ones.
 MOST_FAILED = 50
 _PLACE = ("cell", "replica")
 #: Columns that stand in no statistics.

@@ -22,14 +22,14 @@ from dsa_des.results.statistics import (
 
 @dataclass(frozen=True)
 class Line:
-    """One result at one place of the summary's axes."""
+    """One result at one combination of the summary's axis values."""
 
     at: tuple[Any, ...]
     result: Result
     estimate: Estimate
     missing: int
     expected: float | None
-    #: Runs of this place, and (where, how many) of those whose value the run cut off.
+    #: Runs of this combination, and (where, how many) of those whose value the run cut off.
     runs: int = 0
     cut_off: tuple[tuple[str, int], ...] = ()
     #: Of a ratio: all its numbers, by the study's own kind of interval and by the other.
@@ -44,7 +44,7 @@ def summarise(
     method: str,
     expected: Mapping[tuple[str, tuple[Any, ...]], float],
 ) -> list[Line]:
-    """Return one line per place and result."""
+    """Return one line per combination of axis values and result."""
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
@@ -111,7 +111,7 @@ def compare_axis(
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest value at one place of the other axes."""
+    """The cheapest value at one combination of the other axes' values."""
 
     requirement: Requirement
     #: Values of the other axes.
@@ -127,7 +127,7 @@ class Answer:
 
 
 def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]) -> list[Answer]:
-    """Return the cheapest value at every place of the other axes."""
+    """Return the cheapest value at every combination of the other axes' values."""
     if requirement.axis not in axes:
         return []
     index = list(axes).index(requirement.axis)

@@ -22,7 +22,7 @@ from dsa_des.text.safe_text import shortened
 _MOST_SCATTERS = 6
 SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
 REQUIREMENTS = "requirements.parquet"
-#: (Result, place) → the analytic answer there.
+#: (Result, axis values) → the analytic answer there.
 Expected = Mapping[tuple[str, tuple[Any, ...]], float]
 
 
@@ -44,7 +44,7 @@ class Tables:
             self.rows, self.results, record.confidence, record.interval,
             self._earlier() if expected is None else expected,
         )  # fmt: skip
-        #: What each requirement comes to, at every place of the other axes.
+        #: Of each requirement, at every combination of the other axes' values.
         self.answers: list[Answer] = [
             result
             for requirement in record.requirements

@@ -147,7 +147,7 @@ def _check_clock(
 
 
 def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]) -> None:
-    """Add effects that nothing would ever call, or of which only one could be told."""
+    """Add effects that no hook calls, and those of one block that share a name."""
     for name, block in blocks.items():
         cls, hooks = block.cls, block.cls.all_hooks()
         said = [
@@ -174,7 +174,7 @@ def check_activity(
     """Add blocks that would never run, and wires that hold a message for a queued input."""
     faults: list[Problem] = []
     clocks = _clocks(scene, blocks, faults)
-    if faults:  # said before
+    if faults:  # reported before
         return
     woken = {
         wire.target

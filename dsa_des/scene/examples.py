@@ -1,4 +1,4 @@
-"""Scenes, studies and cases that packages ship, found by name: ``first_light``."""
+"""Scenes, studies and cases that packages ship, by name: ``first_light``."""
 
 import os
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     result = find_example(path.as_posix(), kind)
     if result is not None:
         return result
-    # What no file system takes as a name is said by who opens it.
+    # A name that no file system takes is refused where it is opened.
     if len(path.parts) == 1 and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
         close = nearest(path.name.removesuffix(".toml"), names)

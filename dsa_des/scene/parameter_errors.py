@@ -23,7 +23,7 @@ def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
         table = SchemaValidator(_of_fields(model.__pydantic_core_schema__)).validate_python(
             item["input"]
         )
-    except Exception:  # a stranger's model may do anything; what was found stands
+    except Exception:  # a foreign model may raise anything; the errors so far stand
         return result
     return list(dict.fromkeys(result + _asked(model, table)))
 
@@ -44,7 +44,7 @@ def disagreements_besides(
         )
         for name in refused:
             table.__dict__.pop(name, None)
-    except Exception:  # a stranger's model may do anything; what was found stands
+    except Exception:  # a foreign model may raise anything; the errors so far stand
         return []
     return _asked(model, table)
 
@@ -59,7 +59,7 @@ def _asked(model: type[BaseModel], table: Any) -> list[str]:
         try:
             getattr(table, validator.cls_var_name)()
         except Exception as error:
-            # What rests on keys that are refused may fail in any way; who means a key names it.
+            # One that reads refused keys may fail in any way; one that means a key names it.
             if isinstance(error, ValueError):
                 result += [text for text in _texts(error) if names & set(re.findall(r"\w+", text))]
     return result
@@ -176,7 +176,7 @@ def _one_by_key(problems: list[Problem]) -> list[Problem]:
 
 
 def _refused(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:
-    """Return what a validator said; that of a whole table is put at the key it speaks of."""
+    """Return a validator's problem; that of a whole table is put at the key that it names."""
     if not isinstance(value, Mapping):
         return scene_file.problem(at, message, _shown(value))
     about = re.fullmatch(r"(\w+) is (\S+): (.*)", message, re.DOTALL)

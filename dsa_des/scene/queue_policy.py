@@ -17,7 +17,7 @@ class Job(Protocol):
 class QueuePolicy:
     """Every message waits in line (``wait``); a subclass lets some go.
 
-    It remembers nothing: what it says follows from who waits.
+    It has no state: its answers follow from the jobs in line.
     """
 
     def skips(self, busy: bool) -> bool:

@@ -105,7 +105,7 @@ def read_wires(
     if not isinstance(entries, list):
         problems.append(scene.problem(("wires",), "must be a list of wires", entries))
         if unsure is not None:
-            unsure.update(classes)  # which ones it meant to feed cannot be told
+            unsure.update(classes)  # its targets are unknown
         return []
     wires: list[Wire] = []
     for position, entry in enumerate(entries):
@@ -115,7 +115,7 @@ def read_wires(
         except _WireError as error:
             problems.append(scene.problem(key, str(error), *error.value))
             if unsure is not None:
-                unsure.update(classes)  # whom it meant to feed cannot be told
+                unsure.update(classes)  # its target is unknown
             continue
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:

@@ -1,7 +1,7 @@
 """Executors of a study's chunks: this process, a pool of processes, or a Dask cluster.
 
-An executor gives results as they come, in any order. What a chunk gives does not depend on who ran
-it, so neither do the results. What is run again when a process dies is said in `attempts.py`.
+An executor gives results as they come, in any order. A chunk's rows do not depend on
+its worker, so neither do the results. Pieces whose process dies: see `attempts.py`.
 """
 
 import multiprocessing

@@ -1,4 +1,4 @@
-"""Metrics, which a study measures, found by the entry-point group ``dsa_des.metrics``.
+"""Metrics, which a study measures, registered in the entry-point group ``dsa_des.metrics``.
 
 A metric reads the recorded tables of a *group* of replicas at once: every table has one more
 column, ``replica``, with the number of the replica each row belongs to. It is written over arrays,

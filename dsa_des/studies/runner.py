@@ -181,7 +181,7 @@ def tables_of(study: Study, folder: StudyFolder) -> Tables:
 
 
 def _expected(study: Study) -> Expected:
-    """Return the analytic answers at every place, averaged over draws and encounters."""
+    """Return the analytic answers by axis values, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
     for cell in study.cells:

@@ -28,7 +28,7 @@ _MOST_SCENES = 64
 def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    What is wrong is said of `file`, the study's, and of the `scene` without axes where no cell has
+    Problems name `file`, the study's, and the `scene` without axes is checked where no cell has
     one that fits. Names of results are checked only where the `whole` study could be read.
     """
     problems: list[Problem] = []
@@ -239,7 +239,7 @@ def _build_metrics(
 
 
 def _tables_read(study: Study, scene: Scene) -> set[str]:
-    """Return the tables that the metrics read; what is wrong with one is said elsewhere."""
+    """Return the tables that the metrics read; problems of metrics are reported elsewhere."""
     result: set[str] = set()
     for spec in study.metrics:
         with contextlib.suppress(ValueError):

@@ -131,7 +131,7 @@ class _StudyReader:
         specs = self.metric_specs()
         stop_when = self.stop_when(replicas)
         base, scene = self.scene()
-        if base is None or scene is None:  # all else is said of this scene
+        if base is None or scene is None:  # all else is checked against this scene
             raise SceneError(self.problems)
         axes = self.axes(scene, swaps)
         cells = math.prod(len(axis.labels) for axis in axes)
@@ -237,7 +237,7 @@ class _StudyReader:
         for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
-            except SceneError as error:  # what else is wrong is then said of the scene as it is
+            except SceneError as error:  # all else is then checked against the scene as it is
                 known = {str(problem) for problem in self.problems}
                 self.problems += [one for one in error.problems if str(one) not in known]
         return None, None
