@@ -65,18 +65,13 @@ class Gate(Component):
             where.append(targets.hidden)
         for sensor, reach in self._reach.items():
             rows = wake.demand.get(sensor)
-            if rows is not None and len(rows) == 0:
-                place = np.full(len(targets), -1, dtype=np.int64)
-                decisions[sensor] = Decision(place, np.empty((0, width), dtype=np.uint8))
-                continue
             if rows is None or len(rows) == len(targets):
-                place = np.arange(len(targets))
-                seen = where
+                rows, reason = np.arange(len(targets)), reach.decide(*where)
+            elif len(rows):
+                reason = reach.decide(*(values.take(rows, axis=0) for values in where))
             else:
-                place = np.full(len(targets), -1, dtype=np.int64)
-                place[rows] = np.arange(len(rows))
-                seen = [values.take(rows, axis=0) for values in where]
-            decisions[sensor] = Decision(place, reach.decide(*seen))
+                reason = np.empty((0, width), dtype=np.uint8)
+            decisions[sensor] = Decision(rows, reason, len(targets))
         # Behind another gate, that one's decisions were for the sensors there.
         values = {one.name: getattr(targets, one.name) for one in fields(targets)}
         return GatedTargets(**{**values, "tick": wake.ticks, "decisions": decisions})

@@ -135,7 +135,8 @@ def geodesic_state(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Evaluate straight legs."""
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
-    climbed = table[_CLIMB] * elapsed
+    # Flights that all keep their altitude have one row of them for all times.
+    climbed = table[_CLIMB] * (elapsed if table[_CLIMB].any() else elapsed[:1])
     # Ground speed is flown at altitude: over the ellipsoid it is slower by R / (R + h), with h
     # the mean altitude so far. The bound only matters in a dive to the Earth's core.
     below = 0.5 * climbed
@@ -145,13 +146,13 @@ def geodesic_state(
     tau /= below
     tau *= table[_PER_METRE]
     tau += table[_TAU]
-    sine, cosine = np.sin(tau), np.cos(tau)
-    delta = _sine_series(table, _INVERSE, _INVERSE_TERMS, sine, cosine, below)
+    sine, cosine, spare = np.sin(tau), np.cos(tau), np.empty_like(tau)
+    delta = _sine_series(table, _INVERSE, _INVERSE_TERMS, sine, cosine, spare)
     sigma = np.add(tau, delta, out=tau)
-    _turn_on(sine, cosine, delta, below)  # now those of sigma
+    _turn_on(sine, cosine, delta, spare)  # now those of sigma
     along = table[_COS_AZ0] * cosine
     sin_az0 = table[_SIN_AZ0]
-    cos_beta = np.multiply(along, along, out=below)
+    cos_beta = np.multiply(along, along, out=spare)
     cos_beta += sin_az0 * sin_az0
     np.sqrt(cos_beta, out=cos_beta)
     cos_beta *= 1.0 - FLATTENING
@@ -159,7 +160,7 @@ def geodesic_state(
     lat = slope_angle(sin_beta, cos_beta)
     lat *= DEG_PER_RAD
     lon = direction_angle(np.multiply(sine, sin_az0, out=delta), cosine)
-    sigma += _sine_series(table, _LONGITUDE, _LONGITUDE_TERMS, sine, cosine, below)
+    sigma += _sine_series(table, _LONGITUDE, _LONGITUDE_TERMS, sine, cosine, spare)
     sigma *= table[_LON_SLOPE]
     lon -= sigma
     lon += table[_LON_RAD]

@@ -261,16 +261,19 @@ class ScriptedFleet(Fleet):
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times."""
         times = checked_times(time_s)
-        state = empty_state(len(times), len(self))
         groups, others = self._parts
-        for group in groups:
-            group.fill(state, times)
+        parts = [(group.columns, group.at(times)) for group in groups]
         if len(others):
             shape = len(times), len(others)
             aircraft = np.broadcast_to(others, shape).reshape(-1)
             several = self.each(aircraft, np.repeat(times, len(others))).reshaped(shape)
-            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
-                out[:, others] = columns
+            parts.append((others, several))
+        if len(parts) == 1:
+            return parts[0][1]
+        state = empty_state(len(times), len(self))
+        for members, part in parts:
+            for out, columns in zip(state.arrays(), part.arrays(), strict=True):
+                out[:, members] = columns
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
@@ -335,7 +338,7 @@ class ScriptedFleet(Fleet):
             groups.append(
                 _Group(
                     FORMULAS[KINDS[kind]],
-                    slice(None) if len(members) == len(flights) else members,
+                    members,
                     self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
                     np.where(np.isnan(fixed), derived, fixed),
@@ -350,26 +353,29 @@ class _Group:
     """Flights of one leg each that share a formula: one array expression."""
 
     formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
-    columns: slice | IntArray
+    columns: IntArray
     table: FloatArray
     times_s: tuple[FloatArray, FloatArray, FloatArray]
     attitude: FloatArray
     yaw_is_fixed: BoolArray
 
-    def fill(self, state: TrajectoryState, times: FloatArray) -> None:
-        """Write the group's columns of the state."""
+    def at(self, times: FloatArray) -> TrajectoryState:
+        """Return the group's states, (times, flights); angles that never change, once for all."""
         start_s, end_s, until_s = self.times_s
+        shape = len(times), len(start_s)
+        moving = lat, lon, alt, yaw = tuple(np.empty(shape) for _ in range(4))
+        present = np.empty(shape, dtype=bool)
         rows = max(1, CELLS_AT_ONCE // len(start_s))
-        fixed_yaw, pitch, roll = self.attitude
         for first in range(0, len(times), rows):
             block = slice(first, first + rows)
             t = times[block, np.newaxis]
             inside = np.maximum(t, start_s)
             np.minimum(inside, until_s, out=inside)
             inside -= start_s
-            lat, lon, alt, yaw = self.formula(self.table, inside)
-            if self.yaw_is_fixed.any():
-                yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
-            values = (lat, lon, alt, yaw, pitch, roll, (t >= start_s) & (t <= end_s))
-            for out, value in zip(state.arrays(), values, strict=True):
-                out[block, self.columns] = value
+            for out, values in zip(moving, self.formula(self.table, inside), strict=True):
+                out[block] = values
+            np.logical_and(t >= start_s, t <= end_s, out=present[block])
+        fixed_yaw, pitch, roll = (np.broadcast_to(angle, shape) for angle in self.attitude)
+        if self.yaw_is_fixed.any():
+            yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

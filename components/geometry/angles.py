@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import common_shape, shaped, squarable
+from dsa_des.arrays.column_values import one_row
 from dsa_des.arrays.types import FloatArray
 
 Vector = tuple[FloatArray, FloatArray, FloatArray]
@@ -212,13 +213,15 @@ def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     Parameters
     ----------
     angle_rad : ndarray
-        Contiguous, at least one axis. Pitch and roll are the same in level flight, for example.
+        At least one axis. Pitch and roll are the same in level flight, for example.
 
     Returns
     -------
     sine, cosine : ndarray
-        The angle's shape, or (1,) in its place where they are all the same.
+        The angle's shape, one row of it where all rows are known to be the same, or (1,) in its
+        place where all angles are.
     """
+    angle_rad = one_row(angle_rad)
     if angle_rad.size > _LOOK_FOR_ONE_ANGLE and angle_rad.min() == angle_rad.max():
         angle_rad = angle_rad.reshape(-1)[:1]
     return np.sin(angle_rad), np.cos(angle_rad)

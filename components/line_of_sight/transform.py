@@ -19,7 +19,7 @@ from components.sensor.ladder_values import (
     over_roster,
     wrapped_apart_mrad,
 )
-from dsa_des.arrays.column_values import seen_once
+from dsa_des.arrays.column_values import one_row, seen_once
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
@@ -310,7 +310,7 @@ def _beside_targets(states: TrafficStates) -> SimpleNamespace:
 def _require_numbers(*angles: FloatArray) -> None:
     """Refuse what is not a finite number, here for all blocks downstream."""
     # A sum is finite only if all of it is; it stands for whatever the angles came from.
-    if not math.isfinite((angles[0] + angles[1] + angles[2] + angles[3]).sum()):
+    if not math.isfinite(sum(one_row(values).sum() for values in angles)):
         raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 

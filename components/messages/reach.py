@@ -164,30 +164,48 @@ class Decision:
 
     Parameters
     ----------
-    place : (rows,) of int
-        Row of `reason` that belongs to each message row; -1 where the sensor does not scan.
+    rows : (scans,) of int
+        The message rows at which the sensor scans, ascending.
     reason : (scans, targets) of uint8
+    count : int
+        How many rows the message has.
     """
 
-    place: IntArray
+    rows: IntArray
     reason: ReasonArray
+    count: int
+
+    def at(self, rows: IntArray) -> ReasonArray | None:
+        """Return the reasons at some message rows; None where the sensor does not scan at one."""
+        own = self.rows
+        if rows is own or (len(rows) == len(own) and bool((rows == own).all())):
+            return self.reason
+        scan = self._scan_of_row[rows]
+        return self.reason[scan] if scan.min(initial=0) >= 0 else None
+
+    @property
+    def _scan_of_row(self) -> IntArray:
+        """Row of `reason` that belongs to each message row; -1 where the sensor does not scan."""
+        scan = np.full(self.count, -1, dtype=np.int64)
+        scan[self.rows] = np.arange(len(self.rows))
+        return scan
 
     def take_rows(self, rows: slice | IntArray) -> "Decision":
         """Return the decision for some of the rows."""
-        return Decision(self.place[rows], self.reason)
+        scan = self._scan_of_row[rows]
+        kept = np.flatnonzero(scan >= 0)
+        return Decision(kept, self.reason[scan[kept]], len(scan))
 
     def widened(self, place: IntArray, width: int) -> "Decision":
         """Return the decision over `width` targets, ours at `place`, the others absent."""
         reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
         reason[:, place] = self.reason
-        return Decision(self.place, reason)
+        return Decision(self.rows, reason, self.count)
 
     @classmethod
     def join_rows(cls, parts: list[Self]) -> "Decision":
         """Return the decision over the rows of all parts."""
-        starts = np.cumsum([0] + [len(part.reason) for part in parts[:-1]])
-        places = [
-            np.where(part.place < 0, -1, part.place + start)
-            for part, start in zip(parts, starts, strict=True)
-        ]
-        return Decision(np.concatenate(places), np.concatenate([part.reason for part in parts]))
+        starts = np.cumsum([0] + [part.count for part in parts]).tolist()
+        rows = [part.rows + start for part, start in zip(parts, starts, strict=False)]
+        reasons = np.concatenate([part.reason for part in parts])
+        return Decision(np.concatenate(rows), reasons, starts[-1])

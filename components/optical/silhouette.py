@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
 from components.geometry import sine_and_cosine
+from dsa_des.arrays.column_values import one_row
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
@@ -63,11 +64,12 @@ def line_of_sight_in_target_axes(
     sin_pitch, cos_pitch = sine_and_cosine(pitch_rad)
     sin_roll, cos_roll = sine_and_cosine(roll_rad)
     sin_elevation, cos_elevation = np.sin(elevation_rad), np.cos(elevation_rad)
-
-    leaving = cos_yaw >= 0.0
-    tilt = np.sin(np.where(leaving, pitch_rad - elevation_rad, pitch_rad + elevation_rad))
-    side = 2.0 * sin_pitch * cos_elevation
-    m = np.where(leaving, tilt - side * np.square(sin_half), side * np.square(cos_half) - tilt)
+    m = 0.0 - sin_elevation  # of one that flies level
+    if one_row(pitch_rad).any():
+        leaving = cos_yaw >= 0.0
+        tilt = np.sin(np.where(leaving, pitch_rad - elevation_rad, pitch_rad + elevation_rad))
+        side = 2.0 * sin_pitch * cos_elevation
+        m = np.where(leaving, tilt - side * np.square(sin_half), side * np.square(cos_half) - tilt)
     n = sin_yaw * cos_elevation
 
     u_x = cos_pitch * cos_yaw * cos_elevation + sin_pitch * sin_elevation

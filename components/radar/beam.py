@@ -246,7 +246,10 @@ class Sweep:
             lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present, lit.hidden
         )
         reason[~met & ((reason == EVALUATE) | (reason == RANGE))] = FIELD_OF_VIEW
-        fields = {**vars(lit), "decisions": {block.name: Decision(np.arange(len(rows)), reason)}}
+        fields = {
+            **vars(lit),
+            "decisions": {block.name: Decision(np.arange(len(rows)), reason, len(rows))},
+        }
         return LitTargets(**fields, offset_s=offset_s)
 
     def __call__(

@@ -9,6 +9,8 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.targets import RelativeTargets
+from dsa_des.arrays.column_values import of_one_value, picked
+from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
@@ -105,24 +107,21 @@ class Cells:
         self.run_of_scan = targets.run[rows] if runs is None else runs
         self.message_rows = rows
         self.roster = targets.roster
-        place = wanted.ravel().nonzero()[0]
-        width = max(1, wanted.shape[1])
-        #: Index of each cell's scan within this look, and of its target in the roster.
-        if len(rows) == 1:
-            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
-        elif width == 1:
-            self.row, self.target = place, np.zeros(len(place), dtype=np.int64)
-        else:
-            self.row, self.target = np.divmod(place, width)
+        #: Index of each cell's scan within this look.
+        self.row, self._column = cells_of(wanted)
+        width = wanted.shape[1]
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
         # Rows that only rise and are as many as there are, are all of them.
-        self._everything = len(place) == targets.range_m.size and (
+        self._everything = len(self.row) == targets.range_m.size and (
             len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
         )
-        self._flat = place if self._everything else rows[self.row] * width + self.target
-        self.target = targets.columns[self.target]
+        self._flat = rows.take(self.row)
+        if width > 1:
+            self._flat = self._flat * width + self._column
+        #: And of its target in the roster.
+        self.target = targets.columns[self._column]
         #: Which lie in a cone of a cue; None where none does.
         self.cued: BoolArray | None = None
 
@@ -138,8 +137,12 @@ class Cells:
     def __getattr__(self, name: str) -> Any:
         if name[0] == "_":
             raise AttributeError(name)
-        flat = getattr(self._targets, name).reshape(-1)
-        gathered = flat if self._everything else flat.take(self._flat)
+        values = getattr(self._targets, name)
+        if self._width > 1 and of_one_value(values):  # of each target
+            gathered = values[0].take(self._column)
+        else:
+            flat = values.reshape(-1)
+            gathered = flat if self._everything else picked(flat, self._flat)
         self.__dict__[name] = gathered  # the next time it is a plain attribute
         return gathered
 

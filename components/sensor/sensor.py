@@ -80,7 +80,7 @@ def _per_row(mask: BoolArray) -> IntArray:
         return _of_each(0, len(mask))
     if mask.shape[1] > _FEW_COLUMNS:
         return mask.sum(axis=1)
-    total = mask[:, 0].astype(np.int64)
+    total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column
     return total
@@ -331,7 +331,7 @@ class Sensor(Measuring):
             Message row of each scan.
         wake : Wake
         """
-        rows, reason = self._decide(targets, rows)
+        reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
@@ -344,27 +344,20 @@ class Sensor(Measuring):
             return {}
         return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
 
-    def _decide(self, targets: RelativeTargets, rows: IntArray) -> tuple[IntArray, ReasonArray]:
-        """Return message rows and reasons for each scan, from the gate's decision if it has one."""
+    def _decide(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
+        """Return the reasons of each scan, from the gate's decision if it has one."""
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
-            decision = targets.decisions[self.name]
-            place = decision.place[rows]
-            if len(place) == 1 == len(decision.reason) and place[0] == 0:
-                return rows, decision.reason
-            if place.min(initial=0) >= 0:
-                # All in order need no copy; where messages were lost, others stand for them.
-                if len(place) == len(decision.reason) and bool((place[1:] > place[:-1]).all()):
-                    return rows, decision.reason
-                return rows, decision.reason[place]
+            reason = targets.decisions[self.name].at(rows)
+            if reason is not None:
+                return reason
         part = targets.take(rows)
-        reason = self._reach_from_body.decide(
+        return self._reach_from_body.decide(
             part.body_azimuth_rad,
             part.body_elevation_rad,
             part.range_m,
             part.present,
             part.hidden,
         )
-        return rows, reason
 
 
 #: Inputs of a sensor that can be cued.

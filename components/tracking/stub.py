@@ -11,6 +11,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
+from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -73,21 +74,20 @@ class TrackerStub(Component):
         updated = counts.nonzero()[0]
         if len(updated) == 0:
             return None
-        replica = wake.run[updated]
+        counts = counts.take(updated)
+        rows = np.repeat(np.arange(len(updated)), counts)
+        replica = wake.run.take(updated)
         before = self._held.of(replica)
-        targets = _present(before.target, fused.target, len(fused.roster))
-        pool, held, new = _pool(before, fused, np.repeat(replica, counts[updated]))
+        targets, column = _present(before.target, fused.target, len(fused.roster))
+        pool, held, new = _pool(before, fused, replica.take(rows))
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
             first_row = begins.nonzero()[0][np.searchsorted(replica[begins], before.replica)]
-            last[first_row, targets.searchsorted(before.target)] = held
-        rows: Any = 0
-        if len(updated) > 1:
-            rows = np.repeat(np.arange(len(updated)), counts[updated])
-        last[rows, targets.searchsorted(fused.target)] = new
+            last[first_row, column.take(before.target)] = held
+        last[rows, column.take(fused.target)] = new
         last = np.maximum.accumulate(last, axis=0)
-        first = new[np.cumsum(counts[updated]) - counts[updated]]
+        first = new.take(np.cumsum(counts) - counts)
         if replica[0] != replica[-1]:
             # What each row holds of replicas before its own is not its own's.
             own_from = first.copy()
@@ -95,10 +95,10 @@ class TrackerStub(Component):
             own_from = np.maximum.accumulate(np.where(begins, own_from, 0))
             last[last < own_from[:, np.newaxis]] = -1
         ends = np.append(replica[1:] != replica[:-1], True).nonzero()[0]
-        row, column = (last[ends] >= 0).nonzero()
-        entry = last[ends][row, column]
+        row, at = cells_of(last[ends] >= 0)
+        entry = last[ends][row, at]
         now = {name: values[entry] for name, values in pool.items()}
-        table = KeyedTable(replica=replica[ends][row], target=targets[column], **now)
+        table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
         self._held = self._held.after(replica, table, wake.first_run)
         return self._tracks(fused, wake.instants.part(updated), targets, last, pool, first)
 
@@ -112,35 +112,37 @@ class TrackerStub(Component):
         first: IntArray,
     ) -> Tracks:
         """Return the tracks of each row; `first` is the first of its own entries in the pool."""
-        ticks = instants.tick
+        row, column = cells_of(last >= 0)
+        entry = last.ravel().take(row * len(targets) + column)
+        measured = pool["measured_tick"].take(entry)
         # A sweeping beam measures after its scan has begun, which is when its report is sent.
         age_s: FloatArray = (
-            np.maximum(ticks[:, np.newaxis] - pool["measured_tick"][np.maximum(last, 0)], 0)
-        ) / self.context.ticks_per_s
-        held = last >= 0
+            np.maximum(instants.tick.take(row) - measured, 0) / self.context.ticks_per_s
+        )
         if self.p.drop_after_s is not None:
-            held &= age_s < self.p.drop_after_s
-        row, column = held.nonzero()
-        entry = last[row, column]
+            kept = age_s < self.p.drop_after_s
+            row, column, entry, measured, age_s = (
+                values[kept] for values in (row, column, entry, measured, age_s)
+            )
         pose: dict[str, Any] = {}
         message: type[Tracks] = Tracks
         if isinstance(fused, FusedWithPose):
             message, pose = TracksWithPose, {n: pool[n][entry] for n in POSE}
         tracks = message(
-            tick=ticks,
+            tick=instants.tick,
             run=instants.run,
-            offsets=offsets_of(row, len(ticks)),
-            target=targets[column],
-            azimuth_rad=pool["azimuth_rad"][entry],
-            elevation_rad=pool["elevation_rad"][entry],
-            range_m=pool["range_m"][entry],
-            age_s=age_s[row, column],
-            contributors=pool["contributors"][entry],
+            offsets=offsets_of(row, len(instants)),
+            target=targets.take(column),
+            azimuth_rad=pool["azimuth_rad"].take(entry),
+            elevation_rad=pool["elevation_rad"].take(entry),
+            range_m=pool["range_m"].take(entry),
+            age_s=age_s,
+            contributors=pool["contributors"].take(entry),
             roster=fused.roster,
             sensors=fused.sensors,
-            measured_tick=pool["measured_tick"][entry],
+            measured_tick=measured,
             ticks_per_s=self.context.ticks_per_s,
-            updated=entry >= first[row],
+            updated=entry >= first.take(row),
             **({"own_of_entries": pose} if pose else {}),
         )
         tracks.instants = instants
@@ -169,9 +171,9 @@ def _pool(
     return {name: v[order] for name, v in pool.items()}, place[:start], place[start:]
 
 
-def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:
-    """Return the targets that are held or newly measured, ascending."""
+def _present(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
+    """Return the targets that are held or newly measured, ascending, and each one's column."""
     there = np.zeros(targets, dtype=bool)
     there[held] = True
     there[new] = True
-    return there.nonzero()[0]
+    return there.nonzero()[0], np.cumsum(there) - 1

@@ -55,9 +55,14 @@ class Instants:
 
 #: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
 #: In float64, NaN means null.
-#: Beside arrays and text, `Instants` on the way to a recorder, which makes seconds of them.
+#: Beside arrays and text, `Instants` on the way to a recorder and its sinks.
 Columns = dict[str, AnyArray | Text]
 Schema = dict[str, str]
+
+
+def in_seconds(values: Any) -> Any:
+    """Return instants as seconds since the start of their run; other columns as they are."""
+    return values.ticks / values.ticks_per_s if isinstance(values, Instants) else values
 
 
 def nothing_in(rows: int) -> AnyArray:
@@ -93,6 +98,11 @@ def constant(value: Any, rows: int, kind: Any) -> AnyArray:
 def of_one_value(values: AnyArray) -> bool:
     """Return whether a column is known to hold the same in all rows, without a look at them."""
     return not values.strides[0]
+
+
+def one_row(values: AnyArray) -> AnyArray:
+    """Return one row of what is known to hold the same in all rows; other values as they are."""
+    return values if values.strides[0] else values[:1]
 
 
 def seen_once(values: AnyArray) -> AnyArray:

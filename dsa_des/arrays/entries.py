@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import BoolArray, IntArray
 
 
 def offsets_of(row: IntArray, rows: int) -> IntArray:
@@ -14,9 +14,25 @@ def offsets_of(row: IntArray, rows: int) -> IntArray:
     rows : int
         How many rows there are.
     """
-    offsets = np.zeros(rows + 1, dtype=np.int64)
-    np.bincount(row, minlength=rows).cumsum(out=offsets[1:])
-    return offsets
+    count = len(row)
+    if count == 0:
+        return np.zeros(rows + 1, dtype=np.int64)
+    # Each number of entries stands as often as rows lie between two of them.
+    gaps = np.empty(count + 1, dtype=np.int64)
+    gaps[0], gaps[-1] = row[0] + 1, rows - row[-1]
+    np.subtract(row[1:], row[:-1], out=gaps[1:-1])
+    return np.repeat(np.arange(count + 1), gaps)
+
+
+def cells_of(mask: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return row and column of what is true, row by row; several times as fast as `nonzero`."""
+    cell, width = mask.ravel().nonzero()[0], mask.shape[1]
+    if len(mask) == 1:
+        return np.zeros(len(cell), dtype=np.int64), cell
+    if width < 2:
+        return cell, np.zeros(len(cell), dtype=np.int64)
+    row = cell // width
+    return row, cell - row * width
 
 
 def row_of_entries(offsets: IntArray) -> IntArray:

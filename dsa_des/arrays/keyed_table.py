@@ -74,7 +74,9 @@ class KeyedTable:
 
     def of(self, runs: IntArray) -> Self:
         """Return what there is of some runs, which are in order."""
-        return self if self._only_of(runs) else self.take(np.isin(self.replica, runs))
+        if len(self) == 0 or self._only_of(runs):
+            return self
+        return self.take(np.isin(self.replica, runs))
 
     def after(self, runs: IntArray, newer: Self, first_run: int) -> Self:
         """Return `newer` of some runs, and what there is of others but those before the first."""

@@ -113,14 +113,15 @@ class RunTicks:
         """The position of the last instant of each run."""
         if len(self) == 0 or self.one_run:
             return np.arange(len(self))[-1:]
-        return np.flatnonzero(np.append(self.run[1:] != self.run[:-1], True))
+        # A search for each run: they are far fewer than the instants.
+        numbers = np.arange(self.run[0], self.run[-1] + 1)
+        ends = np.searchsorted(self.run, numbers, side="right") - 1
+        return ends[np.append(True, ends[1:] != ends[:-1])]
 
     @property
     def first_of_each(self) -> IntArray:
         """The position of the first instant of each run."""
-        if len(self) == 0 or self.one_run:
-            return np.arange(len(self))[:1]
-        return np.flatnonzero(np.append(True, self.run[1:] != self.run[:-1]))
+        return np.append(0, self.last_of_each[:-1] + 1)[: len(self)]
 
     def order(self) -> IntArray | None:
         """Return what puts them in order, those of one instant as they stand; None if they are."""

@@ -9,7 +9,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dsa_des.arrays.column_values import Columns, Instants, Schema, Text, is_empty, nothing_in
+from dsa_des.arrays.column_values import (
+    Columns,
+    Instants,
+    Schema,
+    Text,
+    in_seconds,
+    is_empty,
+    nothing_in,
+)
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
 from dsa_des.record.notes import Notes
@@ -54,8 +62,7 @@ def to_arrow(columns: Columns, schema: Schema) -> pa.RecordBatch:
 def _array(values: Any, kind: str) -> pa.Array:
     if isinstance(values, Text):
         return _dictionary(values.codes, values.names).cast(pa.string())
-    if isinstance(values, Instants):
-        values = values.ticks / values.ticks_per_s
+    values = in_seconds(values)
     if kind == "float64":
         if is_empty(values):
             return pa.nulls(len(values), _TYPES[kind])
@@ -220,4 +227,7 @@ def _joined(parts: list[Any]) -> Any:
     if isinstance(parts[0], Text):
         # A recorder only ever adds names: the last piece knows them all.
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)
+    if all(isinstance(part, Instants) for part in parts):
+        return Instants(np.concatenate([p.ticks for p in parts]), parts[0].ticks_per_s)
+    parts = [in_seconds(part) for part in parts]
     return np.concatenate(parts)

@@ -335,21 +335,25 @@ class Recorder:
         pieces: list[tuple[str, Columns]],
         order: IntArray | None,
         instants: RunTicks,
-    ) -> AnyArray | Text:
+    ) -> Any:
         """Return a column of all pieces in their order; `instants` are in it already."""
         if name == "replica":
             return instants.run
         if name == "tick":
             return instants.tick
         if name == "time_s":
-            return instants.tick / self._ticks_per_s
+            return Instants(instants.tick, self._ticks_per_s)
         if kind == "text":
             text = self._texts.setdefault((table, name), _TextCodes(name))
             codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
             return Text(codes, text.names)
+        given: list[Any] = [columns.get(name) for _, columns in pieces]
+        if all(isinstance(values, Instants) for values in given):
+            ticks = _joined([values.ticks for values in given], order)
+            return Instants(ticks, self._ticks_per_s)
         parts = [
-            _values(self._in_seconds(columns.get(name)), kind, len(columns["tick"]))
-            for _, columns in pieces
+            _values(self._in_seconds(values), kind, len(columns["tick"]))
+            for values, (_, columns) in zip(given, pieces, strict=True)
         ]
         if all(map(is_empty, parts)):
             return nothing_in(len(instants))
@@ -421,6 +425,7 @@ def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
         return nothing_in(count) if kind == "float64" else constant(0, count, kind)
     values = np.asarray(values)
-    if values.dtype == kind:
+    # Whole numbers may be narrower: sinks widen them where they must be wide.
+    if values.dtype == kind or (kind == "int64" and values.dtype.kind == "i"):
         return values
     return constant(values[0], count, kind) if of_one_value(values) else values.astype(kind)

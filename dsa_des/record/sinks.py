@@ -5,7 +5,14 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Schema, Text, same_bits
+from dsa_des.arrays.column_values import (
+    Columns,
+    Instants,
+    Schema,
+    Text,
+    in_seconds,
+    same_bits,
+)
 from dsa_des.arrays.types import AnyArray
 
 
@@ -84,6 +91,8 @@ class _Keeping:
     def _packed(self, name: str, values: Any) -> Any:
         if isinstance(values, Text):
             return Text(_narrow(values.codes), values.names)
+        if isinstance(values, Instants):  # most often those of the rows
+            return Instants(self._packed("tick", values.ticks), values.ticks_per_s)
         if values.dtype.kind == "i":
             values = _narrow(values)
         if not values.strides[0]:
@@ -119,7 +128,7 @@ class ColumnSink(_Keeping):
     def _joined(self, table: str, parts: list[Columns]) -> Columns:
         joined: Columns = {}
         for name, kind in self._schemas[table].items():
-            pieces: list[Any] = [part[name] for part in parts]
+            pieces: list[Any] = [in_seconds(part[name]) for part in parts]
             if kind == "text":  # later pieces know at least the names of earlier ones
                 codes = [piece.codes for piece in pieces]
                 names = pieces[-1].names if pieces else ()
@@ -165,6 +174,14 @@ class Observer(Protocol):
         """Return sections of the run's summary."""
 
 
+def _plain(values: Any) -> Any:
+    """Return a column as observers read it: instants in seconds, whole numbers of 64 bits."""
+    if isinstance(values, Text):
+        return values
+    values = in_seconds(values)
+    return values.astype(np.int64, copy=False) if values.dtype.kind == "i" else values
+
+
 class ObserverSink:
     """Passes rows on to observers.
 
@@ -185,9 +202,11 @@ class ObserverSink:
 
     def write(self, table: str, columns: Columns) -> None:
         """Pass rows to every observer of this table."""
-        for observer in list(self.observers):
-            if table in observer.tables:
-                self._ask(observer, observer.update, table, columns)
+        asked = [observer for observer in self.observers if table in observer.tables]
+        if asked:
+            columns = {name: _plain(values) for name, values in columns.items()}
+        for observer in asked:
+            self._ask(observer, observer.update, table, columns)
 
     def close(self) -> None:
         """Nothing to do."""

@@ -119,8 +119,7 @@ def true_errors(listener: Listener) -> dict[str, float]:
         p, q = sensor_angles(azimuth, elevation, *attitude)
         looked = np.zeros(range_m.shape, dtype=bool)
         for decision in targets.decisions.values():
-            row = np.flatnonzero(decision.place >= 0)
-            looked[row] |= decision.reason[decision.place[row]] == EVALUATE
+            looked[decision.rows] |= decision.reason == EVALUATE
         if not looked.any():
             continue
         true = np.array(unit_vector(p, q))
