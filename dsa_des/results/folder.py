@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import PREFIX, write_file
+from dsa_des.files.output_file import PREFIX, locked, write_file
 from dsa_des.files.output_names import why_not_written
 from dsa_des.results.record import StudyHead, StudyRecord
 from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
@@ -86,18 +86,12 @@ class StudyFolder:
 
     def _take_lock(self) -> None:
         try:
-            import fcntl
-        except ImportError:  # no such locks on this system
-            return
-        try:
             self._lock = open_lock(self.path / LOCK)
         except OSError as error:
             reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
             raise UsageError(reason) from None
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise UsageError(f"{self.path}: another process is running this study") from None
+        if locked(self._lock) is False:
+            raise UsageError(f"{self.path}: another process is running this study")
 
     def _take_up(self, text: str, *, resume: bool) -> None:
         known = os.path.lexists(self.path / STUDY_JSON)
