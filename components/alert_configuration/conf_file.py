@@ -33,14 +33,9 @@ _SPREADS = tuple(key for key in LEVEL_KEYS if key.startswith("spread_"))
 
 
 class AlerterKeys:
-    """Reads the keys that begin with the name of an alerter.
+    """Reads the keys that begin with the name of an alerter, and notes all that is wrong.
 
-    Parameters
-    ----------
-    lines : dict
-        Line number, key as written and text of the value, by key in lower case.
-    problems : Problems
-        Told about every key that is unknown, missing or wrong.
+    Of each key in lower case, `lines` has the line number, the key as written and the value's text.
     """
 
     def __init__(self, lines: dict[str, tuple[int, str, str]], problems: Problems) -> None:

@@ -68,7 +68,7 @@ def alert_files(
             _write_folders(configuration, done, places, decimals)
         else:
             for option, place in places.items():
-                _WRITERS[option](configuration, done[0], place, decimals)
+                _write(option, configuration, done[0], place, decimals)
     except OSError as error:
         raise OutputError(f"{error.filename or out}: cannot be written: {reason_of(error)}") from (
             error
@@ -157,22 +157,17 @@ def _write_folders(
         with OutputFolder(place).writing() as folder:
             for one in done:
                 path = folder / f"{one.path.stem}{suffix}"
-                _WRITERS[option](configuration, one, path, decimals)
+                _write(option, configuration, one, path, decimals)
 
 
-def _write(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
-    write_file(path, alert_table(configuration, one.encounter, one.alerts, decimals).encode())
-
-
-def _write_bands(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
-    write_file(path, bands_table(configuration, one.encounter, one.alerts, decimals).encode())
-
-
-def _draw(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
-    draw_alerts(path, one.path.stem, configuration, one.encounter, one.alerts)
-
-
-_WRITERS = {"--out": _write, "--bands": _write_bands, "--figure": _draw}
+def _write(
+    option: str, configuration: Configuration, one: _Done, path: Path, decimals: int
+) -> None:
+    if option == "--figure":
+        draw_alerts(path, one.path.stem, configuration, one.encounter, one.alerts)
+        return
+    table = bands_table if option == "--bands" else alert_table
+    write_file(path, table(configuration, one.encounter, one.alerts, decimals).encode())
 
 
 def _show(configuration: Configuration, done: list[_Done], places: dict[str, Path]) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations
-from components.alerting.own_poses import OwnPoses
+from components.alerting.received import OwnPoses, Received
 from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
@@ -36,19 +36,14 @@ class BelievedPositions:
     """Positions of the last seconds, true or measured, and straight flights fitted to them."""
 
     def __init__(self, keep_s: float, targets: int) -> None:
-        self._keep_s = keep_s
-        self._came = RunTicks.none()
-        self._time_s = np.empty(0)
-        #: East, north, up (n, targets, 3); NaN where a target was not seen.
-        self._position_m = np.empty((0, targets, 3))
+        self._keep_s, self._targets = keep_s, targets
+        #: East, north, up (targets, 3, n); NaN where a target was not seen.
+        self._seen = Received.none(time_s=(), position_m=(targets, 3))
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
-        """Take in positions at instants since the start of their run, and when they came."""
-        self._came = RunTicks.joined([self._came, came])
-        self._time_s = np.concatenate([self._time_s, time_s])
-        self._position_m = np.concatenate([self._position_m, position_m])
-        if (order := self._came.order()) is not None:  # runs that go side by side
-            self._keep(order)
+        """Take in positions (n, targets, 3) at instants of their run, and when they came."""
+        position = np.moveaxis(position_m, 0, -1)
+        self._seen = self._seen.with_more(came, time_s=time_s, position_m=position)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in what was measured in body axes, by the attitude of when it was measured."""
@@ -70,18 +65,14 @@ class BelievedPositions:
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
         # A row of its own for every instant of measurement.
         line, of, made = _by_instant(sights.tick, row, sights.measured_tick[new])
-        position = np.full((len(made), *self._position_m.shape[1:]), np.nan)
+        position = np.full((len(made), self._targets, 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
         self.add_truth(arrived.instants.take(of), made / wake.ticks_per_s, position)
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what no scan after some asks for."""
-        young = self._time_s >= float(times_s.max()) - self._keep_s  # the next scans come later
-        self._keep(np.flatnonzero(young & (self._came.run >= wake.first_run)))
-
-    def _keep(self, lines: IntArray) -> None:
-        self._came, self._time_s = self._came.take(lines), self._time_s[lines]
-        self._position_m = self._position_m[lines]
+        young = self._seen.time_s >= float(times_s.max()) - self._keep_s  # the next come later
+        self._seen = self._seen.take(young & (self._seen.replica >= wake.first_run))
 
     def flights(
         self,
@@ -100,26 +91,27 @@ class BelievedPositions:
 
         It is known from positions at two instants, not older than `keep_s`.
         """
-        first = first_of_run(self._came, now.run)
-        counts = np.maximum(last_of_run(self._came, now) + 1 - first, 0)
+        came, time_s = self._seen.instants, self._seen.time_s
+        first = first_of_run(came, now.run)
+        counts = np.maximum(last_of_run(came, now) + 1 - first, 0)
         of = np.repeat(np.arange(len(now)), counts)
         start = np.cumsum(counts) - counts
         line = np.arange(len(of)) + (first - start)[of]
-        young = self._time_s[line] >= now_s[of] - self._keep_s
+        young = time_s[line] >= now_s[of] - self._keep_s
         of, line = of[young], line[young]
         counts = np.bincount(of, minlength=len(now))
         start = np.cumsum(counts) - counts
-        targets = self._position_m.shape[1]
-        known = np.zeros((len(now), targets), dtype=bool)
-        state = np.zeros((6, len(now), targets))
+        known = np.zeros((len(now), self._targets), dtype=bool)
+        state = np.zeros((6, len(now), self._targets))
         # Instants with as many positions are added up alike, each as it would be by itself.
         for count in np.flatnonzero(np.bincount(counts)).tolist():
             alike = np.flatnonzero(counts == count)
             if count < 2:
                 continue
             lines = line[start[alike] + np.arange(count)[:, np.newaxis]]
+            position = np.moveaxis(self._seen.position_m[:, :, lines], (0, 1), (2, 3))
             known[alike], state[:, alike] = _fitted(
-                self._time_s[lines], self._position_m[lines], now_s[alike]
+                time_s[lines], np.ascontiguousarray(position), now_s[alike]
             )
         return known, state
 

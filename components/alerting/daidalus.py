@@ -13,7 +13,7 @@ from components.alerting.believed_positions import BelievedPositions, true_posit
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
-from components.alerting.own_poses import OwnPoses
+from components.alerting.received import OwnPoses
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
@@ -134,10 +134,11 @@ class DaidalusAlerting(Component):
         states: TrafficStates = arrived.message
         if self._roster is None:
             self._roster = states.roster
+            targets = len(states.roster)
             self._belief: BelievedTracks | BelievedPositions = (
-                BelievedTracks()
+                BelievedTracks(targets)
                 if self._source == "estimates"
-                else BelievedPositions(self.p.fit_s, len(states.roster))
+                else BelievedPositions(self.p.fit_s, targets)
             )
         self._own.add(arrived.instants, states)
         if self._source not in ("tracks", "fused"):

@@ -57,27 +57,13 @@ def read_encounter(
     configuration: Configuration,
     wind_mps: tuple[float, float] | None = None,
 ) -> Encounter:
-    """Read a `.daa` or `.xyz` file; the first aircraft is the ownship.
+    """Read a `.daa` or `.xyz` file, whose first aircraft is the ownship.
 
-    Parameters
-    ----------
-    path : path-like
-    configuration : Configuration
-        Its alerters, and how the file's standard deviations count.
-    wind_mps : (towards the east, towards the north), optional
-        By default the wind that the ownship's columns `heading` and `airspeed` imply, where both
-        are given; else none.
-
-    Raises
-    ------
-    TrafficFileError
-        With all problems of the file; also without velocities, or with an alerter that is not
-        there.
-
-    Notes
-    -----
-    Targets count at the ownship's times: a sample at another instant is left out, as the reference
-    leaves it out.
+    The wind (towards the east and the north, m/s) is by default what the ownship's columns
+    `heading` and `airspeed` imply, where both are given, else none. Targets count at the ownship's
+    times: a sample at another instant is left out, as the reference leaves it out. Raises
+    `TrafficFileError` with all problems of the file, also without velocities or with an alerter
+    that is not there.
     """
     samples = read_daa_samples(path, tuple(EXTRA_COLUMNS))
     problems = Problems(str(path))

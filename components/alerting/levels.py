@@ -158,20 +158,9 @@ def alert_levels(
 ) -> Alerts:
     """Return the alert levels of targets over time, memory included.
 
-    Parameters
-    ----------
-    configuration : Configuration
-    time_s : (times,)
-        The ownship's.
-    present : (times, targets) of bool
-    pairs : AlertPairs of (times, targets)
-        Finite also where a target is absent.
-    alerter : (times, targets) of int, optional
-        Place of each one's alerter in the configuration, from 0; the first for all by default.
-
-    Returns
-    -------
-    Alerts
+    `time_s` (times,) is the ownship's; `pairs` (times, targets) are finite also where a target is
+    not `present`. `alerter` (times, targets) is the index of each one's in the configuration, by
+    default the first for all.
     """
     shape = present.shape
     most = configuration.most_levels
@@ -190,10 +179,10 @@ def alert_levels(
                 whole[cells[0], cells[1], :count] = part
     level = np.full(shape, -1, dtype=np.int64)
     early_level = np.zeros(shape, dtype=np.int64)
-    memory = AlertMemory(memory_rule(configuration), shape[1])
+    rule, targets = memory_rule(configuration), np.arange(shape[1])
+    memory = AlertMemory.new(rule, 0 * targets, targets)
     for row, now_s in enumerate(np.asarray(time_s).tolist()):
-        level[row] = np.where(
-            present[row], memory.step(now_s, present[row], due[row], early[row]), -1
-        )
-        early_level[row] = memory.early_levels(now_s, present[row])
+        memory, now = memory.step(rule, now_s, present[row], due[row], early[row])
+        level[row] = np.where(present[row], now, -1)
+        early_level[row] = memory.early_levels(rule, now_s, present[row])
     return Alerts(level, violation_s, early_level)

@@ -1,17 +1,17 @@
 """Memory of alert levels: hysteresis, M-of-N, persistence, of one run or of many."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
 # The time of what has not been yet.
 _LONG_AGO_S = -np.inf
-_COLUMNS = ("_last_s", "_output", "_risen_s", "_queue", "_own_time_s")
 
 
 @dataclass(frozen=True)
@@ -24,79 +24,81 @@ class MemoryRule:
     n: int
 
 
-class AlertMemory:
-    """The remembered state of targets 0 ... count - 1, of one ownship or of several."""
+class AlertMemory(KeyedTable):
+    """What is remembered of targets, by run (``replica``) and ``number``.
 
-    def __init__(self, rule: MemoryRule, count: int) -> None:
-        self._rule = rule
-        self._last_s = np.full(count, _LONG_AGO_S)
-        self._output = np.full(count, _NONE, dtype=np.int64)
-        self._risen_s = np.full(count, _LONG_AGO_S)
-        self._queue = np.full((count, max(rule.n, 1)), _NONE, dtype=np.int64)
-        self._own_time_s = np.full(count, np.nan)
+    ``output`` is the level that is on, -1 for none, and ``risen_s`` when it rose; ``queue`` (n of
+    the rule, targets) has the last levels, ``last_s`` is when the target was last present, and
+    ``asked_s`` when it was last asked for.
+    """
 
-    def _forget(self, which: BoolArray) -> None:
-        self._last_s[which] = self._risen_s[which] = _LONG_AGO_S
-        self._output[which] = _NONE
-        self._queue[which] = _NONE
-
-    def take(self, which: IntArray) -> "AlertMemory":
-        """Return the memory of some targets, to be put back with `put`."""
-        part = AlertMemory(self._rule, len(which))
-        for name in _COLUMNS:
-            setattr(part, name, getattr(self, name)[which])
-        return part
-
-    def put(self, which: IntArray, part: "AlertMemory") -> None:
-        """Take over what `part` remembers as that of some targets."""
-        for name in _COLUMNS:
-            getattr(self, name)[which] = getattr(part, name)
+    @classmethod
+    def new(cls, rule: MemoryRule, replica: IntArray, number: IntArray) -> Self:
+        """Return the memory of targets of which nothing is known yet."""
+        count = len(number)
+        return cls(
+            replica=replica,
+            number=number,
+            last_s=np.full(count, _LONG_AGO_S),
+            output=np.full(count, _NONE, dtype=np.int64),
+            risen_s=np.full(count, _LONG_AGO_S),
+            queue=np.full((max(rule.n, 1), count), _NONE, dtype=np.int64),
+            asked_s=np.full(count, np.nan),
+        )
 
     def step(
-        self, now_s: float | FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
-    ) -> IntArray:
-        """Take in one instant and return the level of each target."""
-        rule = self._rule
-        step_s = now_s - self._own_time_s
+        self,
+        rule: MemoryRule,
+        now_s: float | FloatArray,
+        present: BoolArray,
+        due: BoolArray,
+        early: BoolArray,
+    ) -> tuple[Self, IntArray]:
+        """Return the memory after one instant, and the level of each target.
+
+        `due` and `early` (targets, levels) say which levels are due by their times, and which if
+        they are on already.
+        """
+        step_s = now_s - self.asked_s
         gap = (step_s < 0.0) | (step_s > rule.hysteresis_s)
-        if gap.any():
-            self._forget(gap)
-        self._own_time_s[:] = now_s
-        raw = self._raw(now_s, due, early)
-        gap_s = now_s - self._last_s
-        known = (gap_s > 0.0) & (gap_s <= rule.hysteresis_s)
-        fresh = present & ~known
-        self._output[fresh] = _NONE
-        self._risen_s[fresh] = _LONG_AGO_S
-        counted = raw
-        if rule.m > 0:
-            self._queue[fresh] = _NONE
-            self._queue[fresh, : rule.m] = raw[fresh, np.newaxis]
-            pushed = np.concatenate([self._queue[:, 1:], raw[:, np.newaxis]], axis=1)
-            self._queue = np.where(present[:, np.newaxis], pushed, self._queue)
-            counted = np.sort(self._queue, axis=1)[:, -rule.m]
-        since_s = now_s - self._risen_s
-        young = (since_s >= 0.0) & (since_s < rule.persistence_s)
-        held = (self._output > 0) & (counted < self._output) & young
-        rises = ~held & (counted > 0) & (counted > self._output) & present
-        self._risen_s = np.where(rises, now_s, self._risen_s)
-        level = np.where(held, self._output, np.maximum(counted, 0))
-        self._output = np.where(present, level, self._output)
-        self._last_s = np.where(present, now_s, self._last_s)
-        return level
-
-    def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
-        """Return whose early alerting time counts for guidance: levels that rose before now."""
-        counts = present & (self._rule.hysteresis_s > 0.0) & (self._risen_s < now_s)
-        return np.where(counts, np.maximum(self._output, 0), 0)
-
-    def _raw(self, now_s: float | FloatArray, due: BoolArray, early: BoolArray) -> IntArray:
-        """Return the highest level that is due; the one that is on may be so early."""
+        last_s = np.where(gap, _LONG_AGO_S, self.last_s)
+        output = np.where(gap, _NONE, self.output)
         levels = np.arange(1, due.shape[1] + 1)
-        before = self._last_s < now_s
-        on = (self._output[:, np.newaxis] == levels) & before[:, np.newaxis]
-        is_due = np.where(on, early, due)
-        return np.asarray((is_due * levels).max(axis=1, initial=0))
+        on = (output[:, np.newaxis] == levels) & (last_s < now_s)[:, np.newaxis]
+        raw = np.asarray((np.where(on, early, due) * levels).max(axis=1, initial=0))
+        gap_s = now_s - last_s
+        fresh = present & ~((gap_s > 0.0) & (gap_s <= rule.hysteresis_s))
+        output = np.where(fresh, _NONE, output)
+        risen_s = np.where(gap | fresh, _LONG_AGO_S, self.risen_s)
+        queue, counted = self.queue, raw
+        if rule.m > 0:
+            queue = np.where(gap | fresh, _NONE, queue)
+            queue[: rule.m, fresh] = raw[fresh]
+            queue = np.where(present, np.concatenate([queue[1:], raw[np.newaxis]]), queue)
+            counted = np.sort(queue, axis=0)[-rule.m]
+        since_s = now_s - risen_s
+        young = (since_s >= 0.0) & (since_s < rule.persistence_s)
+        held = (output > 0) & (counted < output) & young
+        rises = ~held & (counted > 0) & (counted > output) & present
+        level = np.where(held, output, np.maximum(counted, 0))
+        after = self.with_columns(
+            last_s=np.where(present, now_s, last_s),
+            output=np.where(present, level, output),
+            risen_s=np.where(rises, now_s, risen_s),
+            queue=queue,
+            asked_s=np.full(len(self), now_s),
+        )
+        return after, level
+
+    def early_levels(self, rule: MemoryRule, now_s: float, present: BoolArray) -> IntArray:
+        """Return whose early alerting time counts for guidance: levels that rose before now."""
+        counts = present & (rule.hysteresis_s > 0.0) & (self.risen_s < now_s)
+        return np.where(counts, np.maximum(self.output, 0), 0)
+
+    @property
+    def keys(self) -> RunTicks:
+        """Run and number of each."""
+        return RunTicks(self.replica, self.number)
 
 
 class LevelMemory:
@@ -104,10 +106,9 @@ class LevelMemory:
 
     def __init__(self, rule: MemoryRule) -> None:
         self._rule = rule
-        #: Run and number of each one that is remembered, ascending, and when it was last seen.
-        self._known = RunTicks.none()
-        self._seen_s: FloatArray = np.empty(0)
-        self._memory = AlertMemory(rule, 0)
+        none = np.empty(0, dtype=np.int64)
+        #: Ascending by run and number.
+        self._known = AlertMemory.new(rule, none, none)
 
     def __len__(self) -> int:
         """Return how many targets are remembered."""
@@ -132,40 +133,36 @@ class LevelMemory:
         present = np.ones(len(number), dtype=bool) if present is None else present
         place = self._places(RunTicks(run, number))
         for rows in turns(place):
-            part = self._memory.take(place[rows])
-            level[rows] = part.step(now_s[rows], present[rows], due[rows], early[rows])
-            self._memory.put(place[rows], part)
-        self._seen_s[place] = now_s  # the last of each counts
+            part, level[rows] = self._known.take(place[rows]).step(
+                self._rule, now_s[rows], present[rows], due[rows], early[rows]
+            )
+            self._put(place[rows], part)
         return level
 
     def forget(self, runs: IntArray, times_s: FloatArray) -> None:
         """Forget who was gone for too long, given the time in some runs (ascending)."""
-        of = self._known.run
+        of = self._known.replica
         last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
-        away_s = np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)
-        self._remember(np.flatnonzero(away_s <= self._rule.hysteresis_s))
+        away_s = np.where(runs[last] == of, times_s[last] - self._known.asked_s, 0.0)
+        self._known = self._known.take(away_s <= self._rule.hysteresis_s)
 
     def forget_before(self, run: int) -> None:
         """Forget the runs before one."""
-        self._remember(np.flatnonzero(self._known.run >= run))
+        self._known = self._known.take(self._known.replica >= run)
 
-    def _remember(self, which: IntArray) -> None:
-        if len(which) < len(self._known):
-            self._known, self._seen_s = self._known.take(which), self._seen_s[which]
-            self._memory = self._memory.take(which)
+    def _put(self, which: IntArray, part: AlertMemory) -> None:
+        for name, values in part.columns.items():
+            self._known.columns[name][..., which] = values
 
     def _places(self, those: RunTicks) -> IntArray:
         """Return the rows of targets, by run and number, all of them remembered from now on."""
-        place = last_of_run(self._known, those)
-        if len(self._known) and bool(
-            ((place >= 0) & (self._known.tick[place] == those.tick)).all()
-        ):
+        known = self._known.keys
+        place = last_of_run(known, those)
+        if len(known) and bool(((place >= 0) & (known.tick[place] == those.tick)).all()):
             return place
         order = those.order()
-        every = union([self._known, those if order is None else those.take(order)])
-        old = last_of_run(every, self._known)
-        memory, seen_s = AlertMemory(self._rule, len(every)), np.full(len(every), -np.inf)
-        memory.put(old, self._memory)
-        seen_s[old] = self._seen_s
-        self._known, self._seen_s, self._memory = every, seen_s, memory
+        every = union([known, those if order is None else those.take(order)])
+        old, before = last_of_run(every, known), self._known
+        self._known = AlertMemory.new(self._rule, every.run.copy(), every.tick.copy())
+        self._put(old, before)
         return last_of_run(every, those)

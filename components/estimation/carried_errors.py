@@ -83,23 +83,12 @@ class MotionWithErrors:
 
 @dataclass(frozen=True, eq=False)
 class ToldErrors:
-    """What measurements, or pairs of them with tracks, say of their errors.
+    """The errors of measurements that aircraft report, or of pairs of them with tracks."""
 
-    Parameters
-    ----------
-    ways : sequence of int
-        Which way each error goes (`NORTH` to `RANGE`).
-    deviation : (errors, n)
-        Standard deviation of each: m, m/s, rad; 0 where a measurement has none of it.
-    age_s : (n,)
-        For how long places were carried on by the velocity that is told.
-    at_range : (n,) of bool
-        Whether a height leaves the range as it is: measured ranges with a height that is told.
-    """
-
-    ways: Sequence[int]
-    deviation: FloatArray
-    age_s: FloatArray
+    ways: Sequence[int]  # Which way each error goes (`NORTH` to `RANGE`)
+    deviation: FloatArray  # (errors, n), standard deviation: m, m/s, rad; 0 where there is none
+    age_s: FloatArray  # (n,), for how long positions were carried on by the reported velocity
+    # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
 
     def take(self, which: IntArray) -> "ToldErrors":

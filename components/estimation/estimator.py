@@ -263,9 +263,11 @@ def pair_measurement(
             spread[i] += selected(weight * expected.total[i, i], track)
     new = variance_of_what_is_new(variance, common, spread)
     learning = [found.innovation(new, track) for found in moments]
-    odds = np.empty_like(likelihoods)
-    for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
-        odds[i] = log_likelihood(found, distance_squared(found.root, apart))
+    odds = None
+    if len(learning) > 1:  # the odds of a single model are known
+        odds = np.empty_like(likelihoods)
+        for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
+            odds[i] = log_likelihood(found, distance_squared(found.root, apart))
     return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
 

@@ -126,16 +126,16 @@ def mixed(
     new_states, new_covariances = [], []
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
-        sizes = [_shared(states[i], states[j], shared) for i in range(many)]
-        given = [_filled(states[i], states[j], sizes[i], bool(fresh)) for i in range(many)]
-        state = sum_of([w * x for w, x in zip(weights, given, strict=True)])
+        given = [
+            _entering((states[i], covariances[i]), (states[j], covariances[j]), shared,
+                      fresh[j] if fresh else None)
+            for i in range(many)
+        ]  # fmt: skip
+        state = sum_of([w * x for w, (x, _) in zip(weights, given, strict=True)])
         covariance = np.zeros_like(covariances[j])
-        for i in range(many):
-            apart = given[i] - state
-            whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
-            if fresh and sizes[i] < len(whole):
-                _freshen(whole, shared, fresh[j])
-            covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
+        for weight, (x, whole) in zip(weights, given, strict=True):
+            apart = x - state
+            covariance += weight * (whole + apart[:, np.newaxis] * apart[np.newaxis])
         new_states.append(state)
         new_covariances.append(symmetric(covariance))
     return new_states, new_covariances, predicted
@@ -154,27 +154,25 @@ def before(
     return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
 
 
-def _shared(one: FloatArray, other: FloatArray, least: int) -> int:
-    return len(one) if len(one) == len(other) else least
+def _entering(
+    given: tuple[FloatArray, FloatArray],
+    own: tuple[FloatArray, FloatArray],
+    shared: int,
+    fresh: float | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return state and covariance of a target that enters another model.
 
-
-def _filled(given: FloatArray, own: FloatArray, shared: int, fresh: bool) -> FloatArray:
-    if shared == len(own):
-        return given[:shared]
-    rest = own[shared:]
-    return np.concatenate([given[:shared], np.zeros_like(rest) if fresh else rest])
-
-
-def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
-    if shared == len(own):
-        return given[:shared, :shared]
-    whole = np.zeros_like(own)
-    whole[:shared, :shared] = given[:shared, :shared]
-    whole[shared:, shared:] = own[shared:, shared:]
-    return whole
-
-
-def _freshen(covariance: FloatArray, shared: int, variance: float) -> None:
-    covariance[shared:, shared:] = 0.0
-    for i in range(shared, len(covariance)):
-        covariance[i, i] = variance
+    What the model has besides the shared components is as its own filter has it, or 0 with the
+    variance `fresh`.
+    """
+    (x, p), (own_x, own_p) = given, own
+    if len(x) == len(own_x):
+        return x, p
+    state, covariance = np.zeros_like(own_x), np.zeros_like(own_p)
+    state[:shared], covariance[:shared, :shared] = x[:shared], p[:shared, :shared]
+    if fresh is None:
+        state[shared:], covariance[shared:, shared:] = own_x[shared:], own_p[shared:, shared:]
+    else:
+        for i in range(shared, len(own_x)):
+            covariance[i, i] = fresh
+    return state, covariance

@@ -10,7 +10,7 @@ import numpy as np
 
 from components.estimation.batched import product, product_transposed, squared_length, times
 from components.estimation.frame import SensorPose, dot
-from components.geometry import wrap_pi_unchecked
+from components.geometry import unit_vector_unchecked, wrap_pi_unchecked
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the
@@ -184,10 +184,7 @@ def axis_in_body(
     pose: SensorPose,
 ) -> FloatArray:
     """Return unit vectors from the one who looks along cones' axes, in body axes."""
-    level = np.cos(direction[1])
-    pointed = np.stack(
-        [level * np.cos(direction[0]), level * np.sin(direction[0]), -np.sin(direction[1])]
-    )
+    pointed = np.stack(unit_vector_unchecked(direction[0], direction[1]))
     away = state[:3] + ahead_s * state[3:] - pose.position_m
     away = np.where(has_range, away, pointed)
     length = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)

@@ -20,19 +20,11 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Ages:
-    """How old what is told is, (n,) each, s.
-
-    Parameters
-    ----------
-    place, velocity : (n,)
-        From the instant of each to now; 0 where it is of now or not told.
-    since : (n,)
-        Since the track was last updated: what was new before that is in its state.
-    """
+    """How old reported positions and velocities are, (n,) each, s; 0 where not reported."""
 
     place: FloatArray
     velocity: FloatArray
-    since: FloatArray
+    since: FloatArray  # Since the track was last updated: what was new before is in its state
 
     def errors(self, model: Motion, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return covariances of what is told of place and velocity, and of the state with it.

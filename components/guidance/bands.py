@@ -125,23 +125,12 @@ class Guidance(NamedTuple):
 
 @dataclass(frozen=True)
 class GuidedIntruder:
-    """One intruder as guidance sees it.
+    """One intruder as guidance sees it."""
 
-    Parameters
-    ----------
-    state : State
-        In the ownship's plane.
-    alerter : Alerter
-    early_level : int
-        The level whose early alerting time counts; 0 for none.
-    bounds : Bounds of (), optional
-        How far the relative state may be wrong.
-    """
-
-    state: State
+    state: State  # In the ownship's plane
     alerter: Alerter
-    early_level: int = 0
-    bounds: Bounds | None = None
+    early_level: int = 0  # The level whose early alerting time counts; 0 for none
+    bounds: Bounds | None = None  # of (), how far the relative state may be wrong
 
 
 def guidance(

@@ -64,21 +64,10 @@ def changes_out(
 ) -> list[Changes | None]:
     """Return the smallest changes to either side that lead out of the bands at some instants.
 
-    Parameters
-    ----------
-    kind_name : {"hdir", "hs", "vs", "alt"}
-    configuration : Configuration
-    alerter : Alerter
-        Of all targets.
-    alerts : AlertLevels
-    rows : sequence of int
-        Of the message; each is looked at by itself.
-
-    Returns
-    -------
-    list of (float, float) or None
-        To the left or down, negative, and to the right or up, positive, rad, m/s or m; infinite
-        where nothing there leads out. None where the own value needs no change or is not known yet.
+    They are to the left or down, negative, and to the right or up, positive, in rad, m/s or m;
+    infinite where nothing there leads out, and None where the own value needs no change or is not
+    known yet. `rows` are of the message, each looked at by itself; the alerter is that of all
+    targets.
     """
     region, cyclic = configuration["corrective_region"], kind_name == "hdir"
     return [

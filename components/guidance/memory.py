@@ -14,15 +14,7 @@ _SEVERE = ("FAR", "MID", "NEAR")
 
 
 class BandMemory:
-    """The memory of one kind of bands of one ownship.
-
-    Parameters
-    ----------
-    values : mapping
-        Values of a configuration, by key.
-    cyclic : bool
-        Whether the values are directions, of which 0 and a full turn are one place.
-    """
+    """The memory of one kind of bands of one ownship, by the values of a configuration."""
 
     def __init__(self, values: Any, cyclic: bool) -> None:
         self._hysteresis_s: float = values["hysteresis_time"]
@@ -190,17 +182,11 @@ _LOW, _HIGH = 0, 1
 
 
 class ResolutionMemory:
-    """The memory of one kind of resolutions of one ownship.
+    """The memory of one kind of resolutions of one ownship, by the values of a configuration.
 
     An earlier way out is kept while the preferred side is young, while the recovery cylinder was
     larger, or while it is near the new one; and as long as the bands between the two are not red.
     The preferred side changes only when it is no longer young and the other way clearly shorter.
-
-    Parameters
-    ----------
-    values : mapping
-        Values of a configuration, by key.
-    kind_name : {"hdir", "hs", "vs", "alt"}
     """
 
     def __init__(self, values: Any, kind_name: str) -> None:
@@ -327,13 +313,9 @@ class Remembered(NamedTuple):
 
 
 class GuidanceMemory:
-    """What is remembered of the guidance of one kind, for one ownship.
+    """What is remembered of the guidance of one kind (of `KINDS`), for one ownship.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        With `hysteresis_time` 0 every instant stands by itself.
-    kind_name : {"hdir", "hs", "vs", "alt"}
+    With `hysteresis_time` 0 of the configuration every instant stands by itself.
     """
 
     def __init__(self, configuration: Configuration, kind_name: str) -> None:

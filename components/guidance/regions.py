@@ -58,16 +58,7 @@ class Concerned(NamedTuple):
 
 
 class Regions:
-    """Regions of guidance around n ownships.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    kind : ManoeuvreKind
-        Of the ownships.
-    own : State of (n,)
-    intruders : list of GuidedIntruders
-    """
+    """Regions of guidance around n ownships, by one kind of their manoeuvres."""
 
     def __init__(
         self,

@@ -37,20 +37,11 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Detector:
-    """A volume, or an open cylinder, that flights must not meet.
-
-    Parameters
-    ----------
-    volume : Volume or TcasAdvisory or None
-    cylinder_m : (radius, half height) or None
-        Where there is no volume; of floats, or of arrays that broadcast against the flights.
-    bounds : Bounds or None
-        How far the relative states may be wrong, for the volume; arrays as the flights.
-    """
+    """A volume, or an open cylinder, that flights must not meet; arrays as the flights."""
 
     volume: Volume | TcasAdvisory | None = None
-    cylinder_m: tuple[Any, Any] | None = None
-    bounds: Bounds | None = None
+    cylinder_m: tuple[Any, Any] | None = None  # Radius and half height, where there is no volume
+    bounds: Bounds | None = None  # How far the relative states may be wrong, for the volume
 
     def span(self, own: State, intruder: State, begin_s: Any, end_s: Any) -> Span:
         """Return from when to when flights meet it."""

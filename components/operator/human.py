@@ -44,19 +44,11 @@ class _Alert(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """When a decision was taken in, s, and what it does to what was told before.
-
-    Parameters
-    ----------
-    time_s : float
-    ends_s : float
-        When a turn or a climb is flown; NaN for others.
-    replaces_s : float
-        When a command of the same kind was taken in that is still being flown; NaN without one.
-    """
+    """When a decision was taken in, s, and which earlier command it replaces."""
 
     time_s: float
-    ends_s: float = math.nan
+    ends_s: float = math.nan  # When a turn or a climb is flown; NaN for others
+    # When a command of the same kind was taken in that is still being flown; NaN without one
     replaces_s: float = math.nan
 
 

@@ -59,17 +59,10 @@ class _DecisionRow(BaseModel):
 def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
     """Return the decisions of a table with their times, s, in order.
 
-    Parameters
-    ----------
-    path : Path
-        A run's ``decisions.parquet``, its folder, or a CSV file with the columns ``time_s`` and
-        ``decision``, and where they are needed ``target``, ``turn_rad``, ``climb_m`` and
-        ``wall_time_s``.
-
-    Raises
-    ------
-    ValueError
-        It cannot be read, or a row holds what no operator can decide.
+    The path is a run's ``decisions.parquet``, its folder, or a CSV file with the columns ``time_s``
+    and ``decision``, and where they are needed ``target``, ``turn_rad``, ``climb_m`` and
+    ``wall_time_s``. Raises ValueError if it cannot be read, or a row holds what no operator can
+    decide.
     """
     if path.is_dir():
         path = path / "decisions.parquet"

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearised
-from components.messages.columns import STATE
+from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
@@ -199,8 +199,6 @@ class StoneSoupTracker(Component):
     def setup(self) -> None:
         """Build the tracker."""
         needs_stone_soup("tracking.stonesoup")
-        from components.stone_soup.tracker import Follower
-
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
         self._newest = -1
@@ -339,9 +337,14 @@ class StoneSoupTracker(Component):
         def column(name: str, kind: type = float) -> Any:
             return np.array([getattr(one, name) for one in tracks], dtype=kind)
 
-        moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(STATE)}
         assert self._origin is not None
-        lat, lon, alt = (np.full(count, value) for value in self._origin)
+        origin = (np.full(count, value) for value in self._origin)
+        moments: dict[str, Any] = {
+            **{name: known(values) for name, values in zip(STATE, state, strict=True)},
+            **dict(zip((*OWN_POSITION, *ORIGIN), (*at.position_m, *origin), strict=True)),
+            **{name: column(name) for name in ("age_s", "state_s", "updated_s")},
+            **{name: column(name, np.int64) for name in ("contributors", "updated_by")},
+        }
         return StateTracks(
             tick=wake.ticks[rows],
             offsets=offsets_of(of_row, len(rows)),
@@ -353,17 +356,6 @@ class StoneSoupTracker(Component):
             azimuth_variance_rad2=angular[0],
             elevation_variance_rad2=angular[1],
             has_range=ranged,
-            age_s=column("age_s"),
-            state_s=column("state_s"),
-            updated_s=column("updated_s"),
-            contributors=column("contributors", np.int64),
-            updated_by=column("updated_by", np.int64),
-            own_north_m=at.position_m[0],
-            own_east_m=at.position_m[1],
-            own_down_m=at.position_m[2],
-            origin_lat_deg=lat,
-            origin_lon_deg=lon,
-            origin_alt_m=alt,
             covariance={name: known(spread[place]) for place, name in COVARIANCE.items()},
             extras={},
             sensors=sensors,

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -110,15 +109,6 @@ class IntersectionParameters(Parameters):
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Reports:
-    """What came from the trackers in a wake, in the frames of the replicas."""
-
-    tracks: LocalTracks
-    row: IntArray  # (tracks,), of the wake
-    reported_at: list[IntArray]  # list of (reports,): By tracker: the rows at which it reported
-
-
 class CovarianceIntersection(Component):
     """Makes one track of those that several trackers have of a target.
 
@@ -169,14 +159,17 @@ class CovarianceIntersection(Component):
             return None
         replica = wake.run[rows]
         records = self._records_of(np.unique(replica), came, row_of, wake)
-        reports = self._reports(wake, came, row_of, records)
+        new, reported_at = self._reports(wake, came, row_of, records)
         local, reported = self._local.of(records.replica), self._reported.of(records.replica)
         parts = []
         for at in turns(replica):
-            local, records = self._taken_in(local, records, reports, rows[at], replica[at])
-            new = self._fused(local, records, reported, rows[at], replica[at])
-            parts.append(new)
-            kept = new.take(new.track_status != DELETED)
+            local, records = self._taken_in(
+                local, records, new.take(np.isin(new.row, rows[at])), reported_at, rows[at],
+                replica[at],
+            )  # fmt: skip
+            fused = self._fused(local, records, reported, rows[at], replica[at])
+            parts.append(fused)
+            kept = fused.take(fused.track_status != DELETED)
             reported = reported.after(replica[at], kept, wake.first_run)
         runs, first = records.replica, wake.first_run
         self._records = self._records.after(runs, records, first)
@@ -225,19 +218,19 @@ class CovarianceIntersection(Component):
         came: dict[str, Arrivals],
         row_of: dict[str, IntArray],
         records: KeyedTable,
-    ) -> _Reports:
-        parts, rows = [], []
+    ) -> tuple[LocalTracks, list[IntArray]]:
+        """Return the tracks that came, with their ``row`` of the wake, and each tracker's rows."""
+        parts = []
         reported_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
         for name, row in row_of.items():
             message, replica = came[name].message, wake.run[row]
             index = self.trackers.index(name)
             origin = records.origin[:, np.searchsorted(records.replica, replica)]
             masks = self._masks(message.sensors)
-            found, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
-            parts.append(found)
-            rows.append(row[of])
+            came_now, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
+            parts.append(came_now.with_columns(row=row[of]))
             reported_at[index] = row
-        return _Reports(LocalTracks.joined(parts), np.concatenate(rows), reported_at)
+        return LocalTracks.joined(parts), reported_at
 
     def _masks(self, sensors: Sequence[str]) -> list[int]:
         """Return the bit of each of a tracker's sensors among all."""
@@ -249,14 +242,15 @@ class CovarianceIntersection(Component):
         self,
         local: LocalTracks,
         records: KeyedTable,
-        reports: _Reports,
+        new: LocalTracks,
+        reported_at: list[IntArray],
         at: IntArray,
         replica: IntArray,
     ) -> tuple[LocalTracks, KeyedTable]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
-        new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
+        new = new.with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
-        for index, rows in enumerate(reports.reported_at):
+        for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.joined([local.take(~gone), new])
         records = with_newest(records, new)
@@ -284,8 +278,8 @@ class CovarianceIntersection(Component):
         mine = local.take(np.isin(local.replica, replica))
         before = reported.of(replica)
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
-        found = fused_states(mine, when, self._rules.motion, self.p.rule)
-        of = np.searchsorted(records.replica, found.replica)
+        fused = fused_states(mine, when, self._rules.motion, self.p.rule)
+        of = np.searchsorted(records.replica, fused.replica)
         return reported_after(
-            before, found, mine, records.origin[:, of], records.own_m[:, of], replica, at
+            before, fused, mine, records.origin[:, of], records.own_m[:, of], replica, at
         )

@@ -1,7 +1,5 @@
 """Fused tracks: their states, from those of their members, and the message that reports them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, times
@@ -21,35 +19,19 @@ from components.messages.state_tracks import (
 from components.track_fusion.local_tracks import LocalTracks
 from components.track_fusion.track_association import bearing, leaders
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.run_ticks import RunTicks, positions_among
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
-
-
-@dataclass(frozen=True, eq=False)
-class FusedStates:
-    """Fused tracks by replica and number."""
-
-    replica: IntArray
-    number: IntArray
-    status: IntArray
-    # (n,), the largest of any member: as much is sure whatever they have in common
-    existence: FloatArray
-    ranged: BoolArray
-    state: FloatArray  # (6, n), of angle-only tracks meaningless
-    covariance: FloatArray  # (6, 6, n)
-    newest: IntArray  # (n,): index of the member that gives the direction where there is no range
-    time_s: FloatArray
-    updated_s: FloatArray
-    updated_by: IntArray
-    contributors: IntArray
 
 
 def fused_states(
     tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
-) -> FusedStates:
-    """Return the fused tracks to which tracks belong.
+) -> KeyedTable:
+    """Return the fused tracks to which tracks belong, by replica and number (``track``).
 
+    ``existence`` is the largest of any member: as much is sure whatever they have in common.
+    ``newest`` is the index of the member that gives the direction where there is no range; there
+    ``state`` (6, n) and ``covariance`` mean nothing.
     Members with a range come first, then those without, each group by tracker; each is combined
     with what those before it gave.
     """
@@ -86,16 +68,16 @@ def fused_states(
     np.bitwise_or.at(contributors, of, tracks.contributors)
     last = tracks.updated_s == updated_s[of]
     np.bitwise_or.at(updated_by, of[last], tracks.updated_by[last])
-    return FusedStates(
+    return KeyedTable(
         replica=tracks.replica[leader],
-        number=tracks.system[leader],
-        status=status,
+        track=tracks.system[leader],
+        track_status=status,
         existence=existence,
-        ranged=tracks.ranged[leader],
+        has_range=tracks.ranged[leader],
         state=x,
         covariance=p,
         newest=_newest(tracks, of, count),
-        time_s=time_s[leader],
+        state_s=time_s[leader],
         updated_s=updated_s,
         updated_by=updated_by,
         contributors=contributors,
@@ -132,7 +114,7 @@ def no_fused_tracks() -> KeyedTable:
 
 def reported_after(
     before: KeyedTable,
-    found: FusedStates,
+    fused: KeyedTable,
     members: LocalTracks,
     origin_deg_m: FloatArray,
     own_m: FloatArray,
@@ -140,39 +122,26 @@ def reported_after(
     row_of_replica: IntArray,
 ) -> KeyedTable:
     """Return what is reported of fused tracks, and once of those that are no more."""
-    row = row_of_replica[np.searchsorted(replica, found.replica)]
-    count = len(found.replica)
-    held = {
-        key: place
-        for place, key in enumerate(
-            zip(before.replica.tolist(), before.track.tolist(), strict=True)
-        )
-    }
-    keys = list(zip(found.replica.tolist(), found.number.tolist(), strict=True))
-    old = np.array([held.get(key, -1) for key in keys], dtype=np.int64)
-    known = old >= 0
-    born_s, contributors = found.time_s.copy(), found.contributors.copy()
+    count, ranged = len(fused), fused.has_range
+    keys, old_keys = (RunTicks(one.replica, one.track) for one in (fused, before))
+    old, known = positions_among(old_keys, keys)
+    known = np.ones(count, dtype=bool) if known is None else known
+    born_s, contributors = fused.state_s.copy(), fused.contributors.copy()
     born_s[known] = before.born_s[old[known]]
     contributors[known] |= before.contributors[old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
-    seen, by_state = linearised(Kind(False), found.state, SensorPose(own_m, axes))
-    spread = product_transposed(product(by_state, found.covariance[:3, :3]), by_state)
-    newest = members.take(found.newest)
+    seen, by_state = linearised(Kind(False), fused.state, SensorPose(own_m, axes))
+    spread = product_transposed(product(by_state, fused.covariance[:3, :3]), by_state)
+    newest = members.take(fused.newest)
     azimuth, elevation = newest.direction()
-    ranged = found.ranged
-    state_s = np.where(ranged, found.time_s, newest.time_s)
-    new = KeyedTable(
-        replica=found.replica,
-        row=row,
-        track=found.number,
-        track_status=found.status,
-        existence=found.existence,
+    state_s = np.where(ranged, fused.state_s, newest.time_s)
+    columns = {name: fused.columns[name] for name in fused.columns if name != "newest"}
+    new = KeyedTable(**columns).with_columns(
+        row=row_of_replica[np.searchsorted(replica, fused.replica)],
         born_s=born_s,
         contributors=contributors,
-        updated_by=found.updated_by,
-        has_range=ranged,
-        state=np.where(ranged, found.state, np.nan),
-        covariance=np.where(ranged, found.covariance, np.nan),
+        state=np.where(ranged, fused.state, np.nan),
+        covariance=np.where(ranged, fused.covariance, np.nan),
         azimuth_rad=np.where(ranged, seen[0], azimuth) % (2.0 * np.pi),
         elevation_rad=np.where(ranged, seen[1], elevation),
         azimuth_variance_rad2=np.where(ranged, spread[0, 0], newest.azimuth_variance_rad2),
@@ -181,13 +150,11 @@ def reported_after(
         origin=origin_deg_m,
         state_s=state_s,
         age_s=np.maximum(state_s - born_s, 0.0),
-        updated_s=found.updated_s,
     )
-    alive = set(keys)
-    ended = np.array([key not in alive for key in held], dtype=bool)
-    if not ended.any():
+    _, goes_on = positions_among(keys, old_keys)
+    if goes_on is None or len(before) == 0:
         return new
-    last = before.take(ended)
+    last = before.take(~goes_on)
     last = last.with_columns(
         row=row_of_replica[np.searchsorted(replica, last.replica)],
         track_status=np.full(len(last), DELETED),

@@ -8,6 +8,7 @@ import numpy as np
 from components.estimation.batched import times
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
+from components.geometry import unit_vector_unchecked
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from dsa_des.arrays.keyed_table import KeyedTable
@@ -25,13 +26,15 @@ class LocalTracks(KeyedTable):
     ``covariance`` (6, 6, n) of a track without a range are 0 and the identity. ``azimuth_rad`` and
     ``elevation_rad`` are the direction along the tracker's own axes, ``own_m`` (3, n) is where the
     ownship believed to be, and ``turn`` (3, 3, n) turns the axes into those of the frame; all this
-    speaks of ``time_s``. ``contributors`` and ``updated_by`` are masks over all sensors.
+    speaks of ``time_s``. ``contributors`` and ``updated_by`` are masks over all sensors;
+    ``row`` is that of the wake with which it came.
     """
 
     @classmethod
     def none(cls) -> Self:
         """Return no tracks."""
-        whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by")
+        whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by",
+                 "row")  # fmt: skip
         numbers = (
             "existence", "azimuth_rad", "elevation_rad", "azimuth_variance_rad2",
             "elevation_variance_rad2", "time_s", "updated_s",
@@ -65,11 +68,7 @@ class LocalTracks(KeyedTable):
 
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Return azimuth and elevation along the frame's axes."""
-        level = np.cos(self.elevation_rad)
-        unit = np.stack(
-            [level * np.cos(self.azimuth_rad), level * np.sin(self.azimuth_rad),
-             -np.sin(self.elevation_rad)]
-        )  # fmt: skip
+        unit = np.stack(unit_vector_unchecked(self.azimuth_rad, self.elevation_rad))
         north, east, down = times(self.turn, unit)
         return np.arctan2(east, north), np.arctan2(-down, np.hypot(north, east))
 

@@ -14,6 +14,7 @@ from components.estimation.batched import times
 from components.estimation.carried_errors import BEARING, RANGE, ToldErrors
 from components.estimation.frame import SensorPose
 from components.estimation.told_ages import Ages
+from components.geometry import unit_vector_unchecked
 from components.messages.columns import TOLD
 from components.messages.detections import SensorOffer, ToldError
 from components.tracking.scans import Scans
@@ -94,9 +95,7 @@ def levelled(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, Sens
 
     What is told of bearings and heights is told in level axes: there it is linear.
     """
-    azimuth, elevation = angles_rad
-    level = np.cos(elevation)
-    body = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)])
+    body = np.stack(unit_vector_unchecked(*angles_rad))
     x, y, z = times(pose.to_body.swapaxes(0, 1), body)
     upright = np.zeros_like(pose.to_body)
     for i in range(3):

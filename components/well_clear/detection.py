@@ -35,19 +35,7 @@ def uncertain_violation_span(
 ) -> Span:
     """Return from when to when pairs of aircraft may violate a volume of modified tau.
 
-    Parameters
-    ----------
-    volume : Volume
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
-    bounds : Bounds
-        Where all four are 0, the result is that of `violation_span`.
-    begin_s, end_s : float or (n,)
-
-    Returns
-    -------
-    Span
-        Infinity and minus infinity where there is no violation.
+    As `violation_span`; where all four bounds are 0, with its result.
     """
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
     known = np.all(np.stack(np.broadcast_arrays(*bounds)) == 0.0, axis=0)
@@ -175,22 +163,9 @@ def detection_span(
 ) -> Span:
     """Return from when to when pairs of aircraft in straight flight meet a volume.
 
-    Parameters
-    ----------
-    volume : Volume or TcasAdvisory
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
-    own_up_mps : (altitude in m, climb in m/s) of (n,) or None
-        Of the ownship at time 0; only advisories ask for it.
-    bounds : Bounds or None
-        How far the states may be wrong, for volumes of modified tau.
-    begin_s, end_s : float or (n,)
-        The times looked at.
-
-    Raises
-    ------
-    ValueError
-        An advisory's sizes are asked for without the ownship's altitude.
+    As `violation_span`. `own_up_mps` is the ownship's altitude (m) and climb (m/s) at time 0,
+    without which an advisory raises `ValueError`; `bounds` say how far the states may be wrong, for
+    volumes of modified tau.
     """
     if isinstance(volume, TcasAdvisory):
         if own_up_mps is None:

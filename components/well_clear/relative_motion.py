@@ -21,20 +21,10 @@ _CLOSE = DOUBLES_APART * 2.0**-52
 def nearly_equal(
     first: Any, second: Any, doubles_apart: int = DOUBLES_APART, tiny: float = TINY
 ) -> BoolArray:
-    """Tell whether numbers are equal up to rounding.
+    """Tell whether numbers are equal up to rounding; infinities of one sign are.
 
-    Parameters
-    ----------
-    first, second : array_like
-        Of any unit; infinities of one sign are equal.
-    doubles_apart : int
-        Most steps from one double to the next between them.
-    tiny : float
-        Bound on both where one of them is 0.
-
-    Returns
-    -------
-    ndarray of bool
+    At most `doubles_apart` steps from one double to the next lie between them, or both are below
+    `tiny` where one of them is 0.
     """
     a = np.asarray(first, dtype=np.float64)
     b = np.asarray(second, dtype=np.float64)
@@ -106,19 +96,9 @@ def discriminant(motion: Horizontal, radius_m: float | FloatArray) -> FloatArray
 def entry_of_circle_s(
     motion: Horizontal, radius_m: float | FloatArray, root: FloatArray
 ) -> FloatArray:
-    """Return when the line of flight enters a circle.
+    """Return when the line of flight enters a circle, given the square root of the `discriminant`.
 
-    Parameters
-    ----------
-    motion : Horizontal
-    radius_m : float or ndarray
-    root : ndarray
-        Square root of the `discriminant`, not negative.
-
-    Returns
-    -------
-    ndarray
-        s; of either sign, meaningless where there is no relative motion.
+    It is of either sign, and meaningless where there is no relative motion.
     """
     p, outside = motion.closing_m2_s, motion.range_sq_m2 - radius_m * radius_m
     # Whichever form of the smaller root does not subtract nearly equal numbers.
@@ -154,21 +134,10 @@ def vertical_span(
     begin_s: float | FloatArray,
     end_s: float | FloatArray,
 ) -> Span:
-    """Return when the height difference, or its time, is small enough.
+    """Return when, in [begin, end], the height difference, or its time, is small enough.
 
-    Parameters
-    ----------
-    height_m, climb_mps : ndarray
-        Relative height and its rate.
-    vertical_m, vertical_time_s : float
-        As in `components.well_clear.volume.Volume`.
-    begin_s, end_s : float or ndarray
-        The times looked at.
-
-    Returns
-    -------
-    Span
-        Within [begin, end]. A level flight is inside all the time or never.
+    Sizes are those of `components.well_clear.volume.Volume`. A level flight is inside all the time
+    or never.
     """
     level = nearly_zero(climb_mps)
     rate = np.where(level, 1.0, climb_mps)
@@ -213,12 +182,7 @@ def within_time(
 ) -> BoolArray:
     """Tell whether the flight passes within a distance and its time variable is short enough.
 
-    Parameters
-    ----------
-    motion : Horizontal
-    distance_m, time_s : float
-    time_variable : str
-        One of `components.well_clear.volume.TIME_VARIABLES`; "none" is never short.
+    It is one of `components.well_clear.volume.TIME_VARIABLES`; "none" is never short.
     """
     if time_variable == "none":
         return np.zeros(np.shape(motion.range_sq_m2), dtype=bool)

@@ -36,16 +36,10 @@ class PairSeparation(NamedTuple):
 def separation(
     relative: Relative, lookahead_s: float, tau_distance_m: FloatArray
 ) -> PairSeparation:
-    """Return present and projected distances in straight flight.
+    """Return present and projected distances in straight flight, looking so far ahead.
 
-    Parameters
-    ----------
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder.
-    lookahead_s : float
-        How far ahead is looked.
-    tau_distance_m : (n,)
-        The distance of modified tau; NaN gives none.
+    `relative` is as for `violation_span`; a `tau_distance_m` (n,) that is NaN gives no modified
+    tau.
     """
     east, north, up, v_east, v_north, climb = relative
     motion = horizontal_of(east, north, v_east, v_north)
@@ -97,21 +91,13 @@ def first_inside_cylinder(
 ) -> FloatArray:
     """Return when pairs of flights first are inside a cylinder, s; NaN for those that never are.
 
-    The boundary is outside. Each is within `FINEST_S` of the true one. Where a flight comes inside
-    for less than that, it may be left out: it is then inside by no more than `closing_mps` times
-    half of `FINEST_S`, 0.1 m at 200 m/s. Where more than 100,000 pieces along the edge would have
-    to be cut, their length stands for `FINEST_S`.
-
-    Parameters
-    ----------
-    apart : callable
-        Horizontal distance and difference in height (m, not negative) of pairs (n,) at times (n,).
-    between_s : two of (pairs,)
-        The times looked at.
-    closing_mps : (pairs,)
-        Neither distance changes faster.
-    horizontal_m, vertical_m : float
-        Radius and half of the height.
+    `apart` gives the horizontal distance and the difference in height (m, not negative) of pairs
+    (n,) at times (n,); neither changes faster than `closing_mps` (pairs,). `between_s` are the
+    times looked at, two of (pairs,); sizes are radius and half height, m. The boundary is outside.
+    Each time is within `FINEST_S` of the true one. Where a flight comes inside for less than that,
+    it may be left out: it is then inside by no more than `closing_mps` times half of `FINEST_S`,
+    0.1 m at 200 m/s. Where more than 100,000 pieces along the edge would have to be cut, their
+    length stands for `FINEST_S`.
     """
     begin_s, end_s = between_s
     if len(begin_s) > _PAIRS_AT_ONCE:  # flights along the very edge would take all of the memory

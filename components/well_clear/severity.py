@@ -10,13 +10,7 @@ from dsa_des.arrays.types import FloatArray
 
 
 def miss_distance_m(relative: Relative) -> FloatArray:
-    """Return the horizontal miss distance of straight flights, the distance now if it is past.
-
-    Parameters
-    ----------
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder.
-    """
+    """Return the horizontal miss distance of straight flights, the distance now if it is past."""
     east, north, _, v_east, v_north, _ = relative
     motion = horizontal_of(east, north, v_east, v_north)
     ahead_s = np.maximum(time_to_closest_s(motion), 0.0)
@@ -76,14 +70,7 @@ POOR_SCALE_M = np.array([60.0, 60.0, 69.0, 87.0, 101.0, 101.0]) * FOOT_M
 
 
 def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Return (chance, scale in m) of each altimeter an aircraft may have.
-
-    Parameters
-    ----------
-    altitude_m : (n,)
-    mode_c : bool
-        A transponder of Mode C, or none.
-    """
+    """Return (chance, scale in m) of each altimeter an aircraft may have: Mode C's, or any."""
     layer = np.searchsorted(LAYER_TOPS_M, np.asarray(altitude_m), side="left")
     if not mode_c:
         return ((np.ones(np.shape(layer)), SCALE_M[layer]),)
@@ -92,17 +79,8 @@ def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, F
 
 
 def difference_beyond(height_m: Any, scale_m: Any, other_scale_m: Any) -> FloatArray:
-    """Return the chance that the difference of two Laplace errors exceeds a height.
+    """Return the chance that the difference of two Laplace errors exceeds a height of any sign.
 
-    Parameters
-    ----------
-    height_m : (n,)
-        Of any sign.
-    scale_m, other_scale_m : (n,)
-        Above 0.
-
-    Notes
-    -----
     With c = 1/λ of either error, the tail is a mixture of exponentials; nearly equal scales are
     taken through the limit, whose error is of second order in their difference.
     """

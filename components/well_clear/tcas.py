@@ -80,12 +80,8 @@ def sensitivity_level(altitude_m: FloatArray) -> IntArray:
 def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the radius and half height that recovery keeps clear where no sizes are given.
 
-    They are the miss distance and the height of resolution advisories, of level 3 at least.
-
-    Parameters
-    ----------
-    altitude_m : (n,)
-        Of the ownship.
+    They are the miss distance and the height of resolution advisories, of level 3 at least, at the
+    ownship's altitude.
     """
     sizes = [one for one in RESOLUTION_ADVISORY if one is not None]
     place = np.maximum(sensitivity_level(altitude_m) - FIRST_LEVEL - 1, 0)

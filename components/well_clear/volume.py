@@ -82,17 +82,7 @@ PRESETS: Mapping[str, Volume] = MappingProxyType(
 def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | FloatArray) -> Span:
     """Return when, in [0, duration], the horizontal condition of a volume holds.
 
-    Parameters
-    ----------
-    motion : Horizontal
-        At time 0.
-    volume : Volume
-    duration_s : float or ndarray
-
-    Returns
-    -------
-    Span
-        One interval: the set is convex for every time variable.
+    It is one interval: the set is convex for every time variable.
     """
     radius_m = volume.horizontal_m
     p, speed_sq = motion.closing_m2_s, motion.speed_sq_m2_s2
@@ -209,15 +199,7 @@ def _arrays(relative: Relative) -> list[FloatArray]:
 def inside_cylinder(
     distance_m: FloatArray, height_m: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Tell whether aircraft are within a cylinder now, its boundary left out.
-
-    Parameters
-    ----------
-    distance_m, height_m : (n,)
-        Horizontal distance and difference in height, of any sign.
-    horizontal_m, vertical_m : float
-        Radius and half of the height.
-    """
+    """Tell whether aircraft are within a cylinder now, its boundary left out."""
     return np.asarray((distance_m < horizontal_m) & (np.abs(height_m) < vertical_m))
 
 
@@ -230,20 +212,8 @@ def cylinder_span(
 ) -> Span:
     """Return from when to when pairs in straight flight are inside a cylinder.
 
-    Parameters
-    ----------
-    horizontal_m, vertical_m : float or ndarray
-        Radius and half of the height.
-    relative : six of (n,)
-        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
-    begin_s, end_s : float or (n,)
-        The times looked at, begin before end.
-
-    Returns
-    -------
-    Span
-        An open interval: touching the cylinder is not entering it. Infinity and minus infinity
-        where it is not entered.
+    As `violation_span`; sizes are radius and half height. It is an open interval: touching the
+    cylinder is not entering it.
     """
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
     motion = horizontal_of(east, north, v_east, v_north)

@@ -8,9 +8,24 @@ import pytest
 from components.alerting.memory import AlertMemory, MemoryRule
 
 
+class Remembering:
+    """The memory of some targets, step by step."""
+
+    def __init__(self, rule, count):
+        self.rule, targets = rule, np.arange(count)
+        self.memory = AlertMemory.new(rule, 0 * targets, targets)
+
+    def step(self, *now):
+        self.memory, level = self.memory.step(self.rule, *now)
+        return level
+
+    def early_levels(self, now_s, present):
+        return self.memory.early_levels(self.rule, now_s, present)
+
+
 def levels(rule, raw, times=None):
     """Return what one target's raw levels (1 to 3) become, without early times."""
-    memory = AlertMemory(rule, 1)
+    memory = Remembering(rule, 1)
     found = []
     for number, level in enumerate(raw):
         due = np.array([[level == k for k in (1, 2, 3)]])
@@ -47,7 +62,7 @@ def test_time_that_goes_back_forgets():
 
 def test_the_level_that_is_on_takes_its_early_time():
     """Level 2 is due early only: it stays on where it was out, and does not come on by itself."""
-    memory = AlertMemory(MemoryRule(5.0, 0.0, 0, 0), 2)
+    memory = Remembering(MemoryRule(5.0, 0.0, 0, 0), 2)
     here = np.array([True, True])
     none = np.zeros((2, 3), dtype=bool)
     second = np.array([[False, True, False], [False, False, False]])
@@ -59,7 +74,7 @@ def test_the_level_that_is_on_takes_its_early_time():
 
 
 def test_early_times_count_for_the_level_that_came_on_before_and_for_no_other():
-    memory = AlertMemory(MemoryRule(5.0, 0.0, 0, 0), 3)
+    memory = Remembering(MemoryRule(5.0, 0.0, 0, 0), 3)
     due = np.array([[True, True, False], [False, False, False], [False, False, True]])
     here, none = np.array([True, True, False]), np.zeros((3, 3), dtype=bool)
     memory.step(0.0, here, due, due)
@@ -114,7 +129,7 @@ def test_many_targets_at_once_are_as_each_one_told(rule):
     times = np.cumsum(draw.choice([0.5, 1.0, 2.0, 5.0], steps, p=[0.4, 0.4, 0.15, 0.05]))
     raw = np.repeat(draw.integers(0, 4, (steps // 2, count)), 2, axis=0)
     present = draw.random((steps, count)) < 0.85
-    memory = AlertMemory(rule, count)
+    memory = Remembering(rule, count)
     found = []
     for now_s, row, here in zip(times.tolist(), raw, present, strict=True):
         due = row[:, np.newaxis] == np.arange(1, 4)

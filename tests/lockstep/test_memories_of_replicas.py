@@ -78,7 +78,7 @@ def test_places_are_remembered_run_by_run():
 
 def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
     """Two targets change places from one look to the next."""
-    tracks = BelievedTracks()
+    tracks = BelievedTracks(2)
     here, there = [0.0, 0.0, 0.0], [500.0, 0.0, 0.0]
     tracks.add_truth(
         RunTicks.of_run(0, np.array([10, 20, 30])),

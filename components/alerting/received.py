@@ -1,4 +1,6 @@
-"""The ownship's own flight as an alerting block knows it: places, attitude, velocity."""
+"""What has come to an alerting block, and the ownship's own flight as it knows it."""
+
+from typing import Any, Self
 
 import numpy as np
 
@@ -10,19 +12,40 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
 
+class Received(KeyedTable):
+    """Rows that have come: those of each run (``replica``) together, by when they ``came``."""
+
+    @classmethod
+    def none(cls, *whole: str, **shapes: tuple[int, ...]) -> Self:
+        """Return no rows, of columns of whole numbers, and of floats (with what shape)."""
+        columns = dict.fromkeys(("replica", "came", *whole), int)
+        return cls.empty({**columns, **dict.fromkeys(shapes, float)}, shapes)
+
+    @property
+    def instants(self) -> RunTicks:
+        """When each came."""
+        return RunTicks(self.replica, self.came)
+
+    def with_more(self, came: RunTicks, **columns: Any) -> Self:
+        """Return them with rows that came later, or in other runs."""
+        new = type(self)(replica=came.run, came=came.tick, **columns)
+        every = self.joined([self, new])
+        order = every.instants.order()
+        return every if order is None else every.take(order)
+
+    def last(self, asked: RunTicks) -> IntArray:
+        """Return the row that came last by some instants; -1 for none."""
+        return last_of_run(self.instants, asked)
+
+
 class OwnPoses:
-    """What has come of the ownship's poses; those of each run together, as they came."""
+    """What has come of the ownship's poses."""
 
     def __init__(self, ticks_per_s: int) -> None:
         self._per_s = ticks_per_s
-        types = {"replica": int, "came": int, "tick": int, "place": float, "attitude": float}
-        self._poses = KeyedTable.empty(types, {"place": (3,), "attitude": (3,)})
+        self._poses = Received.none("tick", place=(3,), attitude=(3,))
         #: Poses that were set aside.
-        self._old: list[KeyedTable] = []
-
-    @property
-    def _came(self) -> RunTicks:
-        return RunTicks(self._poses.replica, self._poses.came)
+        self._old: list[Received] = []
 
     @property
     def _made(self) -> RunTicks:
@@ -32,31 +55,30 @@ class OwnPoses:
         """Take in poses, and when they came."""
         place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
-        new = KeyedTable(
-            replica=came.run, came=came.tick, tick=states.tick,
-            place=np.stack(place), attitude=np.stack(angles),
-        )  # fmt: skip
-        self._poses = KeyedTable.joined([self._poses, new])
-        self._sort()
+        self._keep(
+            self._poses.with_more(
+                came, tick=states.tick, place=np.stack(place), attitude=np.stack(angles)
+            )
+        )
 
-    def _sort(self) -> None:
-        if (order := self._came.order()) is not None:
-            self._poses = self._poses.take(order)
+    def _keep(self, poses: Received) -> None:
         # Of those that overtook each other on the way, the newest counts.
-        self._poses = self._poses.with_columns(tick=self._made.newest().tick)
+        newest = RunTicks(poses.replica, poses.tick).newest()
+        self._poses = poses.with_columns(tick=newest.tick)
 
     def have_come(self, asked: RunTicks) -> BoolArray:
         """Return whether any has come by some instants."""
-        return np.asarray(last_of_run(self._came, asked) >= 0)
+        return np.asarray(self._poses.last(asked) >= 0)
 
     def pose_of(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
         """Return the pose of when something was measured, of those that had come; -1 for none."""
-        place = np.minimum(last_of_run(self._made, measured), last_of_run(self._came, came))
-        first = first_of_run(self._came, came.run)
+        place = np.minimum(last_of_run(self._made, measured), self._poses.last(came))
+        first = first_of_run(self._poses.instants, came.run)
         if self._old and bool((asked & (place <= first)).any()):
-            self._poses = KeyedTable.joined([*self._old, self._poses])
+            every = Received.joined([*self._old, self._poses])
+            order = every.instants.order()
+            self._keep(every if order is None else every.take(order))
             self._old = []
-            self._sort()
             return self.pose_of(measured, came, asked)
         return place
 
@@ -66,12 +88,12 @@ class OwnPoses:
 
     def place(self, asked: RunTicks) -> FloatArray:
         """Return latitude and longitude (rad) and height (m) as known at some instants, (3, n)."""
-        return np.asarray(self._poses.place[:, np.maximum(last_of_run(self._came, asked), 0)])
+        return np.asarray(self._poses.place[:, np.maximum(self._poses.last(asked), 0)])
 
     def states(self, asked: RunTicks, over_s: float) -> dict[str, FloatArray]:
         """Return the altitude, and the mean velocity over the last seconds, at some instants."""
-        earliest = first_of_run(self._came, asked.run)
-        last = np.maximum(last_of_run(self._came, asked), earliest)
+        earliest = first_of_run(self._poses.instants, asked.run)
+        last = np.maximum(self._poses.last(asked), earliest)
         first = next_of_run(self._made, asked.later(-round(over_s * self._per_s)))
         first = np.maximum(np.minimum(first, last - 1), earliest)
         now, then = self._poses.place[:, last], self._poses.place[:, first]
