@@ -79,7 +79,7 @@ class Grid:
             # NaN, and what cannot be counted in steps, take the general way.
             simple = size.size and float(size.max()) < self._countable
             result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
-            np.copysign(result, values, out=result)
+            result = np.copysign(result, values)
         if self._highest is not None:
             result = np.minimum(result, self._highest)
         if self._lowest is not None:
