@@ -8,18 +8,24 @@ motion model has besides comes after them.
 Source: Schmidt, *Application of state-space methods to navigation problems* (1966), where such
 states are only considered; here they are estimated as well, which is the Kalman filter of the whole
 (Bar-Shalom, Li, Kirubarajan (2001), §8.2).
+
+A position is reported of some time ago and carried on by a velocity that is reported of another.
+What the target's motion has changed since is an error of both, and the same change is in the error
+of the predicted state: a filter that takes the two for independent is too sure of the velocity
+(the same, §8.3.1, correlated noises).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.estimation.batched import product
+from components.estimation.batched import product, product_transposed
 from components.estimation.frame import SensorPose
+from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, linearised
-from components.estimation.motion import Motion
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from components.estimation.motion import ConstantVelocity, Motion
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: Which way an error goes: of a place along north or east, and of a velocity; of its height and of
 #: its vertical rate; of the bearing and of the range at which it is seen.
@@ -82,7 +88,7 @@ class MotionWithErrors:
 
 
 @dataclass(frozen=True, eq=False)
-class ToldErrors:
+class ReportedErrors:
     """The errors of measurements that aircraft report, or of pairs of them with tracks."""
 
     ways: Sequence[int]  # Which way each error goes (`NORTH` to `RANGE`)
@@ -91,15 +97,9 @@ class ToldErrors:
     # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
 
-    def take(self, which: IntArray) -> "ToldErrors":
-        """Return those of some of them."""
-        return ToldErrors(
-            self.ways, self.deviation[:, which], self.age_s[which], self.at_range[which]
-        )
-
-    def repeated(self, times: int) -> "ToldErrors":
+    def repeated(self, times: int) -> "ReportedErrors":
         """Return them so many times, one after the other."""
-        return ToldErrors(
+        return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
         )  # fmt: skip
@@ -112,8 +112,8 @@ class ToldErrors:
         self, kind: Kind, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same, and its derivative by position, velocity and errors."""
-        told, by_place, cylinder = self._displaced(state, pose)
-        seen, slope = linearised(kind, told, pose)
+        reported, by_place, cylinder = self._displaced(state, pose)
+        seen, slope = linearised(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
         whole[:, :3] = product(slope[:, :3], by_place)
         if slope.shape[1] > 3:
@@ -139,23 +139,23 @@ class ToldErrors:
         self, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, ...]]:
         """Return states as they are told, the derivative of places, and cosines of directions."""
-        told = state[:_MOVING].copy()
-        told[3] += self._sum(state, SPEED_NORTH)
-        told[4] += self._sum(state, SPEED_EAST)
-        told[5] -= self._sum(state, CLIMB)
+        reported = state[:_MOVING].copy()
+        reported[3] += self._sum(state, SPEED_NORTH)
+        reported[4] += self._sum(state, SPEED_EAST)
+        reported[5] -= self._sum(state, CLIMB)
         height = self._sum(state, HEIGHT)
-        told[0] += self._sum(state, NORTH) + self.age_s * (told[3] - state[3])
-        told[1] += self._sum(state, EAST) + self.age_s * (told[4] - state[4])
-        told[2] += self.age_s * (told[5] - state[5]) - np.where(self.at_range, 0.0, height)
+        reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
+        reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
+        reported[2] += self.age_s * (reported[5] - state[5]) - np.where(self.at_range, 0.0, height)
         by_place = np.zeros((3, 3, state.shape[1]))
         for i in range(3):
             by_place[i, i] = 1.0
-        x, y, z = away = told[:3] - pose.position_m
+        x, y, z = away = reported[:3] - pose.position_m
         ground = np.hypot(x, y)
         far = np.maximum(np.sqrt(ground**2 + z**2), 1.0)
         if not self.at_range.any():
             safe = np.maximum(ground, _LEVEL * far)
-            return told, by_place, (x / safe, y / safe, safe, -z, far)
+            return reported, by_place, (x / safe, y / safe, safe, -z, far)
         # In a cylinder about the vertical: a bearing turns, a height leaves the range as it is.
         up = -z + np.where(self.at_range, height, 0.0)
         distance = np.maximum(far + self._sum(state, RANGE), 1.0)
@@ -173,8 +173,8 @@ class ToldErrors:
             moved[1, j] = sin * by_level[j] + level * cos * by_bearing[j]
         moved[2, 2] = 1.0
         at = self.at_range
-        told[:3] = np.where(at, turned, told[:3])
-        return told, np.where(at, moved, by_place), (
+        reported[:3] = np.where(at, turned, reported[:3])
+        return reported, np.where(at, moved, by_place), (
             np.where(at, cos, x / safe), np.where(at, sin, y / safe), np.where(at, level, safe),
             np.where(at, up, -z), np.where(at, distance, far),
         )  # fmt: skip
@@ -200,3 +200,57 @@ class ToldErrors:
                 outward = deviation * distance / level
                 found[0, i], found[1, i] = outward * cos, outward * sin
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class Ages:
+    """How old reported positions and velocities are, (n,) each, s; 0 where not reported."""
+
+    place: FloatArray
+    velocity: FloatArray
+    since: FloatArray  # Since the track was last updated: what was new before is in its state
+
+    def errors(self, model: Motion, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return covariances of what is told of place and velocity, and of the state with it.
+
+        Both are (6, 6, n), in m and m/s; of the second one rows are the state's.
+        """
+        own = model.model if isinstance(model, MotionWithErrors) else model
+        age, now = self.place, self.velocity
+        both = np.minimum(age, now)
+        then, reported, common = (own.noise(t) for t in (age, now, both))
+        held, gained = (own.noise(np.minimum(self.since, t)) for t in (age, now))
+        error, shared = np.zeros((6, 6, len(age))), np.zeros((6, 6, len(age)))
+        for i in range(3):
+            v = i + 3
+            error[i, i] = then[i, i] - 2.0 * age * (then[i, v] - common[i, v])
+            error[i, i] += age * age * (then[v, v] + reported[v, v] - 2.0 * common[v, v])
+            error[i, v] = common[i, v] - age * (common[v, v] - reported[v, v])
+            error[v, i], error[v, v] = error[i, v], reported[v, v]
+            shared[i, i] = age * (held[i, v] - gained[i, v]) - held[i, i]
+            shared[v, i] = age * (held[v, v] - gained[v, v]) - held[i, v]
+            shared[i, v], shared[v, v] = -gained[i, v], -gained[v, v]
+        if not isinstance(own, ConstantVelocity):
+            # By how much the model itself has it change: that is not carried back.
+            changed = model.move(state, -now)[3:6] - state[3:6]
+            for i in range(3):
+                error[i, i] += (age * changed[i]) ** 2
+                error[i + 3, i + 3] += changed[i] ** 2
+        return error, shared
+
+    def added(self, moments: Moments, model: Motion, state: FloatArray) -> Moments:
+        """Return what is expected of measurements, with what ages add to it."""
+        error, shared = self.errors(model, state)
+        slope = np.ascontiguousarray(moments.jacobian[:, :6])
+        known = slope.shape[1]
+        new = product_transposed(product(slope, error[:known, :known]), slope)
+        with_state = product_transposed(shared[:, :known], slope)  # (6, m, n)
+        both = product(slope, with_state[:known])
+        cross = moments.cross.copy()
+        cross[:6] += with_state
+        own = new + both.swapaxes(0, 1)
+        return replace(
+            moments, total=moments.total + own + both, cross=cross,
+            left_over=own if moments.left_over is None else moments.left_over + own,
+            shared=with_state.swapaxes(0, 1),
+        )  # fmt: skip

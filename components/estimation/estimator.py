@@ -20,7 +20,7 @@ from components.estimation.batched import (
     sum_of,
     symmetric,
 )
-from components.estimation.carried_errors import MotionWithErrors, ToldErrors
+from components.estimation.carried_errors import MotionWithErrors, ReportedErrors
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import (
     Innovation,
@@ -125,7 +125,11 @@ class Estimator(Protocol):
         return self
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what every model expects to be measured of predicted tracks.
 
@@ -229,10 +233,14 @@ class ExtendedKalmanFilter(SingleModelFilter):
         return Estimates([state], [covariance], tracks.weights)
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what is expected to be measured."""
-        how = linearised if told is None else told.linearised
+        how = linearised if reported is None else reported.linearised
         seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
 

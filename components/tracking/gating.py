@@ -13,9 +13,9 @@ from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
+from components.tracking.reported_errors import by_angles, levelled
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
-from components.tracking.told_errors import by_angles, levelled
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -81,7 +81,7 @@ def gated_pairs(
             own_m_s = None
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
-                told = rules.carried.told(scans, cells)
+                reported = rules.carried.reported(scans, cells)
                 white = rules.carried.white(scans, cells, rows)
                 measured[:2], place = levelled(measured[:2], pose.take(track))
                 mine_then = part.take(track)
@@ -90,7 +90,7 @@ def gated_pairs(
                 foreseen = [
                     ages.added(found, model, state)
                     for found, model, state in zip(
-                        rules.estimator.expect(kind, mine_then.estimates(), place, told),
+                        rules.estimator.expect(kind, mine_then.estimates(), place, reported),
                         rules.estimator.models, mine_then.states(), strict=True,
                     )
                 ]  # fmt: skip

@@ -83,11 +83,6 @@ def bits_set(values: IntArray) -> IntArray:
     return np.asarray((v + (v >> 32)) & 0x7F, dtype=np.int64)
 
 
-def existence(score: FloatArray) -> FloatArray:
-    """Return the probability that belongs to the logarithm of odds."""
-    return np.asarray(1.0 / (1.0 + np.exp(-score)))
-
-
 def after_hits_and_misses(
     history: IntArray, looks: IntArray, misses: IntArray, hit: BoolArray, missed: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
@@ -328,7 +323,7 @@ def _start_by_told(
     if rules.carried is None or not len(telling):
         return state, covariance
     cells = detection[telling]
-    effects = rules.carried.told(scans, cells).effects(position[:, telling], pose.take(telling))
+    effects = rules.carried.reported(scans, cells).effects(position[:, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
     white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
     own = covariance[:6, :6, telling]

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from components.estimation.batched import times
-from components.estimation.carried_errors import BEARING, RANGE, ToldErrors
+from components.estimation.carried_errors import BEARING, RANGE, Ages, ReportedErrors
 from components.estimation.frame import SensorPose
-from components.estimation.told_ages import Ages
 from components.geometry import unit_vector_unchecked
 from components.messages.columns import TOLD
 from components.messages.detections import SensorOffer, ToldError
@@ -25,7 +24,7 @@ _AGES = ("age_s", "velocity_age_s")
 _LEAST_COS = 1e-3
 
 
-def told_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
+def reported_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
     """Return the errors that sensors tell of, and whose they are: once for those of an aircraft."""
     found: dict[tuple[ToldError, str], list[str]] = {}
     for name, offer in sorted(offers.items()):
@@ -46,7 +45,7 @@ class CarriedErrors:
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
         """Return those that some sensors tell of."""
-        errors = told_errors(offers)
+        errors = reported_errors(offers)
         mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
         return cls(
@@ -55,29 +54,31 @@ class CarriedErrors:
             mine, (mine & ranging[:, np.newaxis]).any(axis=0),
         )  # fmt: skip
 
-    def told(self, scans: Scans, cells: IntArray) -> ToldErrors:
+    def reported(self, scans: Scans, cells: IntArray) -> ReportedErrors:
         """Return what some detections are told of their errors."""
-        assert scans.told is not None
-        source, told = scans.source[0][cells], scans.told[:, cells]
-        deviation = np.where(self.mine[:, source], told[self.column], 0.0)
-        return ToldErrors(self.ways, deviation, told[TOLD.index("age_s")], self.at_range[source])
+        assert scans.reported is not None
+        source, reported = scans.source[0][cells], scans.reported[:, cells]
+        deviation = np.where(self.mine[:, source], reported[self.column], 0.0)
+        return ReportedErrors(
+            self.ways, deviation, reported[TOLD.index("age_s")], self.at_range[source]
+        )
 
     def own_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
         """Return the ownship's velocity (north, east, down) where a bearing is coarse, else NaN."""
-        assert scans.told is not None
-        return scans.told[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
+        assert scans.reported is not None
+        return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
     def white(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
         """Return variances of what is new in some detections, of a place along all axes alike."""
-        assert scans.told is not None
+        assert scans.reported is not None
         variance = scans.variance[rows][:, cells]
-        variance[:3] = scans.told[TOLD.index("white_variance"), cells]
+        variance[:3] = scans.reported[TOLD.index("white_variance"), cells]
         return np.asarray(variance)
 
     def ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
         """Return how old what some detections tell is, for tracks last updated so long ago."""
-        assert scans.told is not None
-        place, velocity = (scans.told[TOLD.index(name), cells] for name in _AGES)
+        assert scans.reported is not None
+        place, velocity = (scans.reported[TOLD.index(name), cells] for name in _AGES)
         return Ages(place, velocity, since_s)
 
 
