@@ -121,7 +121,7 @@ def initiated(
     if rules.p.start_climb_m_s is not None:
         spread[5, 5] = rules.p.start_climb_m_s**2
     states, covariances = [], []
-    begin = _start_by_told(rules, scans, pose, codes, detection, position, spread)
+    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
     known = 6 + rules.estimator.errors
     for size in sizes:
         state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
@@ -290,13 +290,13 @@ def _update_by_rates(
     known, slope = linearised(kind, selected(state, which), pose.take(which))
     cells = detection[which]
     rate, variance = selected(scans.measured[3:4], cells), selected(scans.variance[3:4], cells)
-    found = innovation(known[2:], slope[2:], selected(covariance, which), variance)
+    result = innovation(known[2:], slope[2:], selected(covariance, which), variance)
     state[:, which], covariance[:, :, which] = updated(
-        selected(state, which), selected(covariance, which), found, rate - known[2:]
+        selected(state, which), selected(covariance, which), result, rate - known[2:]
     )
 
 
-def _start_by_told(
+def _start_by_reports(
     rules: TrackerRules,
     scans: Scans,
     pose: SensorPose,
@@ -305,9 +305,9 @@ def _start_by_told(
     position: FloatArray,
     spread: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return new tracks with the velocities that are told, and with the errors that they carry.
+    """Return new tracks with the velocities that are reported, and with the errors that they carry.
 
-    `spread` (6, 6, n) is that of position and velocity where nothing is told. What is told is off
+    `spread` (6, 6, n) is that of position and velocity where nothing is reported. A report is off
     by its errors, so that the target lies that far on the other side.
     """
     errors, count = rules.estimator.errors, len(detection)
@@ -342,7 +342,7 @@ def _start_by_told(
 
 
 def _diagonal(variance: FloatArray) -> FloatArray:
-    found = np.zeros((len(variance), *variance.shape))
+    result = np.zeros((len(variance), *variance.shape))
     for i, values in enumerate(variance):
-        found[i, i] = values
-    return found
+        result[i, i] = values
+    return result

@@ -48,7 +48,7 @@ class Scans:
     variance: FloatArray  # (7, detections), the same
     contributors: IntArray
     source: IntArray  # (7, detections), index of the sensor that gave each quantity; -1 for none
-    reported: FloatArray | None  # (`TOLD`, detections), what is told of each; None where nothing is
+    reported: FloatArray | None  # (`TOLD`, detections), what each reports; None where none does
 
     def __len__(self) -> int:
         return len(self.row)

@@ -124,15 +124,15 @@ class Tracker(Component):
             lag_s, why = Fraction(0), "late is 'drop'"
         offers = sensor_offers(self.context.producers)
         shares = left_out(offers, lag_s, self.context.duration_s)
-        found = [warning(n, share, why) for n, share in shares.items()]
+        result = [warning(n, share, why) for n, share in shares.items()]
         for name, offer in sorted(offers.items()):
             if not isinstance(offer, SensorOffer) or offer.lasting is None:
-                found.append(
+                result.append(
                     f"{name} does not say what of its errors lasts from look to look "
                     "(SensorOffer.lasting): all are taken for new, and tracks are too sure where "
                     "they are not"
                 )
-        return super().warnings() + found
+        return super().warnings() + result
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name."""
