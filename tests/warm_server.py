@@ -14,6 +14,7 @@ import runpy
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import types
 
@@ -117,6 +118,7 @@ def _take(job: dict, stdout: int, stderr: int) -> None:
     os.environ.clear()
     os.environ.update(job["env"])
     os.chdir(job["cwd"])
+    tempfile.tempdir = None  # that of its own environment
     signal.signal(signal.SIGINT, signal.default_int_handler)
     words, safe = job["words"], bool(job["env"].get("PYTHONSAFEPATH"))
     while words[0] in ("-B", "-P"):

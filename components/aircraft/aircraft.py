@@ -200,10 +200,8 @@ def _alike(one: Aircraft, other: Aircraft) -> bool:
 class Roster:
     """The targets of a run: their names, their draw keys and what sensors need of them.
 
-    Parameters
-    ----------
-    names : tuple of str
-    aircraft : tuple of Aircraft
+    Replicas in lock step may have other aircraft of the same names: columns, and indices of tables,
+    are then over the aircraft of the first replica, those of the second, and so on.
     """
 
     names: tuple[str, ...]
@@ -300,7 +298,8 @@ class Roster:
 
     def craft(self, target: IntArray, replica: IntArray) -> IntArray:
         """Return which of the aircraft some targets of replicas are."""
-        return target
+        shared = len(self.aircraft) == len(self.names)
+        return target if shared else replica * len(self.names) + target
 
     def column(self, path: str) -> FloatArray:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
@@ -317,30 +316,18 @@ class Roster:
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:
             tables: list[Any] = []
-            place = np.full(len(self.aircraft), -1, dtype=np.int64)
+            index = np.full(len(self.aircraft), -1, dtype=np.int64)
             for target, craft in enumerate(self.aircraft):
                 file = attrgetter(path)(craft)
                 if file is None:
                     continue
                 same = [i for i, table in enumerate(tables) if table is file.table]
-                place[target] = same[0] if same else len(tables)
+                index[target] = same[0] if same else len(tables)
                 if not same:
                     tables.append(file.table)
-            cache[path] = tuple(tables), place
-        found: tuple[tuple[Any, ...], IntArray] = cache[path]
-        return found
-
-
-class ReplicaRoster(Roster):
-    """The targets of replicas in lock step, which bear the same names but are other aircraft.
-
-    Columns, and tables' places, are over the aircraft of the first replica, those of the second,
-    and so on; `craft` says which one a target is.
-    """
-
-    def craft(self, target: IntArray, replica: IntArray) -> IntArray:
-        """Return which of the aircraft some targets of replicas are."""
-        return replica * len(self.names) + target
+            cache[path] = tuple(tables), index
+        result: tuple[tuple[Any, ...], IntArray] = cache[path]
+        return result
 
 
 #: What other aircraft of replicas may have of their own; see `joint_roster`.
@@ -360,10 +347,10 @@ def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Ros
         return None
     same = True
     for number, (name, craft) in enumerate(aircraft):
-        place = number % width
-        if name != first.names[place]:
+        index = number % width
+        if name != first.names[index]:
             return None
-        other = first.aircraft[place]
+        other = first.aircraft[index]
         if _alike(craft, other):
             continue
         same = False
@@ -375,4 +362,4 @@ def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Ros
             return None
     if same:
         return first
-    return ReplicaRoster(first.names, tuple(craft for _, craft in aircraft))
+    return Roster(first.names, tuple(craft for _, craft in aircraft))

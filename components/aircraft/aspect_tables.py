@@ -286,7 +286,7 @@ def _rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
 
 
 def _row_values(
-    place: str,
+    where: str,
     header: Sequence[str],
     cells: Sequence[str],
     columns: Sequence[int],
@@ -300,12 +300,12 @@ def _row_values(
         except (ValueError, IndexError):
             wanted = ", ".join(header[column] for column in columns)
             raise ValueError(
-                f"{place}: it must have a number in each of the columns {wanted}"
+                f"{where}: it must have a number in each of the columns {wanted}"
             ) from None
         try:
             refuse_extremes(quantity, value)
         except ValueError as error:
-            raise ValueError(f"{place}: {header[column]} is {value:g}: {error}") from None
+            raise ValueError(f"{where}: {header[column]} is {value:g}: {error}") from None
         values.append(value)
     return values
 

@@ -153,16 +153,16 @@ class Equipage:
         """Return the equipage of aircraft; `keys` give addresses to those without their own."""
         # A large fleet is of few kinds.
         kinds = {id(one): one for one in aircraft}
-        number = {key: place for place, key in enumerate(kinds)}
-        place = np.array([number[id(one)] for one in aircraft], dtype=np.int64)
+        number = {key: index for index, key in enumerate(kinds)}
+        index = np.array([number[id(one)] for one in aircraft], dtype=np.int64)
 
         def column(read: Callable[[Any], Any], kind: type) -> AnyArray:
-            return np.array([read(one) for one in kinds.values()], dtype=kind)[place]
+            return np.array([read(one) for one in kinds.values()], dtype=kind)[index]
 
         def sent(name: str, otherwise: float, kind: type) -> AnyArray:
             def value(one: Any) -> Any:
-                found = getattr(one.ads_b, name, None)
-                return otherwise if found is None else found
+                given = getattr(one.ads_b, name, None)
+                return otherwise if given is None else given
 
             return column(value, kind)
 
@@ -193,7 +193,7 @@ def with_shares(
         stream.uniform(keys, np.int64(0), draw) < share
         for draw, share in enumerate((shares.mode_s, shares.mode_c, shares.ads_b))
     ]
-    found = []
+    result = []
     for one, *keeps in zip(aircraft, *(part.tolist() for part in kept), strict=True):
         kind = (id(one), *keeps)
         if kind not in of_kind:
@@ -203,5 +203,5 @@ def with_shares(
                 "mode_c": one.mode_c and mode_c,
                 "ads_b": one.ads_b if ads_b else None,
             })  # fmt: skip
-        found.append(of_kind[kind])
-    return found
+        result.append(of_kind[kind])
+    return result

@@ -11,7 +11,7 @@ from typing import Any
 
 from dsa_des.terminal.terminal import say_json
 
-KINDS = ("scenes", "pairs", "rates", "queues", "calls")
+KINDS = ("scenes", "pairs", "rates", "calls")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -44,7 +44,7 @@ def _measured(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]
         return calls.measured(300 if quick else 1800, repeats)
     from components.benchmark import pairs
 
-    return (pairs.measured if kind == "pairs" else pairs.measured_queue)(name, quick, repeats)
+    return pairs.measured(name, quick, repeats)
 
 
 def pin() -> None:

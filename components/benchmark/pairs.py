@@ -1,16 +1,12 @@
-"""What costs little or ought to: two forms of a scene in turn, and ways to share a processor."""
+"""What costs little or ought to: two forms of a scene in turn."""
 
-import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from components.benchmark.scenes import CLOCKED, chosen, engine_run, scene_of
 from components.examples import folder
-from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
@@ -57,8 +53,8 @@ def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
 
 
 def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
-    (found,) = chosen([case])
-    return scene_of(found, quick=quick, sets=_SHARED), scene_of(found, quick=quick)
+    (result,) = chosen([case])
+    return scene_of(result, quick=quick, sets=_SHARED), scene_of(result, quick=quick)
 
 
 def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
@@ -98,51 +94,3 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
         "wanted": pair.wanted,
         "simulated_s_per_s": simulated_s / median(times),
     }
-
-
-@dataclass(frozen=True)
-class Variant:
-    """First light with some of its blocks on one processor."""
-
-    name: str
-    what: str
-    #: Which share it.
-    blocks: tuple[str, ...] = ()
-    #: Further overrides.
-    more: tuple[str, ...] = ()
-
-
-_SPREAD = ("processors.cpu.service_spread_s=0.002",)
-_SKIP = ("processors.cpu.when_busy=skip",)
-VARIANTS = (
-    Variant("none", "none"),
-    Variant("wait", "three sensors wait", CLOCKED),
-    Variant("skip", "three sensors, `skip`", CLOCKED, _SKIP),
-    Variant("skip_spread", "the same with `service_spread_s`", CLOCKED, (*_SKIP, *_SPREAD)),
-    Variant("chain", "radar and fusion, a chain", ("radar", "fusion")),
-    Variant("chain_spread", "the same with `service_spread_s`", ("radar", "fusion"), _SPREAD),
-    Variant(
-        "whole_chain",
-        "sensors, fusion and tracker, all in one chain",
-        (*CLOCKED, "fusion", "tracker"),
-    ),
-)
-
-
-def measured_queue(name: str, quick: bool, repeats: int) -> dict[str, Any]:
-    """Return how many seconds are simulated and recorded in one of CPU, without building."""
-    from dsa_des.record.arrow import ParquetSink
-
-    (variant,) = (variant for variant in VARIANTS if variant.name == name)
-    sets = [f"blocks.{name}.processor=cpu" for name in variant.blocks]
-    if sets:
-        sets += ["processors.cpu.service_s=0.005", *variant.more]
-    scene = load_scene(folder() / "first_light.toml", sets=sets, duration_s="120")
-    rates = []
-    for _ in range(2 if quick else 2 + 2 * repeats):
-        with tempfile.TemporaryDirectory() as place:
-            simulation = Simulation(scene, recorder=Recorder([ParquetSink(Path(place))]))
-            started = time.process_time()
-            simulation.run()
-            rates.append(120.0 / (time.process_time() - started))
-    return {"scene": variant.name, "simulated_s_per_s": median(rates[2:] or rates)}

@@ -51,17 +51,17 @@ _ALL_AT_ONCE = 128
 def other_flights(count: int) -> list[Replica]:
     """Return replicas in which both intruders and the ownship fly otherwise."""
     stream = Streams(1).stream("benchmark", "flights")
-    found = []
+    result = []
     for number in range(count):
         changes: dict[str, Any] = {}
-        for place in range(2):
+        for index in range(2):
             for draw, (key, (low, high)) in enumerate(_DRAWN.items()):
-                part = float(stream.uniform(place, number, draw))
-                changes[f"blocks.traffic.intruders[{place}].{key}"] = low + (high - low) * part
+                part = float(stream.uniform(index, number, draw))
+                changes[f"blocks.traffic.intruders[{index}].{key}"] = low + (high - low) * part
         speed = 30.0 + 40.0 * float(stream.uniform(2, number))
         changes["blocks.traffic.ownship.speed_mps"] = speed
-        found.append(Replica(number, changes))
-    return found
+        result.append(Replica(number, changes))
+    return result
 
 
 def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[], object]]:
@@ -70,8 +70,8 @@ def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[
         run_replicas(scene, replicas[:2], wanted=wanted)
 
         def do() -> None:
-            found = run_replicas(scene, replicas, wanted=wanted)
-            failed = [one.error for one in found if isinstance(one, Failed)]
+            result = run_replicas(scene, replicas, wanted=wanted)
+            failed = [one.error for one in result if isinstance(one, Failed)]
             if failed:
                 raise ValueError(failed[0])
 
@@ -279,9 +279,9 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
 
 def _per_s(count: int, do: Callable[[], object], repeats: int) -> float:
     do()
-    found = []
+    result = []
     for _ in range(repeats):
         started = time.process_time()
         do()
-        found.append(count / (time.process_time() - started))
-    return median(found)
+        result.append(count / (time.process_time() - started))
+    return median(result)

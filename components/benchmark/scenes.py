@@ -96,18 +96,18 @@ def scene_of(
 def replicas_of(scene: Scene, count: int) -> list[Scene]:
     """Return replicas of a scene: other seeds, and random phases of the three clocks."""
     stream = Streams(scene.seed).stream("benchmark", "phase")
-    found = []
+    result = []
     for number in range(count):
         blocks = dict(scene.blocks)
-        for place, name in enumerate(CLOCKED):
+        for index, name in enumerate(CLOCKED):
             block = blocks[name]
-            draw = float(stream.uniform(0, number, place))
+            draw = float(stream.uniform(0, number, index))
             period_ns = int(10**9 / block.parameters.scan_rate_hz)  # type: ignore[attr-defined]
             offset_s = Fraction(int(draw * period_ns), 10**9)
             parameters = block.parameters.model_copy(update={"offset_s": offset_s})
             blocks[name] = replace(block, parameters=parameters)
-        found.append(replace(scene, seed=scene.seed + 1 + number, blocks=blocks))
-    return found
+        result.append(replace(scene, seed=scene.seed + 1 + number, blocks=blocks))
+    return result
 
 
 # The yardstick samples this many replicas of many.
@@ -188,11 +188,11 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
 def _scans(simulation: Simulation) -> int:
     """Count the scans of all sensors, one replica at a time so that it takes no memory."""
     clocks = [node.clock for node in simulation.nodes.values() if node.clock is not None]
-    found = 0
+    result = 0
     for run in range(simulation.runs.count):
         simulation.runs.going = range(run, run + 1)
-        found += sum(len(clock.between(0, simulation.end_tick)[0]) for clock in clocks)
-    return found
+        result += sum(len(clock.between(0, simulation.end_tick)[0]) for clock in clocks)
+    return result
 
 
 def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:

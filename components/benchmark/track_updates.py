@@ -210,9 +210,9 @@ _FEW = 27
 def plainly(targets: int) -> tuple[int, Callable[[], object]]:
     """Return how many updates the plain loop does in one run, and what does them."""
     block = listening(1, targets)
-    scans, places = _looks(block)
-    looks = plain_looks(scans, places, block.context.ticks_per_s)
-    first, rest = _started(scans, places, block.p.start_speed_m_s), looks[1:]
+    scans, poses = _looks(block)
+    looks = plain_looks(scans, poses, block.context.ticks_per_s)
+    first, rest = _started(scans, poses, block.p.start_speed_m_s), looks[1:]
     updates = sum(len(look.measured) for look in rest)
     intensity = block.p.acceleration_intensity_m2_s3
     return updates, lambda: track_plainly(rest, *first, intensity, looks[0].time_s)
@@ -228,8 +228,8 @@ def by_stone_soup(targets: int) -> tuple[int, Callable[[], object]] | None:
     from components.stone_soup.objects import Poses, detections, instant
 
     block = listening(1, targets)
-    scans, places = _looks(block)
-    poses = Poses(places)
+    scans, believed = _looks(block)
+    poses = Poses(believed)
     looks = []
     for k in range(min(len(scans), _FEW)):
         which = slice(int(scans.offsets[k]), int(scans.offsets[k + 1]))
@@ -243,10 +243,10 @@ def by_stone_soup(targets: int) -> tuple[int, Callable[[], object]] | None:
 
     def track() -> None:
         tracker = _stone_soup_tracker(intensity, speed)
-        for when, found in looks:
-            tracker.update_tracker(when, found)
+        for when, result in looks:
+            tracker.update_tracker(when, result)
 
-    return sum(len(found) for _, found in looks[1:]), track
+    return sum(len(result) for _, result in looks[1:]), track
 
 
 def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
@@ -288,28 +288,28 @@ def _looks(block: Listening) -> tuple[Scans, SensorPose]:
                                  (pose[3], pose[4], pose[5]))  # fmt: skip
 
 
-def plain_looks(scans: Scans, places: SensorPose, ticks_per_s: int) -> list[PlainLook]:
+def plain_looks(scans: Scans, poses: SensorPose, ticks_per_s: int) -> list[PlainLook]:
     """Return looks as the plain loop takes them."""
-    found = []
+    result = []
     for k in range(len(scans)):
         which = slice(int(scans.offsets[k]), int(scans.offsets[k + 1]))
         ranged = bool(np.isfinite(scans.measured[2, which]).all())
         size = 3 if ranged else 2
-        found.append(
+        result.append(
             PlainLook(
-                int(scans.tick[k]) / ticks_per_s, places.position_m[:, k], places.to_body[:, :, k],
+                int(scans.tick[k]) / ticks_per_s, poses.position_m[:, k], poses.to_body[:, :, k],
                 scans.measured[:size, which].T.copy(), scans.variance[:size, which].T.copy(),
             )
         )  # fmt: skip
-    return found
+    return result
 
 
 def _started(
-    scans: Scans, places: SensorPose, speed_m_s: float
+    scans: Scans, poses: SensorPose, speed_m_s: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return a track for each detection of the first look, as our trackers start them."""
     which = np.arange(int(scans.offsets[1]))
-    position, slope = position_of(scans.measured[:3, which], places.take(0 * which))
+    position, slope = position_of(scans.measured[:3, which], poses.take(0 * which))
     spread = np.zeros((3, 3, len(which)))
     for i in range(3):
         spread[i, i] = scans.variance[i, which]

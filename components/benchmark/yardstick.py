@@ -187,9 +187,9 @@ def _own_flight(own: Any, ticks: list[int], ticks_per_s: int) -> Callable[[float
     seconds = [tick * (1.0 / ticks_per_s) for tick in ticks]
     state = own.at(np.array(ticks) / ticks_per_s)
     columns = (state.lat_deg, state.lon_deg, state.alt_m, state.yaw_rad)
-    places = zip(*(column.tolist() for column in columns), strict=True)
+    positions = zip(*(column.tolist() for column in columns), strict=True)
     tilts = zip(state.pitch_rad.tolist(), state.roll_rad.tolist(), strict=True)
-    flown = dict(zip(seconds, zip(places, tilts, strict=True), strict=True))
+    flown = dict(zip(seconds, zip(positions, tilts, strict=True), strict=True))
     return lambda time_s: flown[time_s]
 
 

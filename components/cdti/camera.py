@@ -75,11 +75,11 @@ class CameraSights:
         name = max(names, key=lambda n: self._seen[n][target, 0])
         camera = self._cameras[name]
         seen_s, azimuth, elevation, range_m, pixels, margin = self._seen[name][target].tolist()
-        place = int(np.searchsorted(states.columns, target))
-        if place == len(states.columns) or states.columns[place] != target:
+        index = int(np.searchsorted(states.columns, target))
+        if index == len(states.columns) or states.columns[index] != target:
             return None
         attitude = np.array(
-            [getattr(states, f"{a}_rad")[-1, place] for a in ("yaw", "pitch", "roll")]
+            [getattr(states, f"{a}_rad")[-1, index] for a in ("yaw", "pitch", "roll")]
         )
         own_attitude = np.array([own.heading_rad, own.pitch_rad, own.roll_rad])
         pixel_rad = camera.pixel_azimuth_rad, camera.pixel_elevation_rad
@@ -123,9 +123,9 @@ class CameraSights:
         for seen in self._seen.values():
             along = np.stack(unit_vector_unchecked(seen[:, 1], seen[:, 2]), axis=1) @ line
             along = np.where(time_s - seen[:, 0] < LATELY_S, along, -1.0)
-            place = int(np.argmax(along))
-            if along[place] > least:
-                best, least = place, float(along[place])
+            index = int(np.argmax(along))
+            if along[index] > least:
+                best, least = index, float(along[index])
         return best
 
 
@@ -222,12 +222,12 @@ def _hull(points: FloatArray) -> FloatArray:
 
 
 def _chain(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    found: list[tuple[float, ...]] = []
+    result: list[tuple[float, ...]] = []
     for point in points:
-        while len(found) > 1 and _left(found[-2], found[-1], point) <= 0.0:
-            found.pop()
-        found.append(point)
-    return found[:-1]
+        while len(result) > 1 and _left(result[-2], result[-1], point) <= 0.0:
+            result.pop()
+        result.append(point)
+    return result[:-1]
 
 
 def _left(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:

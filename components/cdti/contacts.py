@@ -71,8 +71,8 @@ class OwnFlight:
 
     def poses(self, tick: IntArray) -> FloatArray:
         """Return the last poses not after some instants, (n, 6); the first one before it."""
-        place = np.searchsorted(self._tick, tick, side="right") - 1
-        return self._pose[np.maximum(place, 0)]
+        index = np.searchsorted(self._tick, tick, side="right") - 1
+        return self._pose[np.maximum(index, 0)]
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Contacts:
 
     The number is that of the target, -1 for none, or `TRACKS_FROM` and the tracker's number. Of one
     that was seen last at `seen_s` the range and when it was measured are NaN without one, as is the
-    place (n, 3): east and north in the plane, and altitude. The line of sight is `toward` (n, 2):
-    bearing from north and elevation, rad.
+    position (n, 3): east and north in the plane, and altitude. The line of sight is `toward`
+    (n, 2): bearing from north and elevation, rad.
     """
 
     number: IntArray
@@ -90,7 +90,7 @@ class Contacts:
     ranged: BoolArray
     range_m: FloatArray
     range_s: FloatArray
-    place_m: FloatArray
+    position_m: FloatArray
     toward: FloatArray
 
     def shown(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
@@ -101,15 +101,15 @@ class Contacts:
         """
         fresh = np.flatnonzero(time_s - self.seen_s < forgotten_s)
         fresh = fresh[np.argsort(~self.ranged[fresh], kind="stable")]
-        away = self.place_m[fresh] - (own.east_m, own.north_m, own.alt_m)
+        away = self.position_m[fresh] - (own.east_m, own.north_m, own.alt_m)
         bearing = np.degrees(self.toward[fresh, 0]) % 360.0
         table = np.round(np.column_stack([away, bearing, time_s - self.seen_s[fresh]]), 2)
-        found = []
+        result = []
         for number, ranged, row in zip(
             self.number[fresh].tolist(), self.ranged[fresh].tolist(), table.tolist(), strict=True
         ):
-            found.append([number, *(row[:3] if ranged else (None, None, None)), *row[3:]])
-        return found
+            result.append([number, *(row[:3] if ranged else (None, None, None)), *row[3:]])
+        return result
 
 
 def contacts_of_lines(
@@ -129,13 +129,13 @@ def contacts_of_lines(
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
     away = np.stack([east, north, -down], axis=1) * range_m[:, np.newaxis]
     toward = np.stack([np.arctan2(east, north), np.arcsin(np.clip(-down, -1.0, 1.0))], axis=1)
-    found = Contacts(
+    result = Contacts(
         message.target, seen_s, np.isfinite(range_m), range_m, range_s, pose[:, :3] + away, toward
     )
     if before is None or isinstance(message, Tracks):
-        return found
-    stays = ~np.isin(before.number, found.number)
-    pairs = zip(vars(found).values(), vars(before).values(), strict=True)
+        return result
+    stays = ~np.isin(before.number, result.number)
+    pairs = zip(vars(result).values(), vars(before).values(), strict=True)
     return Contacts(*(np.concatenate([new, old[stays]]) for new, old in pairs))
 
 
@@ -145,11 +145,11 @@ def _held(
     """Return the ranges with those of before where none was measured, and when they were."""
     order = np.argsort(before.number, kind="stable")
     known = before.number[order]
-    place = np.searchsorted(known, number)
-    there = place < len(known)
-    there[there] = known[place[there]] == number[there]
+    index = np.searchsorted(known, number)
+    there = index < len(known)
+    there[there] = known[index[there]] == number[there]
     there &= number >= 0
-    old = order[np.minimum(place, max(len(known) - 1, 0))] if len(known) else place
+    old = order[np.minimum(index, max(len(known) - 1, 0))] if len(known) else index
     for_it = np.flatnonzero(there & ~np.isfinite(range_m))
     for_it = for_it[seen_s[for_it] - before.range_s[old[for_it]] <= RANGE_HELD_S]
     range_m, range_s = range_m.copy(), range_s.copy()
@@ -160,16 +160,16 @@ def _held(
 def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -> Contacts:
     """Return the contacts of one row of estimated states."""
     lives = np.flatnonzero(message.track_status != DELETED)
-    place = np.full((len(lives), 3), np.nan)
+    position = np.full((len(lives), 3), np.nan)
     ranged = message.has_range[lives] & np.isfinite(message.north_m[lives])
     if own.plane is not None:
         ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
         origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
         ends = offset_positions(np.where(ranged, ned_m, np.nan), [part[lives] for part in origin])
-        place = np.stack([*own.plane.east_north_m(*ends), ends[2]], axis=1)
+        position = np.stack([*own.plane.east_north_m(*ends), ends[2]], axis=1)
     toward = np.stack([message.azimuth_rad[lives], message.elevation_rad[lives]], axis=1)
     seen_s = message.updated_s[lives]
     unknown = np.full(len(lives), np.nan)
     return Contacts(
-        TRACKS_FROM + message.track[lives], seen_s, ranged, unknown, unknown, place, toward
+        TRACKS_FROM + message.track[lives], seen_s, ranged, unknown, unknown, position, toward
     )

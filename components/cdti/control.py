@@ -16,7 +16,7 @@ from components.cdti.page import (
     Ready,
     Turned,
 )
-from components.cdti.scope import Heard, Scope
+from components.cdti.scope import Received, Scope
 from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
 from components.operator.human import Desk, PendingDecision, Taken
 from dsa_des.running.pacing import Pacer
@@ -132,8 +132,8 @@ class SessionControl:
         self._began = False
         self._gone_at: float | None = None
         self.scope: Scope | None = None
-        #: How far the run has come, its lag, and what was heard by then.
-        self._now: tuple[float, float, Heard | None] = (0.0, 0.0, None)
+        #: How far the run has come, its lag, and what was received by then.
+        self._now: tuple[float, float, Received | None] = (0.0, 0.0, None)
         self._shown_at = -math.inf
         self._named = 0
         #: How long the last picture took to be made, s, and the one of which instant it was.
@@ -161,7 +161,7 @@ class SessionControl:
 
     def came_to(self, time_s: float, lag_s: float) -> None:
         """Take note of how far the run has come, and show it."""
-        self._now = time_s, lag_s, None if self.scope is None else self.scope.heard()
+        self._now = time_s, lag_s, None if self.scope is None else self.scope.received()
         if self._gone_at is not None:
             self.holds()
         if self.scope is not None and len(self.scope.names) != self._named:
@@ -181,21 +181,21 @@ class SessionControl:
         """Return what pages are told of a decision that was taken in: of its time, s, the alert's
         level, where a command leads to, until when, and what it replaces."""
         assert self.scope is not None
-        told: dict[str, Any] = {
+        answer: dict[str, Any] = {
             "time": round(taken.time_s, 6), "level": self.scope.level_of(message.target)
         }  # fmt: skip
         if isinstance(message, Judged) or not math.isfinite(taken.ends_s):
-            return told
-        told["to"] = self.scope.led_to(message.decision, message.value)
-        told["ends"] = round(taken.ends_s, 6)
+            return answer
+        answer["to"] = self.scope.led_to(message.decision, message.value)
+        answer["ends"] = round(taken.ends_s, 6)
         if math.isfinite(taken.replaces_s):
             replaced = next(
                 one
                 for one in reversed(self._log)
                 if one["decision"] == message.decision and one["time"] == round(taken.replaces_s, 6)
             )
-            told["replaces"] = {name: replaced[name] for name in ("time", "value")}
-        return told
+            answer["replaces"] = {name: replaced[name] for name in ("time", "value")}
+        return answer
 
     # -- the thread of the server ------------------------------------------------------------------
 
@@ -232,9 +232,9 @@ class SessionControl:
         if scope is None:
             return None
         began = time.thread_time()
-        time_s, lag_s, heard = self._now
+        time_s, lag_s, received = self._now
         if self._made is None or self._made[0] != time_s:
-            self._made = time_s, scope.picture(time_s, heard)
+            self._made = time_s, scope.picture(time_s, received)
         picture = self._made[1]
         content = {
             "type": "frame",

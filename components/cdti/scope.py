@@ -62,8 +62,8 @@ class _Alerts:
     closest_m: Any
 
 
-class Heard(NamedTuple):
-    """What a display has heard up to an instant; nothing of it changes."""
+class Received(NamedTuple):
+    """What a display has received up to an instant; nothing of it changes."""
 
     own: OwnNow | None
     contacts: Contacts | None
@@ -186,9 +186,9 @@ class Scope:
         """Return a contact's name as the run has it; empty for none, None if there is none."""
         return contact_name(self._names, contact)
 
-    def heard(self) -> Heard:
-        """Return what was heard until now: asked for between two windows, it is of one instant."""
-        return Heard(
+    def received(self) -> Received:
+        """Return all that was received until now; between two windows it is of one instant."""
+        return Received(
             self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands
         )
 
@@ -207,9 +207,11 @@ class Scope:
             return round((math.degrees(own.heading_rad) + value) % 360.0, 1)
         return round(own.alt_m + value, 1)
 
-    def picture(self, time_s: float, heard: Heard | None = None) -> dict[str, Any]:
-        """Return what is shown at an instant of what was heard, for JSON: m, deg, s."""
-        own, contacts, alerts, since, reported, bands = self.heard() if heard is None else heard
+    def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
+        """Return what is shown at an instant of what was received, for JSON: m, deg, s."""
+        own, contacts, alerts, since, reported, bands = (
+            self.received() if received is None else received
+        )
         if own is None:
             return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": {}}
         shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
@@ -263,10 +265,10 @@ class Scope:
         contacts = self._contacts
         if contacts is None:
             return None
-        place = np.flatnonzero(contacts.number == contact)
-        if len(place) == 0:
+        index = np.flatnonzero(contacts.number == contact)
+        if len(index) == 0:
             return None
-        bearing, elevation = contacts.toward[place[0]].tolist()
+        bearing, elevation = contacts.toward[index[0]].tolist()
         return bearing, elevation
 
     def _area(self, alerts: _Alerts) -> list[list[float]]:
@@ -277,51 +279,51 @@ class Scope:
         if level is None:
             return []
         relative = alerts.relative[:, on]
-        found = lost_area(level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S)
-        degrees = np.degrees(found.direction_rad)
+        result = lost_area(level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S)
+        degrees = np.degrees(result.direction_rad)
         return [
             [round(a, 1), round(b, 1), round(c, 1)]
             for a, b, c in zip(
-                degrees.tolist(), found.near_m.tolist(), found.far_m.tolist(), strict=True
+                degrees.tolist(), result.near_m.tolist(), result.far_m.tolist(), strict=True
             )
         ]
 
 
 def _bands_at(
-    heard: tuple[float, GuidanceBands] | None, time_s: float
+    received: tuple[float, GuidanceBands] | None, time_s: float
 ) -> dict[str, list[list[Any]]]:
     """Return bands by kind as [from, to, region]: deg clockwise from north, m, m/s."""
-    found: dict[str, list[list[Any]]] = {kind: [] for kind in BAND_KINDS}
-    if heard is None or time_s - heard[0] > BANDS_LAST_S:
-        return found
-    bands = heard[1]
+    result: dict[str, list[list[Any]]] = {kind: [] for kind in BAND_KINDS}
+    if received is None or time_s - received[0] > BANDS_LAST_S:
+        return result
+    bands = received[1]
     ends = {
         "direction": np.degrees([bands.low_rad, bands.high_rad]),
         "altitude": np.array([bands.low_m, bands.high_m]),
         "speed": np.array([bands.low_mps, bands.high_mps]),
     }
     rows = zip(bands.band.tolist(), bands.region.tolist(), strict=True)
-    for place, (kind, region) in enumerate(rows):
+    for index, (kind, region) in enumerate(rows):
         name = BAND_KINDS[kind]
-        found[name].append([*np.round(ends[name][:, place], 1).tolist(), BAND_REGIONS[region]])
-    return found
+        result[name].append([*np.round(ends[name][:, index], 1).tolist(), BAND_REGIONS[region]])
+    return result
 
 
 def _said(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, Any]]:
     """Return the alerts that are on, the most urgent first."""
-    found = []
-    for place in np.flatnonzero(alerts.level > 0).tolist():
-        target = int(alerts.target[place])
-        to_loss = float(alerts.to_loss_s[place])
-        found.append({
+    result = []
+    for index in np.flatnonzero(alerts.level > 0).tolist():
+        target = int(alerts.target[index])
+        to_loss = float(alerts.to_loss_s[index])
+        result.append({
             "target": target,
-            "level": int(alerts.level[place]),
+            "level": int(alerts.level[index]),
             "since": since.get(target, alerts.time_s),
             "at": alerts.time_s,
             "to_loss": round(to_loss, 2) if math.isfinite(to_loss) else None,
-            "closest": round(float(alerts.closest_m[place]), 1),
+            "closest": round(float(alerts.closest_m[index]), 1),
         })  # fmt: skip
-    return sorted(found, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
+    return sorted(result, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
 
 
 def _flights(alerts: _Alerts) -> dict[int, list[float]]:
@@ -349,11 +351,15 @@ def _sensor(name: str, component: Component) -> dict[str, Any]:
     offer: SensorOffer = component.offer("detections")
     kind = "radar" if offer.measures_range else "ir" if component.mark is IR else "eo"
     reach = offer.reach
-    found: dict[str, Any] = {"name": printable(name), "kind": kind}
+    result: dict[str, Any] = {"name": printable(name), "kind": kind}
     if reach is None or not reach.enabled:
-        return {**found, "range": None, "azimuth": None}
+        return {**result, "range": None, "azimuth": None}
     # Bounds are in the sensor's axes.
     turned_deg = getattr(component.p, "mount_azimuth_deg", 0.0)
     low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
     far = getattr(component, "reach", reach).range_max_m
-    return {**found, "range": round(far, 1) if math.isfinite(far) else None, "azimuth": [low, high]}
+    return {
+        **result,
+        "range": round(far, 1) if math.isfinite(far) else None,
+        "azimuth": [low, high],
+    }

@@ -114,13 +114,13 @@ def run_session(
 
 def _console(scene: Scene) -> str | None:
     """Return the name of the block at which a person sits, or None: a scene to be watched."""
-    found = [name for name, cls in scene.classes.items() if issubclass(cls, Human)]
-    if len(found) > 1:
+    result = [name for name, cls in scene.classes.items() if issubclass(cls, Human)]
+    if len(result) > 1:
         raise UsageError(
-            f"{scene.path}: {', '.join(found)} are all of type operator.human: one person sits at "
+            f"{scene.path}: {', '.join(result)} are all of type operator.human: one person sits at "
             "one console"
         )
-    return found[0] if found else None
+    return result[0] if result else None
 
 
 def _replay(scene: Scene, console: str | None, target: Path) -> Scene | None:

@@ -33,10 +33,10 @@ def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray,
     known = apart[nearest, rows] < NEAR_M
     error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
     spread = np.moveaxis(full_covariance(one, slice(None)), -1, 0).copy()
-    found = np.full(count, np.nan)
+    result = np.full(count, np.nan)
     solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
-    found[known] = (error.T[known] * solved).sum(axis=1)
-    return found, known
+    result[known] = (error.T[known] * solved).sum(axis=1)
+    return result, known
 
 
 def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
@@ -49,15 +49,15 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     for track in drawn.tracks:
         count = len(track.columns["state_s"])
         one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
-        found, known = errors_squared(one, drawn.targets.states(one["state_s"]))
+        result, known = errors_squared(one, drawn.targets.states(one["state_s"]))
         if known.any():
-            shown.append((track, one["state_s"], found))
+            shown.append((track, one["state_s"], result))
     if not shown:
         return None
     of_block = {
-        block: np.concatenate([values[~np.isnan(values)] for _, _, values in told])
+        block: np.concatenate([values[~np.isnan(values)] for _, _, values in own])
         for block in drawn.blocks
-        if (told := [one for one in shown if one[0].block == block])
+        if (own := [one for one in shown if one[0].block == block])
     }
     low, high = chi_square_bounds(6)
     said = {
@@ -105,7 +105,7 @@ def _draw_shares(
 ) -> None:
     """Draw the median of all tracks and where 95 % of them lie: single lines cover each other."""
     edges = np.linspace(drawn.time_s[0], drawn.time_s[1] + 1e-9, _STRETCHES + 1)
-    for place, block in enumerate(drawn.blocks):
+    for index, block in enumerate(drawn.blocks):
         held = [(time_s, values) for track, time_s, values in shown if track.block == block]
         if not held:
             continue
@@ -117,7 +117,7 @@ def _draw_shares(
             [np.quantile(values[stretch == one], (0.025, 0.5, 0.975)) for one in used.tolist()]
         ).T
         middle = 0.5 * (edges[1:] + edges[:-1])[used]
-        colour, several = COLOURS[place % len(COLOURS)], len(drawn.blocks) > 1
+        colour, several = COLOURS[index % len(COLOURS)], len(drawn.blocks) > 1
         axes.fill_between(middle, low, high, color=colour, alpha=0.2, linewidth=0,
                           label=None if several else f"95 % of {len(held)} tracks")  # fmt: skip
         axes.plot(middle, median, color=colour, marker=".", linewidth=1.2,
@@ -125,10 +125,10 @@ def _draw_shares(
 
 
 def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
-    for place, block in enumerate(drawn.blocks):
+    for index, block in enumerate(drawn.blocks):
         held = [one.columns for one in drawn.tracks if one.block == block]
         label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
-        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[place % len(COLOURS)], label)
+        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[index % len(COLOURS)], label)
     if drawn.blocks[1:]:
         axes.set_title(
             "Innovation squared by its covariance (NIS) per quantity, stretches inside "

@@ -166,7 +166,7 @@ def positions(flights: Flights, detected: Detected) -> Positions:
             if detected.names[target] in tracks:
                 rows = rows[evenly(len(rows), most)]
                 wanted.setdefault(target, []).append((name, detected.time_s[name][rows]))
-    found: Positions = {name: [] for name in detected.sensors}
+    result: Positions = {name: [] for name in detected.sensors}
     for target, parts in sorted(wanted.items()):
         # One call per target for all sensors together.
         times = np.concatenate([times for _, times in parts])
@@ -175,16 +175,16 @@ def positions(flights: Flights, detected: Detected) -> Positions:
         for name, part in parts:
             here = slice(start, start + len(part))
             track = tracks[detected.names[target]]
-            found[name].append((track, part, east[here], north[here]))
+            result[name].append((track, part, east[here], north[here]))
             start += len(part)
-    return found
+    return result
 
 
-def where_detected(flights: Flights, found: Positions) -> FloatArray:
+def where_detected(flights: Flights, result: Positions) -> FloatArray:
     """Return the start, the detections and the ownship at their times, shape (points, 2)."""
     points = [np.zeros((1, 2))]
     own = flights.own
-    for paths in found.values():
+    for paths in result.values():
         for _, time_s, east, north in paths:
             points.append(np.column_stack((east, north)))
             own_east = np.interp(time_s, own.time_s, own.east_km)

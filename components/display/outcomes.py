@@ -12,7 +12,7 @@ import numpy as np
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
-from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
+from components.messages.state_tracks import StateTracks, held
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
 from components.metrics.true_states import TargetsInFrame
@@ -31,21 +31,20 @@ NEAR_M = 300.0
 NO_TARGET = "no target"
 #: Instead of a tracker's name, for alerts of what truly is.
 TRUTH = "the truth"
-_HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
 #: Distances of tracks and targets that are worked out at once.
 _MOST_AT_ONCE = 200_000
 
 
 def outcome_observers(simulation: "Simulation") -> list[Observer]:
     """Return running summaries for the kinds of blocks that a scene has."""
-    found: list[Observer] = []
+    result: list[Observer] = []
     if names := senders(simulation, StateTracks):
-        found.append(TrackSummary(names, _recorded_targets(simulation)))
+        result.append(TrackSummary(names, _recorded_targets(simulation)))
     if names := senders(simulation, AlertLevels):
-        found.append(AlertSummary(_sources(simulation, names)))
+        result.append(AlertSummary(_sources(simulation, names)))
     if names := senders(simulation, Manoeuvres):
-        found.append(ManoeuvreSummary(names))
-    return found
+        result.append(ManoeuvreSummary(names))
+    return result
 
 
 class TrackSummary:
@@ -61,22 +60,17 @@ class TrackSummary:
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``state_tracks``."""
-        status = columns["track_status"]
-        wanted = [code for code, name in enumerate(status.names) if name in _HELD]
-        held = np.isin(status.codes, wanted)
+        confirmed = held(columns["track_status"])
         for name, rows in rows_by_name(columns["block"]):
-            self._entries[name].add(columns, rows[held[rows]])
+            self._entries[name].add(columns, rows[confirmed[rows]])
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``tracks``: tracker → what came of it.
+        """Return the section ``tracks``: tracker → counts, error and first instants.
 
-        ``confirmed`` counts tracks that were ever confirmed. Where truth is recorded: ``false``
-        of them have a range and are never within `NEAR_M` of a target (None where no track has
-        a range), and ``position_error_m`` is the rms distance of the others' states from the
-        nearest target within `NEAR_M`, None without any. ``first_confirmed`` is the first
-        instant with a confirmed track and its range from the ownship as estimated there (of
-        several the nearest, None without a range), None without any; ``targets`` is the same for
-        each target that a track with a range came within `NEAR_M` of.
+        Where truth is recorded: ``false`` tracks have a range and are never within `NEAR_M` of a
+        target, ``position_error_m`` is the rms distance of the others' states from the nearest
+        target. ``first_confirmed`` and, by target, ``targets`` are the first instant and the range
+        estimated there, of several tracks the nearest. None is what there is none of.
         """
         return {"tracks": {name: entry.result() for name, entry in self._entries.items()}}
 
@@ -100,10 +94,10 @@ class AlertSummary:
             rows = rows[level[rows] > 0]
             pairs = np.stack([level[rows], target.codes[rows]])
             (levels, codes), which = np.unique(pairs, axis=1, return_inverse=True)
-            for place, (number, code) in enumerate(
+            for index, (number, code) in enumerate(
                 zip(levels.tolist(), codes.tolist(), strict=True)
             ):
-                of_pair = time_s[rows[which.ravel() == place]]
+                of_pair = time_s[rows[which.ravel() == index]]
                 whom = target.names[code] if code >= 0 else NO_TARGET
                 spans = self._entries[name].setdefault(number, {})
                 spans.setdefault(whom, [float(of_pair[0]), 0.0])[1] = float(of_pair[-1])
@@ -205,15 +199,15 @@ class _Tracker:
         self._count += int(near.sum())
 
     def result(self) -> dict[str, Any]:
-        found: dict[str, Any] = {"confirmed": len(self._confirmed)}
+        result: dict[str, Any] = {"confirmed": len(self._confirmed)}
         if self._at is not None:
-            found["false"] = len(self._judged - self._near) if self._judged else None
+            result["false"] = len(self._judged - self._near) if self._judged else None
             mean = self._squares_m2 / self._count if self._count else None
-            found["position_error_m"] = None if mean is None else mean**0.5
-        found["first_confirmed"] = None if self._first is None else _first_result(self._first)
+            result["position_error_m"] = None if mean is None else mean**0.5
+        result["first_confirmed"] = None if self._first is None else _first_result(self._first)
         if self._at is not None:
-            found["targets"] = {n: _first_result(self._firsts[n]) for n in sorted(self._firsts)}
-        return found
+            result["targets"] = {n: _first_result(self._firsts[n]) for n in sorted(self._firsts)}
+        return result
 
 
 def _earlier(
@@ -251,11 +245,11 @@ def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
 def _sources(simulation: "Simulation", names: Iterable[str]) -> dict[str, list[str]]:
     """Return which blocks tell each of some blocks of targets; `TRUTH` where only traffic does."""
     traffic = set(senders(simulation, TrafficStates))
-    found = {}
+    result = {}
     for name in names:
         of = sorted({wire.source for wire in simulation.scene.wires if wire.target == name})
-        found[name] = [source for source in of if source not in traffic] or [TRUTH]
-    return found
+        result[name] = [source for source in of if source not in traffic] or [TRUTH]
+    return result
 
 
 def senders(simulation: "Simulation", message: type) -> list[str]:

@@ -35,16 +35,16 @@ def offset_positions(ned_m: FloatArray, origin: Sequence[FloatArray]) -> FloatAr
 
     NaN where the offset (3, n) north, east and down is not known.
     """
-    found = np.full(ned_m.shape, np.nan)
+    result = np.full(ned_m.shape, np.nan)
     known = np.isfinite(ned_m[0])
     if known.any():
         north_m, east_m, down_m = ned_m[:, known]
         lat_deg, lon_deg, alt_m = (part[known] for part in origin)
-        found[:, known] = enu_to_geodetic(
+        result[:, known] = enu_to_geodetic(
             east_m, north_m, -down_m,
             reference_lat_deg=lat_deg, reference_lon_deg=lon_deg, reference_alt_m=alt_m,
         )  # fmt: skip
-    return found
+    return result
 
 
 def sights(
@@ -59,13 +59,13 @@ def sights(
     ranged = known[np.isfinite(range_m[known])]
 
     def ned(rows: IntArray, far_m: Any) -> FloatArray:
-        found = np.full((3, len(azimuth_rad)), np.nan)
+        result = np.full((3, len(azimuth_rad)), np.nan)
         if len(rows):
             azimuth, elevation = azimuth_rad[rows], elevation_rad[rows]
             level = np.cos(elevation) * far_m
             body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation) * far_m
-            found[:, rows] = body_to_ned(*body, *(angle[rows] for angle in pose[3:]))
-        return found
+            result[:, rows] = body_to_ned(*body, *(angle[rows] for angle in pose[3:]))
+        return result
 
     north, east, _ = ned(known, 1.0)
     return np.arctan2(east, north), offset_positions(ned(ranged, range_m[ranged]), pose[:3])

@@ -17,12 +17,19 @@ from components.display.map_view import (
 from components.display.recorded_rows import Detected
 from components.display.symbols import (
     DENSE,
+    MANY,
+    MOST_NAMED,
+    OWN,
+    TARGET,
     Labels,
-    draw_density,
+    draw_lines,
     draw_marks,
+    gridded,
     in_turns,
     mark_of,
     name_lines,
+    over_time,
+    targets_key,
 )
 from components.display.terminal import distance_text
 from components.messages.reach import Reach
@@ -34,13 +41,10 @@ from dsa_des.record.drawing import DPI, drawing, figure_text
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
 
-MOST_NAMED = 8
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
 # The panel of altitudes below it, and what is between the two.
 _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
-_OWN, _TARGET = "#000000", "#777777"
-_MANY = 20
 
 #: Least span of altitudes that is shown, m: level flights are level lines.
 _LEAST_SPAN_M = 40.0
@@ -77,8 +81,7 @@ def draw_plan(
         axes.set(xlim=view.x, ylim=view.y)
         axes.set_xlabel("east of the ownship's start (km)")
         axes.set_ylabel("north of the ownship's start (km)")
-        axes.grid(color="#DDDDDD", linewidth=0.5)
-        axes.set_axisbelow(True)
+        gridded(axes)
         for name, outline in outlines.items():
             draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
@@ -110,35 +113,20 @@ def draw_plan(
     return path
 
 
-def _draw_lines(axes: Any, lines: list[FloatArray]) -> None:
-    """Draw lines of targets, and last that of the ownship."""
-    from matplotlib.collections import LineCollection
-
-    if len(lines) > DENSE:
-        draw_density(axes, lines[:-1])
-        lines = lines[-1:]
-    targets = len(lines) - 1
-    widths = [0.6 if targets >= _MANY else 1.0] * targets + [2.0]
-    colours = [_TARGET] * targets + [_OWN]
-    axes.add_collection(
-        LineCollection(lines, colors=colours, linewidths=widths, zorder=1.0), autolim=False
-    )
-
-
 def _draw_tracks(axes: Any, view: MapView, flights: Flights) -> None:
     from matplotlib.collections import LineCollection
 
     tracks = [*flights.targets, flights.own]
-    many = len(flights.targets) >= _MANY
+    many = len(flights.targets) >= MANY
     lines = [np.column_stack((track.east_km, track.north_km)) for track in tracks]
-    _draw_lines(axes, lines)
+    draw_lines(axes, lines[:-1], lines[-1])
     # Drawn with their gaps; ends are sought without them.
     known = [line[np.isfinite(line).all(axis=1)] for line in lines]
     starts = np.array([line[0] for line in known if len(line)])
     if len(flights.targets) >= DENSE:  # their density says it; the ownship alone has an arrow
         known, starts = known[-1:], np.array([line[0] for line in known[-1:] if len(line)])
     arrows = [_arrow_head(line, (5.0 if many else 8.0) * view.km_per_px) for line in known]
-    colours = [_TARGET] * (len(known) - 1) + [_OWN]
+    colours = [TARGET] * (len(known) - 1) + [OWN]
     shown = [(arrow, c) for arrow, c in zip(arrows, colours, strict=True) if arrow is not None]
     axes.add_collection(
         LineCollection([arrow for arrow, _ in shown], colors=[colour for _, colour in shown],
@@ -196,8 +184,9 @@ def _draw_altitudes(
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
     half = max(high - low, _LEAST_SPAN_M) * 0.58
     axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    axes.set_xlim(0.0, max(flights.duration_s, 1e-9))
-    _draw_lines(axes, list(lines.values()))
+    over_time(axes, 0.0, flights.duration_s, "altitude (m)")
+    *others, own = lines.values()
+    draw_lines(axes, others, own)
     if len(tracks) <= MOST_NAMED:
         name_lines(axes, lines, "#333333")
     for name, style in styles.items():
@@ -207,10 +196,6 @@ def _draw_altitudes(
             points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
         if points:
             draw_marks(axes, style, np.concatenate(points))
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("altitude (m)")
-    axes.grid(color="#DDDDDD", linewidth=0.5)
-    axes.set_axisbelow(True)
 
 
 def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
@@ -270,9 +255,8 @@ def _legend(
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=_OWN, linewidth=2.0, label="ownship"),
-        Line2D([], [], color=_TARGET, linewidth=5.0 if dense else 1.0, solid_capstyle="butt",
-               label="targets (darker: more)" if dense else "target"),
+        Line2D([], [], color=OWN, linewidth=2.0, label="ownship"),
+        targets_key(dense),
         Line2D([], [], linestyle="none", marker="o", markersize=5, color="#333333", label="start"),
         Line2D([], [], linestyle=":", marker="x", linewidth=0.7, color="#000000",
                label="closest approach"),

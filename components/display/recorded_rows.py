@@ -4,15 +4,17 @@ Detections are thinned where they are many; of scans each sensor's count, times 
 kept, and single scans of a part of the run.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from components.display.summary import rows_by_name
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark
+from dsa_des.block.message import Text
 
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
@@ -26,7 +28,7 @@ _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Give columns of each row group that has rows, in order; a table that is not there has none.
 
-    They are arrays, text is codes (-1 is null) and names.
+    They are arrays, texts a `Text`.
     """
     if not path.is_file():
         return
@@ -47,14 +49,13 @@ def _array(column: Any, text: bool) -> Any:
         column = column.unify_dictionaries()
     chunks = column.chunks
     codes = [chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False) for chunk in chunks]
-    return np.concatenate(codes).astype(np.int64), chunks[0].dictionary.to_pylist()
+    return Text(np.concatenate(codes).astype(np.int64), tuple(chunks[0].dictionary.to_pylist()))
 
 
-def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, list[str]]]:
+def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
     """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
     for rows in each_row_group(folder / "fused.parquet", ("time_s", "sensors")):
-        code, names = rows["sensors"]
-        yield rows["time_s"], code, names
+        yield rows["time_s"], rows["sensors"].codes, rows["sensors"].names
 
 
 @dataclass
@@ -75,23 +76,26 @@ class Detected:
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
         """Read the table ``detections`` of a run folder, if there is one."""
-        rows = ThinnedStream(MOST_ROWS, 2)
         known: dict[str, int] = {}
         series: dict[tuple[str, int], int] = {}
-        for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
-            code, names = group["target"]
-            # Codes of a row group speak of that row group's names only.
-            lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
-            index = np.flatnonzero(code >= 0)  # a false alarm has no place to be marked at
-            block, blocks = group["block"]
-            pair, which = np.unique(block[index] * len(lookup) + code[index], return_inverse=True)
-            ids = [
-                series.setdefault((blocks[a], int(lookup[b])), len(series))
-                for a, b in zip(*(part.tolist() for part in divmod(pair, len(lookup))), strict=True)
-            ]
-            number = np.array(ids, dtype=np.int64)[which]
-            rows.add(number, group["time_s"][index], group["true_range_m"][index])
-        number, (time_s, range_m) = rows.rows()
+
+        def pieces() -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+            for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
+                code, names = group["target"].codes, group["target"].names
+                # Codes of a row group speak of that row group's names only.
+                lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
+                index = np.flatnonzero(code >= 0)  # a false alarm is marked nowhere
+                block, blocks = group["block"].codes, group["block"].names
+                pair = block[index] * len(lookup) + code[index]
+                pair, which = np.unique(pair, return_inverse=True)
+                ids = [
+                    series.setdefault((blocks[a], int(lookup[b])), len(series))
+                    for a, b in zip(*(p.tolist() for p in divmod(pair, len(lookup))), strict=True)
+                ]
+                number = np.array(ids, dtype=np.int64)[which]
+                yield number, group["time_s"][index], group["true_range_m"][index]
+
+        number, (time_s, range_m) = thinned(pieces, MOST_ROWS, 2)
         all_sensors = sorted({*sensors, *(name for name, _ in series)})
         sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
         target = np.array([target for _, target in series], dtype=np.int64)[number]
@@ -105,41 +109,29 @@ class Detected:
         )
 
 
-class ThinnedStream:
-    """Rows of many series that come piece by piece, of which no more are kept than fit.
+def thinned(
+    pieces: Callable[[], Iterable[tuple[Any, ...]]], most: int, columns: int
+) -> tuple[IntArray, list[FloatArray]]:
+    """Return the rows that are kept of many series: their series and columns, in order.
 
-    Every series keeps its first row and every n-th from there on, with n a power of two that
-    follows from how many rows each series has. So what is kept rests on the rows, not on the
-    pieces they came in, and a series with few rows keeps them beside one with millions. More rows
-    than `most` are never kept, unless there are more series: each keeps one.
+    Pieces are read twice, first to count; each is the rows' series 0, 1, 2, ... and columns. Every
+    series keeps its first row and every n-th from there on (`strides`), so a series with few rows
+    keeps them beside one with millions, whatever the pieces.
     """
-
-    def __init__(self, most: int, columns: int) -> None:
-        self._most = most
-        self._series: IntArray = np.empty(0, dtype=np.int64)
-        #: How many rows of its series came before each row that is kept.
-        self._number: IntArray = np.empty(0, dtype=np.int64)
-        self._columns: list[FloatArray] = [np.empty(0) for _ in range(columns)]
-        self._seen: IntArray = np.empty(0, dtype=np.int64)
-
-    def add(self, series: IntArray, *columns: FloatArray) -> None:
-        """Take rows, `most` or fewer at a time, of series 0, 1, 2, ... with none left out."""
-        new = int(series.max(initial=-1)) + 1 - len(self._seen)
-        self._seen = np.concatenate((self._seen, np.zeros(max(0, new), dtype=np.int64)))
-        number = self._seen[series] + places_in_groups(series)
-        self._seen += np.bincount(series, minlength=len(self._seen))
-        every = strides(self._seen, self._most)
-        old, more = self._number % every[self._series] == 0, number % every[series] == 0
-        self._series = np.concatenate((self._series[old], series[more]))
-        self._number = np.concatenate((self._number[old], number[more]))
-        self._columns = [
-            np.concatenate((kept[old], column[more]))
-            for kept, column in zip(self._columns, columns, strict=True)
-        ]
-
-    def rows(self) -> tuple[IntArray, list[FloatArray]]:
-        """Return the series and the columns of the rows that are kept, in the order they came."""
-        return self._series, self._columns
+    counts: IntArray = np.empty(0, dtype=np.int64)
+    for series, *_ in pieces():
+        counts = np.bincount(series, minlength=len(counts)) + np.pad(
+            counts, (0, max(0, int(series.max(initial=-1)) + 1 - len(counts)))
+        )
+    every, before = strides(counts, most), np.zeros_like(counts)
+    result: list[list[Any]] = [[np.empty(0, np.int64)], *([np.empty(0)] for _ in range(columns))]
+    for series, *values in pieces():
+        kept = (before[series] + index_in_groups(series)) % every[series] == 0
+        before += np.bincount(series, minlength=len(before))
+        for parts, column in zip(result, (series, *values), strict=True):
+            parts.append(column[kept])
+    series, *values = map(np.concatenate, result)
+    return series, values
 
 
 def strides(counts: IntArray, most: int) -> IntArray:
@@ -161,14 +153,14 @@ def strides(counts: IntArray, most: int) -> IntArray:
     return every
 
 
-def places_in_groups(group: IntArray) -> IntArray:
+def index_in_groups(group: IntArray) -> IntArray:
     """Return how many rows of its own group come before each row, shape (rows,)."""
     order = np.argsort(group, kind="stable")
     starts = np.flatnonzero(np.diff(group[order], prepend=-1))
     lengths = np.diff(starts, append=len(group))
-    places = np.empty(len(group), dtype=np.int64)
-    places[order] = np.arange(len(group)) - np.repeat(starts, lengths)
-    return places
+    indices = np.empty(len(group), dtype=np.int64)
+    indices[order] = np.arange(len(group)) - np.repeat(starts, lengths)
+    return indices
 
 
 @dataclass
@@ -205,16 +197,16 @@ class ScansShown:
 
 def read_scans(folder: Path) -> dict[str, SensorScans]:
     """Return what the table ``scans`` of a run folder says of each sensor, by name."""
-    found: dict[str, SensorScans] = {}
+    result: dict[str, SensorScans] = {}
     for rows in each_row_group(folder / "scans.parquet", _SCANS):
         for name, (time_s, hit_s) in _by_sensor(rows).items():
             first, last = float(time_s[0]), float(time_s[-1])
-            scans = found.setdefault(name, SensorScans(0, first, last, None))
+            scans = result.setdefault(name, SensorScans(0, first, last, None))
             scans.count += len(time_s)
             scans.last_s = last
             if scans.first_hit_s is None and len(hit_s):
                 scans.first_hit_s = float(hit_s[0])
-    return dict(sorted(found.items()))
+    return dict(sorted(result.items()))
 
 
 def scans_between(
@@ -244,11 +236,7 @@ def scans_between(
 
 def _by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return for each sensor of a row group its times, and those of scans with a detection."""
-    code, names = rows["block"]
-    found = {}
-    for number, name in enumerate(names):
-        mine = code == number
-        if mine.any():
-            time_s = rows["time_s"][mine]
-            found[name] = time_s, time_s[rows["detected"][mine] > 0]
-    return found
+    return {
+        name: (rows["time_s"][mine], rows["time_s"][mine[rows["detected"][mine] > 0]])
+        for name, mine in rows_by_name(rows["block"])
+    }

@@ -1,8 +1,9 @@
 """The tables of a run's folder, for pages and for files of other programs."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,27 @@ class RecordedTables:
 
     folder: Path
     tables: Mapping[str, Any]
+    _kept: dict[tuple[str, str], Any] = field(default_factory=dict, compare=False, repr=False)
+
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """The scene that was run, nothing where there is no file; `UsageError` if it is no TOML."""
+        path = self.folder / "scene.toml"
+        try:
+            return tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError:
+            return {}
+        except ValueError as error:
+            raise UsageError(f"{path}: is not TOML ({error})") from error
+
+    def block_types(self, names: Iterable[str]) -> dict[str, str]:
+        """Return name → type of blocks as the scene says it, nothing of those it does not know."""
+        blocks = self.scene.get("blocks", {})
+        return {name: str(blocks.get(name, {}).get("type", "")) for name in names}
+
+    def has(self, table: str, *names: str) -> bool:
+        """Whether there is a table with some columns."""
+        return table in self.tables and {*names} <= {*self.table(table).column_names}
 
     @cached_property
     def _with_pose(self) -> Any:
@@ -52,7 +74,7 @@ class RecordedTables:
         names = self.texts("truth", "target")
         if OWNSHIP in names:
             raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
-        found: dict[str, dict[str, FloatArray]] = {}
+        result: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
         self.refuse_large("truth", columns)
         aircraft = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
@@ -61,8 +83,8 @@ class RecordedTables:
             mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
             time_s, first = np.unique(columns["time_s"][mine], return_index=True)
             if len(time_s):
-                found[name] = {key: values[mine][first] for key, values in columns.items()}
-        return found
+                result[name] = {key: values[mine][first] for key, values in columns.items()}
+        return result
 
     def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
         """Refuse what is no number, or greater than any of a run, by name and row."""
@@ -85,21 +107,23 @@ class RecordedTables:
 
     def texts(self, table: str, name: str) -> list[str | None]:
         """Return a column of texts, as `numbers` does one of numbers."""
-        found = self._column(table, name).to_pylist()
-        if not all(text is None or isinstance(text, str) for text in found):
+        result = self._column(table, name).to_pylist()
+        if not all(text is None or isinstance(text, str) for text in result):
             raise UsageError(
                 f"{self.folder}: {table}.parquet: {name} holds something else than text"
             )
-        return found
+        return result
 
     def values(self, table: str, name: str) -> Any:
         """Return a column of texts as a list, any other as an array of its own type."""
         import pyarrow as pa
 
-        column = self._column(table, name)
-        if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
-            return column.to_pylist()
-        return column.to_numpy(zero_copy_only=False)
+        if (table, name) not in self._kept:
+            column = self._column(table, name)
+            text = pa.types.is_string(column.type) or pa.types.is_dictionary(column.type)
+            result = column.to_pylist() if text else column.to_numpy(zero_copy_only=False)
+            self._kept[table, name] = result
+        return self._kept[table, name]
 
     def _column(self, table: str, name: str) -> Any:
         columns = self.table(table)

@@ -46,15 +46,7 @@ class DetectAndSenseReport:
         return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation)]
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
-        """Print a run's summary.
-
-        Parameters
-        ----------
-        console : rich.console.Console
-        summary : dict
-            Sections ``sensors``, ``fused``, ``targets`` and those of `outcome_observers`, with
-            ``simulated_s``, ``cpu_s`` and ``out``; whatever is missing is left out.
-        """
+        """Print a run's summary on a ``rich.console.Console``; sections that lack are left out."""
         from components.display.terminal import show
 
         show(console, summary)
@@ -71,20 +63,8 @@ class DetectAndSenseReport:
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw the figures of a run into its folder, the same bytes on every drawing.
 
-        Parameters
-        ----------
-        simulation : Simulation
-            The run, for flights and fields of view.
-        folder : Path
-            Holds the run's Parquet tables; takes the figures.
-        summary : dict
-            The run's summary.
-
-        Returns
-        -------
-        list of Path
-            ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
-            ``tracks.png`` and ``consistency.png`` where a tracker confirmed tracks with a range.
+        ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
+        ``tracks.png`` and ``consistency.png`` where a tracker confirmed tracks with a range.
         """
         from components.display.consistency import draw_consistency
         from components.display.flights import Flights
@@ -167,11 +147,11 @@ def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float,
 def _firsts(
     detections: Mapping[tuple[str, int], tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
-    found: dict[str, tuple[float, float]] = {}
+    result: dict[str, tuple[float, float]] = {}
     for (name, _), seen in detections.items():
-        if name not in found or seen[0] < found[name][0]:
-            found[name] = seen
-    return found
+        if name not in result or seen[0] < result[name][0]:
+            result[name] = seen
+    return result
 
 
 def _fused_share(tables: Mapping[str, Any]) -> float | None:

@@ -6,16 +6,13 @@ whatever the length of the run.
 
 import math
 from collections.abc import Collection, Iterable
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from components.messages.detections import Detections
 from components.metrics.censored import END, START, in_scan
 from dsa_des.arrays.types import IntArray
-
-if TYPE_CHECKING:
-    pass
 
 #: Columns of recorded rows; of text `dsa_des.block.message.Text`.
 Columns = Any
@@ -48,20 +45,11 @@ class SensorSummary:
                 entry.add_detections(columns, rows)
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``sensors``.
+        """Return the section ``sensors``: block → counts, first and last detection.
 
-        Returns
-        -------
-        dict
-            ``{"sensors": {block: {"scans", "evaluated", "detections", "false_alarms", "skipped",
-            "first_detection", "last_detection"}}}``, and ``"enabled": False`` for a block that is
-            switched off. ``detections`` are those of targets,
-            ``false_alarms`` all others. ``evaluated`` counts target evaluations over all scans,
-            ``skipped`` targets not evaluated, by reason. A detection is
-            ``{"time_s", "range_m", "target"}`` or None, with ``at`` where it is in the sensor's
-            first scan ("the start") or its last ("the end of the run"); ``range_m`` is the true
-            slant range at that instant, for every sensor, also those that measure none; of
-            several targets detected in one instant it is the nearest.
+        ``evaluated`` counts targets over all scans, ``skipped`` those not evaluated, by reason. A
+        detection has its true range, of several at one instant the nearest, and ``at`` where it is
+        in the sensor's first scan or its last; a block that is switched off ``"enabled": False``.
         """
         return {
             "sensors": {
@@ -152,10 +140,10 @@ class _Sensor:
         """Return a sighting, and whether the sensor's first or last scan censors it."""
         if seen is None:
             return None
-        found = seen.result()
+        result = seen.result()
         if self.span is not None and in_scan(seen.tick, self.span[end]):
-            found["at"] = (START, END)[end]
-        return found
+            result["at"] = (START, END)[end]
+        return result
 
 
 class _Sighting(NamedTuple):

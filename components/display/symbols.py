@@ -14,6 +14,9 @@ from dsa_des.record.drawing import figure_text
 FONT_SIZE = 8
 #: From so many lines on their density is drawn, in so many cells across and up.
 DENSE = 100
+#: From so many on they are thinner, and at most so many are named.
+MANY, MOST_NAMED = 20, 8
+OWN, TARGET = "#000000", "#777777"
 _CELLS = (160, 100)
 _LINE_PX = FONT_SIZE * 1.9
 _LETTER_PX = FONT_SIZE * 0.95
@@ -67,14 +70,14 @@ def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
         name: next((mark for start, mark in _KINDS if kind.startswith(start)), None)
         for name, kind in types.items()
     }
-    found = told_apart(kinds)
+    result = told_apart(kinds)
     before: dict[Mark, int] = {}
     for name, kind in sorted(kinds.items()):
         if kind is not None:
             again = before.get(kind, 0)
             before[kind] = again + 1
-            found[name] = replace(found[name], colour=_shade(kind.colour, again))
-    return found
+            result[name] = replace(result[name], colour=_shade(kind.colour, again))
+    return result
 
 
 def _shade(colour: str, again: int) -> str:
@@ -147,17 +150,56 @@ def name_lines(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
             ends.append((float(y[seen[-1]]), float(x[seen[-1]]), name))
     height_pt = axes.get_window_extent().height * 72 / axes.figure.dpi
     step = 1.25 * _NAME_PT / height_pt * (high - low)
-    places: list[float] = []
+    heights: list[float] = []
     for y, _, _ in sorted(ends):
-        places.append(max(y, places[-1] + step) if places else y)
-    over = max(0.0, places[-1] - high) if places else 0.0
-    for (y, x, name), at in zip(sorted(ends), places, strict=True):
+        heights.append(max(y, heights[-1] + step) if heights else y)
+    over = max(0.0, heights[-1] - high) if heights else 0.0
+    for (y, x, name), at in zip(sorted(ends), heights, strict=True):
         axes.annotate(
             figure_text(name, 14), (x, y), xytext=(4.0, (at - over - y) * height_pt / (high - low)),
             textcoords="offset points", fontsize=_NAME_PT, color=colour, va="center",
             annotation_clip=False, zorder=5.0,
             bbox={"facecolor": "white", "alpha": 0.65, "edgecolor": "none", "pad": 0.4},
         )  # fmt: skip
+
+
+def draw_lines(axes: Any, targets: Sequence[FloatArray], own: FloatArray | None = None) -> None:
+    """Draw lines (points, 2) of targets, of many their density, and that of the ownship."""
+    from matplotlib.collections import LineCollection
+
+    if dense := len(targets) >= DENSE:
+        draw_density(axes, targets)
+    lines = (
+        [] if dense else [(line, TARGET, 0.6 if len(targets) >= MANY else 1.0) for line in targets]
+    )
+    lines += [] if own is None else [(own, OWN, 2.0)]
+    if lines:
+        points, colours, widths = zip(*lines, strict=True)
+        drawn = LineCollection(points, colors=colours, linewidths=widths, zorder=1.0)
+        axes.add_collection(drawn, autolim=False)
+
+
+def targets_key(dense: bool) -> Any:
+    """Return the entry of a legend for lines of targets."""
+    from matplotlib.lines import Line2D
+
+    label = "targets (darker: more)" if dense else "target"
+    return Line2D(
+        [], [], color=TARGET, lw=5.0 if dense else 1.0, solid_capstyle="butt", label=label
+    )
+
+
+def over_time(axes: Any, start_s: float, end_s: float, what: str) -> None:
+    """Give axes a time from start to end, what stands on the other, and a grid."""
+    axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
+    axes.set(xlabel="time (s)", ylabel=what)
+    gridded(axes)
+
+
+def gridded(axes: Any) -> None:
+    """Give axes a grid behind what is drawn."""
+    axes.grid(color="#DDDDDD", linewidth=0.5)
+    axes.set_axisbelow(True)
 
 
 def draw_density(axes: Any, lines: Sequence[FloatArray]) -> None:

@@ -19,12 +19,15 @@ from components.display.recorded_rows import (
 )
 from components.display.symbols import (
     DENSE,
+    MOST_NAMED,
     by_target,
-    draw_density,
+    draw_lines,
     draw_marks,
     in_turns,
     mark_of,
     name_lines,
+    over_time,
+    targets_key,
 )
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
@@ -38,7 +41,6 @@ MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
 _LEFT, _WIDTH, _BELOW = 0.105, 0.87, 0.785  # beside the whole run are names of targets
-_MOST_NAMED = 8
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 
@@ -122,15 +124,15 @@ def _first_joined(folder: Path, sensors: int) -> tuple[float, int] | None:
 
 
 def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
-    found: set[tuple[float, str]] = set()
+    result: set[tuple[float, str]] = set()
     for time_s, code, names in read_fused(folder):
         low, high = np.searchsorted(time_s, [start_s, end_s])
         for row in range(int(low), int(high)):
             if "+" in names[code[row]]:
-                found.add((float(time_s[row]), names[code[row]]))
+                result.add((float(time_s[row]), names[code[row]]))
         if len(time_s) and time_s[-1] > end_s:
             break
-    return [(time_s, name.split("+")) for time_s, name in sorted(found)]
+    return [(time_s, name.split("+")) for time_s, name in sorted(result)]
 
 
 def _draw_scans(
@@ -186,7 +188,8 @@ def _draw_scans(
     axes.tick_params(axis="y", length=0, pad=9)
     axes.spines["left"].set_visible(False)
     axes.set_ylim(-0.6, max(1, len(sensors)) - 0.4)
-    _time_axis(axes, close_up.start_s, close_up.end_s)
+    axes.set_xlim(close_up.start_s, max(close_up.end_s, close_up.start_s + 1e-9))
+    axes.set_xlabel("time (s)")
     handles = [
         Line2D([], [], linestyle="none", marker="|", markersize=10, color="#555555", label="scan"),
         Line2D([], [], linestyle="none", marker="s", markersize=6, color="#555555",
@@ -206,7 +209,6 @@ def _mark_size(count: int) -> float:
 
 
 def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duration_s: float) -> None:
-    from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
     top_km = max(
@@ -222,26 +224,11 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
         top_km = min(farthest, 1.6 * top_km) if top_km else farthest
     top_km = max(1.05 * top_km, 0.1)
     axes.set_ylim(0.0, top_km)
-    axes.set_xlim(0.0, max(duration_s, 1e-9))
-    if len(lines) >= DENSE:
-        draw_density(axes, lines)
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color="#999999",
-                lw=5.0,
-                solid_capstyle="butt",
-                label="targets (darker: more)",
-            )
-        )
-    elif lines:
-        width = 0.5 if len(lines) > 20 else 1.0
-        axes.add_collection(
-            LineCollection(lines, colors="#999999", linewidths=width, zorder=1.0), autolim=False
-        )
-        handles.append(Line2D([], [], color="#999999", linewidth=1.0, label="target"))
-        if flights is not None and len(lines) <= _MOST_NAMED:
+    over_time(axes, 0.0, duration_s, "true slant range (km)")
+    if lines:
+        draw_lines(axes, lines)
+        handles.append(targets_key(len(lines) >= DENSE))
+        if flights is not None and len(lines) <= MOST_NAMED:
             names = [target.name for target in flights.targets]
             name_lines(axes, dict(zip(names, lines, strict=True)), "#333333")
     width_px = _SIZE_IN[0] * _BELOW * DPI
@@ -249,10 +236,6 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
         _draw_detections(axes, detected, name, width_px / duration_s)
         label = figure_text(name, 16)
         handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=label))
-    axes.set_ylabel("true slant range (km)")
-    axes.grid(color="#DDDDDD", linewidth=0.5)
-    axes.set_axisbelow(True)
-    _time_axis(axes, 0.0, duration_s)
     axes.legend(
         handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles),
         frameon=False, borderaxespad=0.1, columnspacing=1.2, handletextpad=0.3,
@@ -267,8 +250,3 @@ def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) 
     ]
     if kept:
         draw_marks(axes, detected.styles[name], points[np.concatenate(kept)])
-
-
-def _time_axis(axes: Any, start_s: float, end_s: float) -> None:
-    axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
-    axes.set_xlabel("time (s)")

@@ -12,7 +12,7 @@ import numpy as np
 from components.display.outcomes import NEAR_M, TABLE, distances
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE
+from components.messages.state_tracks import COVARIANCE, HELD
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
@@ -66,8 +66,8 @@ class DrawnTracks:
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
         several = len(self.blocks) > 1
-        for place, block in enumerate(self.blocks):
-            turn = place
+        for index, block in enumerate(self.blocks):
+            turn = index
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
@@ -96,11 +96,10 @@ def _read(source: Path) -> dict[str, Any] | None:
     groups = file.metadata.num_row_groups
     step = -(-file.metadata.num_rows // _MOST_ROWS)
     table = file.read_row_groups(list(range(0, groups, max(step, 1))), columns=list(_COLUMNS))
-    held = pa.array(["confirmed", "coasted"])
     status = table["track_status"]
     if pa.types.is_dictionary(status.type):
         status = status.cast(status.type.value_type)
-    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, held)))
+    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, pa.array(HELD))))
     if table.num_rows == 0:
         return None
     return {name: np.asarray(table[name].to_numpy(zero_copy_only=False)) for name in _COLUMNS}
@@ -196,11 +195,11 @@ def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
             Line2D(
                 [],
                 [],
-                color=COLOURS[place % len(COLOURS)],
+                color=COLOURS[index % len(COLOURS)],
                 linewidth=1.4,
                 label=figure_text(block, 16) if blocks[1:] else alone,
             )
-            for place, block in enumerate(blocks)
+            for index, block in enumerate(blocks)
         ),
     ]
     if many <= MOST_SPREADS:

@@ -75,7 +75,7 @@ def read_table(text: str) -> EncounterTable:
     if not rows:
         raise UsageError(f"{path}: a row of column names and one row per encounter are needed")
     columns: dict[str, list[object]] = {
-        name: [row[place] or None for _, row in rows] for place, name in enumerate(names)
+        name: [row[index] or None for _, row in rows] for index, name in enumerate(names)
     }
     return EncounterTable(path, columns, [line for line, _ in rows])
 
@@ -150,15 +150,15 @@ def _number(cell: object) -> float:
 
 def kept_rows(table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool) -> BoolArray:
     """Return which rows are good, or raise UsageError with what is wrong with the others."""
-    found: dict[int, list[str]] = {}
+    problems: dict[int, list[str]] = {}
     for some in wrong:
         for row, said in some.items():
-            found.setdefault(row, []).append(said)
+            problems.setdefault(row, []).append(said)
     kept: AnyArray = np.ones(len(table.lines), dtype=np.bool_)
-    kept[list(found)] = False
-    if found and (not skip or not kept.any()):
-        rows = sorted(found)
-        lines = [f"{table.path}: {table.row_name(row)}: {'; '.join(found[row])}" for row in rows]
+    kept[list(problems)] = False
+    if problems and (not skip or not kept.any()):
+        rows = sorted(problems)
+        lines = [f"{table.path}: {table.row_name(row)}: {'; '.join(problems[row])}" for row in rows]
         more = [f"and {len(rows) - _MOST} more"] if len(rows) > _MOST else []
         raise UsageError(*lines[:_MOST], *more)
     return kept
@@ -209,10 +209,10 @@ def show_risk(
         classes = risk_ratios_by_class(n, m, w, labels, together, **options)
     skipped = int((~kept).sum())
     if as_json:
-        found: dict[str, Any] = {"skipped": skipped, "confidence": confidence, **asdict(whole)}
+        result: dict[str, Any] = {"skipped": skipped, "confidence": confidence, **asdict(whole)}
         if by is not None:
-            found["classes"] = {name: asdict(one) for name, one in classes.items()}
-        say_json(found)
+            result["classes"] = {name: asdict(one) for name, one in classes.items()}
+        say_json(result)
         return
     for line in _lines(whole, confidence, skipped):
         say(line)
@@ -249,9 +249,9 @@ def _labels(
     # Numbered, so that classes stand in the order of their edges.
     inner = (f"{low:g} to {high:g}" for low, high in pairwise(bounds))
     names = [f"below {bounds[0]:g}", *inner, f"{bounds[-1]:g} and above"]
-    place = np.searchsorted(bounds, np.nan_to_num(values), side="right")
+    index = np.searchsorted(bounds, np.nan_to_num(values), side="right")
     width = len(str(len(names)))
-    return np.array([f"{k + 1:0{width}d}: {name}" for k, name in enumerate(names)])[place], wrong
+    return np.array([f"{k + 1:0{width}d}: {name}" for k, name in enumerate(names)])[index], wrong
 
 
 def _edges(text: str) -> FloatArray:
@@ -264,37 +264,37 @@ def _edges(text: str) -> FloatArray:
     return bounds
 
 
-def _lines(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
-    alone = found.clusters == found.encounters
-    clusters = "" if alone else f" in {found.clusters} clusters"
-    shown = _digits(found)
-    low, high = map(shown, found.interval)
+def _lines(risk: RiskRatio, confidence: float, skipped: int) -> list[str]:
+    alone = risk.clusters == risk.encounters
+    clusters = "" if alone else f" in {risk.clusters} clusters"
+    shown = _digits(risk)
+    low, high = map(shown, risk.interval)
     lines = [
-        f"{found.encounters} encounters{clusters}, {found.nominal_events} with the event "
-        f"nominally, {found.mitigated_events} mitigated ({found.induced_events} of them induced)",
-        f"probability nominal       {shown(found.nominal_probability)}",
-        f"probability mitigated     {shown(found.mitigated_probability)}",
-        f"risk ratio                {shown(found.ratio)}",
-        f"  unresolved              {shown(found.unresolved)}",
-        f"  induced                 {shown(found.induced)}",
-        f"{f'{100 * confidence:g} % interval':<26}{low} to {high} ({found.method})",
-        f"standard error            {found.standard_error:.3g} (paired)",
-        f"  nominal taken as known  {found.unpaired_error:.3g}",
-        f"effective sample size     {found.effective_sample_size:.2f}",
+        f"{risk.encounters} encounters{clusters}, {risk.nominal_events} with the event "
+        f"nominally, {risk.mitigated_events} mitigated ({risk.induced_events} of them induced)",
+        f"probability nominal       {shown(risk.nominal_probability)}",
+        f"probability mitigated     {shown(risk.mitigated_probability)}",
+        f"risk ratio                {shown(risk.ratio)}",
+        f"  unresolved              {shown(risk.unresolved)}",
+        f"  induced                 {shown(risk.induced)}",
+        f"{f'{100 * confidence:g} % interval':<26}{low} to {high} ({risk.method})",
+        f"standard error            {risk.standard_error:.3g} (paired)",
+        f"  nominal taken as known  {risk.unpaired_error:.3g}",
+        f"effective sample size     {risk.effective_sample_size:.2f}",
     ]
-    if found.few:
+    if risk.few:
         lines.append("few: fewer than 20 mitigated events, in effect, carry the interval")
     if skipped:
         lines.append(f"{skipped} damaged encounters were skipped")
     return lines
 
 
-def _digits(found: RiskRatio) -> Callable[[float], str]:
+def _digits(risk: RiskRatio) -> Callable[[float], str]:
     """Return what writes numbers with three digits, or down to the second of half the interval."""
-    half = (found.interval[1] - found.interval[0]) / 2
+    half = (risk.interval[1] - risk.interval[0]) / 2
     digits = 3
-    if found.ratio > 0 and half > 0:
-        digits = max(digits, 2 + math.floor(math.log10(found.ratio)) - math.floor(math.log10(half)))
+    if risk.ratio > 0 and half > 0:
+        digits = max(digits, 2 + math.floor(math.log10(risk.ratio)) - math.floor(math.log10(half)))
     return lambda value: f"{value:.{digits}g}"
 
 

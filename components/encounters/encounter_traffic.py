@@ -98,8 +98,8 @@ def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
     encounter_set, row, dynamics = aircraft[0]
     if encounter_set.kind != TRACKS:
         return flown_events([(of, row) for of, row, _ in aircraft], dynamics)
-    time_s, *place = encounter_set.path(row)
-    return time_s, *(part[:, np.newaxis] for part in place)
+    time_s, *position = encounter_set.path(row)
+    return time_s, *(part[:, np.newaxis] for part in position)
 
 
 def _flown_alike(aircraft: Sequence[_Craft]) -> list[SampledTrajectory]:
@@ -255,14 +255,14 @@ class _EncounterTraffic(RecordedTraffic):
 
 
 class SetTraffic(_EncounterTraffic):
-    """Traffic of one encounter of a set, told by its number."""
+    """Traffic of one encounter of a set, by its number."""
 
     Parameters = SetParameters
     lockstep = True
 
 
 class ModelTraffic(_EncounterTraffic):
-    """Traffic of one encounter that a pair of encounter models makes, told by its number."""
+    """Traffic of one encounter that a pair of encounter models makes, by its number."""
 
     Parameters = ModelParameters
     lockstep = True
@@ -300,7 +300,7 @@ def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
 
 @lru_cache(maxsize=1200)
 def _moved(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
-    """Return a set elsewhere, the same one for those who ask again: its flights are kept by it."""
+    """Return a set elsewhere, the same object each time: flights are kept by it."""
     return replace(encounter_set, reference_deg=reference_deg)
 
 

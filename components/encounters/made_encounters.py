@@ -156,7 +156,7 @@ class _Recipes:
             dict(zip(swept, values, strict=True)) for values in itertools.product(*swept.values())
         ]
         kinds = [str(one.pop("geometry")) for one in every]
-        place = float(at[0]), float(at[1])
+        origin = float(at[0]), float(at[1])
         courses = None
         if self.tables.get("courses", "one") == "every":
             there = [(k, c) for k, one in enumerate(every) for c in _courses_there(one)]
@@ -164,12 +164,14 @@ class _Recipes:
             courses = [course for _, course in there]
             if not every:
                 raise UsageError(f"{self.path}: no course of any intruder leads there")
-        return Recipe(self.path, every, kinds, count, seed, place, duration, weight, sense, courses)
+        return Recipe(
+            self.path, every, kinds, count, seed, origin, duration, weight, sense, courses
+        )
 
     def values(self, key: str, spec: _Quantity, factor: float) -> list[Any]:
         """Return what a quantity is in turn: numbers, or ranges from which it is drawn."""
         given = self.tables[key]
-        found: list[Any] = []
+        result: list[Any] = []
         for item in given if isinstance(given, list) else [given]:
             ends = item.get("uniform") if isinstance(item, dict) and len(item) == 1 else [item]
             if not isinstance(ends, list) or not ends or not all(map(_is_number, ends)):
@@ -183,10 +185,10 @@ class _Recipes:
                 limits = f"{spec.low / factor:g} to {spec.high / factor:g}"
                 self.add(key, f"must lie from {limits}")
                 return []
-            found.append(tuple(scaled) if isinstance(item, dict) else scaled[0])
-        if not found:
+            result.append(tuple(scaled) if isinstance(item, dict) else scaled[0])
+        if not result:
             self.add(key, "is an empty list")
-        return found
+        return result
 
     def whole(self, key: str, default: int, low: int, high: int) -> int:
         value = self.tables.get(key, default)
@@ -273,16 +275,16 @@ def _refuse(recipe: Recipe, number: int, combination: int, no_course: bool) -> N
 def _courses(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> FloatArray:
     """Return the intruders' headings, NaN where none is of the geometry that is asked for."""
     both = intruder_heading(v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"])
-    found = np.full(len(combination), np.nan)
+    course = np.full(len(combination), np.nan)
     wanted = np.array([recipe.geometries[c] for c in combination])
     for k, heading in enumerate(both):
         off = np.degrees(heading - v["own_heading"]) % 360.0
         kind = np.array([str(name).split(" ")[0] for name in geometry_class(np.nan_to_num(off))])
-        good = ~np.isnan(heading) & ((wanted == "any") | (wanted == kind)) & np.isnan(found)
+        good = ~np.isnan(heading) & ((wanted == "any") | (wanted == kind)) & np.isnan(course)
         if recipe.courses is not None:
             good &= np.array(recipe.courses)[combination] == k
-        found = np.where(good, heading, found)
-    return found
+        course = np.where(good, heading, course)
+    return course
 
 
 def _approach(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> Approach:

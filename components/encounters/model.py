@@ -48,8 +48,8 @@ class NetworkNode:
     def probabilities(self) -> FloatArray:
         """Probabilities, shape (columns, size); an empty column holds those of all columns."""
         filled = np.where(self.empty[:, np.newaxis], self.counts.sum(axis=0), self.counts)
-        found: FloatArray = filled / filled.sum(axis=1, keepdims=True)
-        return found
+        result: FloatArray = filled / filled.sum(axis=1, keepdims=True)
+        return result
 
     @cached_property
     def edges(self) -> FloatArray:
@@ -68,10 +68,10 @@ class NetworkNode:
 
     def column(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
         """Return the column for the bins of all variables, each (n,)."""
-        found: AnyArray = np.zeros(np.shape(bins[0]), dtype=np.int64)
+        result: AnyArray = np.zeros(np.shape(bins[0]), dtype=np.int64)
         for parent, stride in zip(self.parents, self.strides, strict=True):
-            found += stride * bins[parent]
-        return found
+            result += stride * bins[parent]
+        return result
 
 
 @dataclass(frozen=True)
@@ -98,25 +98,25 @@ def make_network(
     Counts (m,) are those of all drawn variables, one behind the other, in the order of `drawn`.
     """
     nodes, start = {}, 0
-    for place in drawn:
-        parents = tuple(np.flatnonzero(arrows[:, place]).tolist())
+    for index in drawn:
+        parents = tuple(np.flatnonzero(arrows[:, index]).tolist())
         strides, columns = [], 1
         for parent in parents:
             strides.append(columns)
             columns *= sizes[parent]
-        needed = columns * sizes[place]
+        needed = columns * sizes[index]
         some = counts[start : start + needed]
         if len(some) < needed:
             raise NetworkError(
-                f"{needed} counts are needed ({sizes[place]} bins times {columns} combinations of "
+                f"{needed} counts are needed ({sizes[index]} bins times {columns} combinations of "
                 f"its parents' bins), {len(some)} are left",
-                labels[place],
+                labels[index],
             )
         start += needed
-        table = some.reshape(columns, sizes[place])
+        table = some.reshape(columns, sizes[index])
         if not table.any():
-            raise NetworkError("all its counts are 0", labels[place])
-        nodes[place] = NetworkNode(labels[place], sizes[place], parents, tuple(strides), table)
+            raise NetworkError("all its counts are 0", labels[index])
+        nodes[index] = NetworkNode(labels[index], sizes[index], parents, tuple(strides), table)
     if start < len(counts):
         raise NetworkError(f"{len(counts)} counts stand there, {start} are needed")
     return BayesNetwork(tuple(labels), tuple(sizes), nodes, _order(labels, nodes))
@@ -169,8 +169,8 @@ class Bins:
     @property
     def _around_zero(self) -> BoolArray:
         assert self.edges is not None
-        found: BoolArray = (self.edges[:-1] < 0.0) & (self.edges[1:] > 0.0)
-        return found
+        result: BoolArray = (self.edges[:-1] < 0.0) & (self.edges[1:] > 0.0)
+        return result
 
 
 @dataclass(frozen=True)

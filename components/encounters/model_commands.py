@@ -46,7 +46,7 @@ def sample_tracks(
     out: str,
 ) -> None:
     """Write the tracks that the command line asks for."""
-    found = open_model(model)
+    encounter_model = open_model(model)
     path = named(out)
     check_file(path)
     seconds = int(duration_s)
@@ -58,16 +58,16 @@ def sample_tracks(
     each = _RAW_ROW if raw else _FLOWN_ROW
     if long := foreseen(asked, count * (seconds + 1), *each):
         say(f"note: {long}", err=True)
-    batches = _raw(found, seed, range(first, first + count), seconds)
+    batches = _raw(encounter_model, seed, range(first, first + count), seconds)
     if not raw:
-        batches = _flown(found, seed, range(first, first + count), seconds, dynamics)
+        batches = _flown(encounter_model, seed, range(first, first + count), seconds, dynamics)
     try:
         rows = _write(path, batches)
     except TrackError as error:
         raise UsageError(f"{model}: {error}") from None
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
-    for note in found.notes:
+    for note in encounter_model.notes:
         say(f"note: {note}")
     say(f"{path}: {count} tracks of {seconds} s, {rows} rows")
 
@@ -99,12 +99,12 @@ def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _C
         "track": np.repeat(tracks.numbers, instants),
         "t_s": np.tile(np.arange(instants), len(tracks.numbers)),
     }
-    for place, label in enumerate(model.labels):
-        if place in model.dynamic:
-            values = tracks.changing[:, model.dynamic.index(place)].T.reshape(-1)
+    for index, label in enumerate(model.labels):
+        if index in model.dynamic:
+            values = tracks.changing[:, model.dynamic.index(index)].T.reshape(-1)
         else:
-            values = np.repeat(tracks.initial[place], instants)
-        if model.bins[place].edges is None:
+            values = np.repeat(tracks.initial[index], instants)
+        if model.bins[index].edges is None:
             values = values.astype(np.int64)
         columns[label] = values
     return columns

@@ -38,7 +38,7 @@ _Rows = list[tuple[int, str]]
 
 
 class ModelFileError(ValueError):
-    """A model file cannot be used; the message names the file and the place in it."""
+    """A model file cannot be used; the message names the file, and the part, line or variable."""
 
 
 @read_once(8)
@@ -61,27 +61,27 @@ class _ModelReader:
         return ModelFileError(where + message)
 
     def _parts(self, text: str) -> dict[str, tuple[int, _Rows]]:
-        found: dict[str, tuple[int, _Rows]] = {}
+        parts: dict[str, tuple[int, _Rows]] = {}
         rows: _Rows = []
         for number, line in enumerate(text.split("\n"), start=1):
             stripped = line.strip()
             if stripped.startswith("#"):
                 name = stripped[1:].strip()
-                expected = PARTS[len(found)] if len(found) < len(PARTS) else None
+                expected = PARTS[len(parts)] if len(parts) < len(PARTS) else None
                 if name != expected:
-                    raise self.fail(self._why_not(name, expected, found), number)
+                    raise self.fail(self._why_not(name, expected, parts), number)
                 rows = []
-                found[name] = number, rows
+                parts[name] = number, rows
             elif stripped:
-                if not found:
+                if not parts:
                     raise self.fail(f"the file must begin with the line '# {PARTS[0]}'", number)
                 rows.append((number, stripped))
-        if len(found) < len(PARTS):
-            raise self.fail(f"the file ends before its part '# {PARTS[len(found)]}'")
-        return found
+        if len(parts) < len(PARTS):
+            raise self.fail(f"the file ends before its part '# {PARTS[len(parts)]}'")
+        return parts
 
-    def _why_not(self, name: str, expected: str | None, found: dict[str, tuple[int, _Rows]]) -> str:
-        if name in found:
+    def _why_not(self, name: str, expected: str | None, parts: dict[str, tuple[int, _Rows]]) -> str:
+        if name in parts:
             return f"the part {shown_value(name)} stands there twice"
         if name not in PARTS:
             return f"there is no part {shown_value(name)}{did_you_mean(name, PARTS)}"
@@ -94,10 +94,10 @@ class _ModelReader:
         sizes = self.sizes("r_initial", labels)
         initial = self.network("initial", labels, sizes, range(len(labels)))
         later = self.sizes("r_transition", now)
-        for place, of in [*enumerate(sources), *targets.items()]:
-            if of >= 0 and later[place] != sizes[of]:
+        for index, of in [*enumerate(sources), *targets.items()]:
+            if of >= 0 and later[index] != sizes[of]:
                 raise self.fail(
-                    f"r_transition: variable '{now[place]}' has {later[place]} bins, but "
+                    f"r_transition: variable '{now[index]}' has {later[index]} bins, but "
                     f"'{labels[of]}' has {sizes[of]} in r_initial",
                     self.parts["r_transition"][0],
                 )
@@ -134,7 +134,7 @@ class _ModelReader:
         """Return of each transition variable the initial one, and those at t + 1."""
         number = self.parts["labels_transition"][1][0][0]
         sources, targets = [], {}
-        for place, name in enumerate(now):
+        for index, name in enumerate(now):
             later = name.endswith(_NEXT)
             base = name.removesuffix(_NEXT if later else _NOW).strip()
             if base not in labels:
@@ -146,12 +146,12 @@ class _ModelReader:
             of = labels.index(base)
             sources.append(-1 if later else of)
             if later:
-                targets[place] = of
+                targets[index] = of
         # One that does not change, and of which nothing depends, may be left out.
-        for place, of in targets.items():
+        for index, of in targets.items():
             if f"{labels[of]}{_NOW}" not in now:
                 raise self.fail(
-                    f"labels_transition: '{now[place]}' needs '{labels[of] + _NOW}' beside it",
+                    f"labels_transition: '{now[index]}' needs '{labels[of] + _NOW}' beside it",
                     number,
                 )
         if len(set(sources) - {-1}) + len(targets) != len(now):
@@ -163,35 +163,35 @@ class _ModelReader:
     def numbers(self, part: str, what: str = "numbers") -> FloatArray:
         """Return all numbers of a part; none may be negative or not finite."""
         start, rows = self.parts[part]
-        found: list[float] = []
+        values: list[float] = []
         for number, text in rows:
             words = text.replace(",", " ").split()
             for word in words:
                 value = _number(word)
                 if not (math.isfinite(value) and value >= 0.0):
                     raise self.fail(f"{part}: {shown_value(word)}: {what} of 0 or more", number)
-                found.append(value)
-        if not found:
+                values.append(value)
+        if not values:
             raise self.fail(f"{part}: holds no number: the file is cut short", start)
-        return np.array(found)
+        return np.array(values)
 
     def sizes(self, part: str, labels: tuple[str, ...]) -> tuple[int, ...]:
-        found = self.numbers(part, "must be whole numbers")
+        values = self.numbers(part, "must be whole numbers")
         number = self.parts[part][1][0][0]
-        if len(found) != len(labels):
+        if len(values) != len(labels):
             raise self.fail(
                 f"{part}: {len(labels)} numbers of bins are needed, one for each variable; there "
-                f"are {len(found)}",
+                f"are {len(values)}",
                 number,
             )
-        for value, label in zip(found.tolist(), labels, strict=True):
+        for value, label in zip(values.tolist(), labels, strict=True):
             if value != int(value) or not 1 <= value <= _MOST_BINS:
                 raise self.fail(
                     f"{part}: variable '{label}' has {value:g} bins: must be a whole number of 1 "
                     "or more",
                     number,
                 )
-        return tuple(int(value) for value in found)
+        return tuple(int(value) for value in values)
 
     def network(
         self, which: str, labels: tuple[str, ...], sizes: tuple[int, ...], drawn: range | list[int]
@@ -200,10 +200,10 @@ class _ModelReader:
         part = f"N_{which}"
         counts = self.numbers(part, "must be counts")
         if which == "transition":
-            for place in range(len(labels)):
-                if place not in drawn and arrows[:, place].any():
+            for index in range(len(labels)):
+                if index not in drawn and arrows[:, index].any():
                     raise self.fail(
-                        f"G_transition: variable '{labels[place]}' has parents, but is not drawn: "
+                        f"G_transition: variable '{labels[index]}' has parents, but is not drawn: "
                         f"only variables at {_NEXT} are",
                         self.parts["G_transition"][0],
                     )
@@ -217,16 +217,16 @@ class _ModelReader:
         count = len(labels)
         if len(rows) != count:
             raise self.fail(f"{part}: {count} rows are needed, there are {len(rows)}", start)
-        found = np.zeros((count, count), dtype=np.int64)
-        for place, (number, text) in enumerate(rows):
+        arrows = np.zeros((count, count), dtype=np.int64)
+        for index, (number, text) in enumerate(rows):
             words = text.replace(",", " ").split()
             if len(words) != count or set(words) - {"0", "1"}:
                 raise self.fail(
-                    f"{part}: variable '{labels[place]}': {count} values of 0 or 1 are needed",
+                    f"{part}: variable '{labels[index]}': {count} values of 0 or 1 are needed",
                     number,
                 )
-            found[place] = [int(word) for word in words]
-        return found
+            arrows[index] = [int(word) for word in words]
+        return arrows
 
     def bins(self, labels: tuple[str, ...], sizes: tuple[int, ...]) -> tuple[Bins, ...]:
         start, rows = self.parts["boundaries"]
@@ -236,10 +236,10 @@ class _ModelReader:
                 f"{len(rows)}",
                 start,
             )
-        found = []
+        bins = []
         for label, size, (number, text) in zip(labels, sizes, rows, strict=True):
             if text == "*":
-                found.append(Bins(None, size))
+                bins.append(Bins(None, size))
                 continue
             edges = np.array([_number(word) for word in text.replace(",", " ").split()])
             if len(edges) != size + 1:
@@ -252,8 +252,8 @@ class _ModelReader:
                 raise self.fail(
                     f"boundaries: variable '{label}': edges must be rising numbers", number
                 )
-            found.append(Bins(edges, size))
-        return tuple(found)
+            bins.append(Bins(edges, size))
+        return tuple(bins)
 
     def rates(self, labels: tuple[str, ...]) -> FloatArray:
         rates = self.numbers("resample_rates", "must be probabilities")

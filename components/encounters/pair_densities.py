@@ -50,9 +50,9 @@ class StepDensity:
 
     def at(self, x: FloatArray) -> FloatArray:
         """Return the value at x; outside the edges that of the nearest step."""
-        place = np.searchsorted(self.edges, x, side="right") - 1
-        found: FloatArray = self.heights[np.clip(place, 0, len(self.heights) - 1)]
-        return found
+        index = np.searchsorted(self.edges, x, side="right") - 1
+        result: FloatArray = self.heights[np.clip(index, 0, len(self.heights) - 1)]
+        return result
 
 
 #: Edges of miss distances: farther than any aircraft sees another.
@@ -152,5 +152,5 @@ def speeds_over_directions(first: FloatArray, second: FloatArray, climb: FloatAr
     from scipy.special import ellipe
 
     largest = (first + second) ** 2 + climb**2
-    found: FloatArray = 4.0 * np.sqrt(largest) * ellipe(4.0 * first * second / largest)
-    return found
+    result: FloatArray = 4.0 * np.sqrt(largest) * ellipe(4.0 * first * second / largest)
+    return result

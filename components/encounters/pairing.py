@@ -7,7 +7,7 @@ is a proposal that is accepted or drawn again under the next attempt number:
 2. The vertical miss distance at the closest approach is accepted with probability P(vmd). Of two
    tracks the altitude in its layer is uniform and says nothing of how they fly, so it is drawn
    here, given that, from what P leaves of its layer. That accepts the same pairs with the same
-   chance, and most that fail are found out before they have been flown.
+   chance, and most that fail are rejected before they have been flown.
 3. The intruder's course is uniform, accepted with |v_rel(ψ)| / |v_rel(head-on)|.
 4. The signed horizontal miss distance has the density q.
 5. The weight undoes 2 to 4: w = S [1 / (2 · 60761 ft)] / q(hmd) / P(vmd), where S is the relative
@@ -218,7 +218,7 @@ class PairSampler:
         vertical: FloatArray,
         drawn: FloatArray,
     ) -> Pairs:
-        """Fly both tracks through their places at the closest approach."""
+        """Fly both tracks through their positions at the closest approach."""
         cpa = self.rules.closest_s
         flown = [
             fly_euler(c.altitude_ft, c.speed_ft_s, c.acceleration_ft_s2, c.climb_ft_s, c.turn_rad_s)
@@ -232,12 +232,12 @@ class PairSampler:
         north = second * np.cos(course) - first
         east = second * np.sin(course)
         relative = np.maximum(np.hypot(north, east), 1e-9)
-        places = (
+        positions = (
             (np.zeros_like(first), np.zeros_like(first)),
             (horizontal * east / relative, -horizontal * north / relative),
         )
         norths, easts, headings = [], [], []
-        for f, at, wanted in zip(flown, places, (0.0, course), strict=True):
+        for f, at, wanted in zip(flown, positions, (0.0, course), strict=True):
             turned = wanted - f.heading_rad[cpa]
             n, e = f.north_ft - f.north_ft[cpa], f.east_ft - f.east_ft[cpa]
             cos, sin = np.cos(turned), np.sin(turned)
@@ -304,17 +304,17 @@ def _course(
     At least 64 in 100 uniform courses are accepted, so of as many as are drawn one always is.
     """
     most = (first + second) ** 2 + climb**2
-    found = np.zeros_like(first)
+    result = np.zeros_like(first)
     left: BoolArray = np.ones(len(first), dtype=np.bool_)
     for k in range(_COURSES):
         course = 2.0 * np.pi * drawn[2 * k]
         squared = first**2 + second**2 - 2.0 * first * second * np.cos(course) + climb**2
         take = left & (drawn[2 * k + 1] ** 2 * most <= squared)
-        found = np.where(take, course, found)
+        result = np.where(take, course, result)
         left &= ~take
         if not left.any():
             break
-    return found
+    return result
 
 
 def set_of_pairs(

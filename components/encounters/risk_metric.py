@@ -14,7 +14,6 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.flown_flights import read_flights
 from components.metrics.losses import nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
@@ -53,9 +52,9 @@ class EncounterWeight(Metric):
         numbers, weights, families = np.empty((3, len(group)))
         for row, scene in enumerate(group.scenes):
             block = traffic_block(scene)
-            found, place = chosen_encounter(block.cls, block.parameters)
-            numbers[row], weights[row] = found.numbers[place], found.weights[place]
-            families[row] = found.extra.get(FAMILY, found.numbers)[place]
+            encounter_set, index = chosen_encounter(block.cls, block.parameters)
+            numbers[row], weights[row] = encounter_set.numbers[index], encounter_set.weights[index]
+            families[row] = encounter_set.extra.get(FAMILY, encounter_set.numbers)[index]
         return {
             "encounter": numbers, "encounter_weight": weights, "encounter_family": families,
         }  # fmt: skip
@@ -66,7 +65,7 @@ BEARINGS = ("ahead", "right", "behind", "left")
 _CLASSES = {"geometry": GEOMETRIES, "bearing": BEARINGS}
 _EVENTS = ("nmac", "well_clear_lost")
 # Of needless manoeuvres.
-_KEPT, _TOLD, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
+_KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # Courses are taken over this time to both sides of the closest approach.
 _BASE_S = 0.5
 
@@ -98,19 +97,19 @@ class RiskRatios(Mitigated):
 
     def results(self) -> list[Result]:
         """Return flags, encounter and weight, classes, and the ratios of all and of each class."""
-        found = super().results()
+        result = super().results()
         weight = cluster = None
         if self._weight is not None:
-            found += self._weight.results()
+            result += self._weight.results()
             weight, cluster = "encounter_weight", "encounter_family"
         for by in self.p.by:
-            found.append(Result(f"encounter_{by}", CLASS, f"class of its {by}"))
+            result.append(Result(f"encounter_{by}", CLASS, f"class of its {by}"))
         for name in _EVENTS:
             flags = f"{name}_nominal", f"{name}_mitigated"
             said = "share of the risk that is left"
             of = RatioOf(*flags, weight, cluster)
-            found.append(Result(f"{name}_risk_ratio", RATIO, said, ratio=of))
-            found += [
+            result.append(Result(f"{name}_risk_ratio", RATIO, said, ratio=of))
+            result += [
                 Result(
                     f"{name}_risk_ratio.{kind.replace(' ', '_')}", RATIO, f"{said}, {kind}",
                     ratio=RatioOf(*flags, weight, cluster, (f"encounter_{by}", kind)),
@@ -119,40 +118,40 @@ class RiskRatios(Mitigated):
             ]  # fmt: skip
         if self.p.needless:
             said = "share with a manoeuvre of the encounters that stay well clear without any"
-            found += [
+            result += [
                 Result(_KEPT, EVENT, "without manoeuvres, well clear is kept"),
-                Result(_TOLD, EVENT, "the ownship is told to manoeuvre"),
+                Result(_COMMANDED, EVENT, "the ownship is told to manoeuvre"),
                 Result(_NEEDLESS, EVENT, "it is told to, and well clear is kept without"),
                 Result("needless_manoeuvre_share", RATIO, said,
                        ratio=RatioOf(_KEPT, _NEEDLESS, weight, cluster, share=True)),
             ]  # fmt: skip
-        return found
+        return result
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all but the ratios for every replica."""
-        found = dict(super().measure(group))
+        result = dict(super().measure(group))
         if self.p.needless:
-            told = np.zeros(len(group))
-            told[list(self._steering.of(group))] = 1.0
-            kept = 1.0 - found["well_clear_lost_nominal"]
-            found |= {_KEPT: kept, _TOLD: told, _NEEDLESS: kept * told}
+            commanded = np.zeros(len(group))
+            commanded[list(self.manoeuvres(group))] = 1.0
+            kept = 1.0 - result["well_clear_lost_nominal"]
+            result |= {_KEPT: kept, _COMMANDED: commanded, _NEEDLESS: kept * commanded}
         if self._weight is not None:
-            found |= self._weight.measure(group)
+            result |= self._weight.measure(group)
         if self.p.by:
-            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg)
+            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)
                 column[np.isnan(course_deg)] = None
-                found[f"encounter_{by}"] = column
-        return found
+                result[f"encounter_{by}"] = column
+        return result
 
 
 def side_of(bearing_deg: FloatArray) -> AnyArray:
     """Return in which sector of 90° each bearing lies: ahead, right, behind or left."""
     sector = np.floor((np.nan_to_num(bearing_deg) + 45.0) % 360.0 / 90.0).astype(int)
-    found: AnyArray = np.array(BEARINGS)[sector]
-    return found
+    result: AnyArray = np.array(BEARINGS)[sector]
+    return result
 
 
 def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
@@ -164,19 +163,19 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     """
     flights = [flight for run in runs for flight in run]
     distance_m, time_s = nearest_of(flights)
-    found = np.full((2, len(runs)), np.nan)
+    angles = np.full((2, len(runs)), np.nan)
     met: list[int] = []
     nearest: list[int] = []
     start = 0
     for number, run in enumerate(runs):
-        place = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
-        if run and np.isfinite(distance_m[place]):
+        index = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
+        if run and np.isfinite(distance_m[index]):
             met.append(number)
-            nearest.append(place)
+            nearest.append(index)
         start += len(run)
-    ways = ways_of([flights[place] for place in nearest], time_s[nearest], _BASE_S)
+    ways = ways_of([flights[index] for index in nearest], time_s[nearest], _BASE_S)
     for number, own, other in zip(met, *(way.T.tolist() for way in ways), strict=True):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
         closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-        found[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
-    return found
+        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    return angles

@@ -43,10 +43,10 @@ class EncounterDraws:
             (blocks, attempt & low, number & low, number >> np.uint64(32)), self._short_key
         )
         pairs = ((words[0], words[1]), (words[2], words[3]))
-        found = np.empty((2 * len(blocks), len(number)))
+        result = np.empty((2 * len(blocks), len(number)))
         for k, (high, rest) in enumerate(pairs):
-            found[k::2] = ((high >> np.uint64(5)) * 67108864.0 + (rest >> np.uint64(6))) * 2.0**-53
-        return found[:count]
+            result[k::2] = ((high >> np.uint64(5)) * 67108864.0 + (rest >> np.uint64(6))) * 2.0**-53
+        return result[:count]
 
     def uniform(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
         """Return draws in [0, 1) with 53 bits, shape (count, encounters)."""
@@ -59,7 +59,7 @@ class EncounterDraws:
             "buffer_pos": 4, "has_uint32": 0, "uinteger": 0,
         }  # fmt: skip
         generator = self._generator
-        found, drawn = np.empty((count, len(numbers))), np.empty((_BLOCK, count))
+        result, drawn = np.empty((count, len(numbers))), np.empty((_BLOCK, count))
         # Turned in blocks that stay in the processor's cache.
         for start in range(0, len(numbers), _BLOCK):
             end = min(start + _BLOCK, len(numbers))
@@ -67,8 +67,8 @@ class EncounterDraws:
                 counter[1], counter[2] = numbers[row], tries[row]
                 generator.state = state
                 self._numbers.random(out=drawn[row - start])
-            found[:, start:end] = drawn[: end - start].T
-        return found
+            result[:, start:end] = drawn[: end - start].T
+        return result
 
 
 #: Tracks that are sampled together: their arrays stay in the processor's cache.
@@ -90,12 +90,12 @@ class SampledTracks:
     left: FloatArray
     changing: FloatArray
 
-    def put(self, places: IntArray, others: "SampledTracks", which: BoolArray) -> None:
-        """Put some of other tracks in these places."""
-        self.initial[:, places] = others.initial[:, which]
-        self.initial_bins[:, places] = others.initial_bins[:, which]
-        self.left[:, places] = others.left[:, which]
-        self.changing[:, :, places] = others.changing[:, :, which]
+    def put(self, indices: IntArray, others: "SampledTracks", which: BoolArray) -> None:
+        """Put some of other tracks at these indices."""
+        self.initial[:, indices] = others.initial[:, which]
+        self.initial_bins[:, indices] = others.initial_bins[:, which]
+        self.left[:, indices] = others.left[:, which]
+        self.changing[:, :, indices] = others.changing[:, :, which]
 
 
 class TrackSampler:
@@ -108,8 +108,8 @@ class TrackSampler:
         self._width = [bins.width for bins in model.bins]
         dynamic = model.dynamic
         self._steps = [
-            _Step(model, place, dynamic.index(model.targets[place]))
-            for place in model.transition.order
+            _Step(model, index, dynamic.index(model.targets[index]))
+            for index in model.transition.order
         ]
 
     def sample(self, numbers: Ints, seconds: int, attempts: Ints | int = 0) -> SampledTracks:
@@ -119,18 +119,18 @@ class TrackSampler:
         uniform = self._draws.few(numbers, variables, attempts)
         bins: IntArray = np.zeros((variables, len(numbers)), dtype=np.int64)
         values, left = np.zeros((2, variables, len(numbers)))
-        for place in model.initial.order:
-            node = model.initial.nodes[place]
-            mine, left[place] = _drawn(node, node.column(bins), uniform[place])
-            bins[place] = mine
-            values[place] = self._low[place][mine] + self._width[place][mine] * left[place]
+        for index in model.initial.order:
+            node = model.initial.nodes[index]
+            mine, left[index] = _drawn(node, node.column(bins), uniform[index])
+            bins[index] = mine
+            values[index] = self._low[index][mine] + self._width[index][mine] * left[index]
         over_time = np.empty((seconds + 1, changing, len(numbers)))
         over_time[0] = values[list(model.dynamic)]
         # Places in the transition network: variables at t, static ones among them, and at t + 1.
         now: IntArray = np.zeros((len(model.sources), len(numbers)), dtype=np.int64)
-        for place, source in enumerate(model.sources):
+        for index, source in enumerate(model.sources):
             if source >= 0:
-                now[place] = bins[source]
+                now[index] = bins[source]
         count = seconds * changing
         drawn = self._draws.uniform(numbers, count, attempts) if count else np.empty((0, 0))
         rows = drawn.reshape(seconds, changing, len(numbers))
@@ -139,7 +139,7 @@ class TrackSampler:
             for step, column in zip(self._steps, fixed, strict=True):
                 step.take(now, column, row, over_time[second - 1], over_time[second])
             for step in self._steps:
-                now[step.before] = now[step.place]
+                now[step.before] = now[step.index]
         return SampledTracks(np.asarray(numbers, dtype=np.int64), values, bins, left, over_time)
 
     def batches(self, numbers: range, seconds: int) -> Iterator[SampledTracks]:
@@ -151,11 +151,11 @@ class TrackSampler:
 class _Step:
     """Draws one dynamic variable at t + 1 for all tracks."""
 
-    def __init__(self, model: EncounterModel, place: int, row: int) -> None:
-        self.place, self._row = place, row
-        variable = model.targets[place]
+    def __init__(self, model: EncounterModel, index: int, row: int) -> None:
+        self.index, self._row = index, row
+        variable = model.targets[index]
         self.before = model.sources.index(variable)
-        self._node = node = model.transition.nodes[place]
+        self._node = node = model.transition.nodes[index]
         moves = {model.sources.index(of) for of in model.targets.values()} | set(model.targets)
         parts = list(zip(node.parents, node.strides, strict=True))
         self._static = [part for part in parts if part[0] not in moves]
@@ -172,10 +172,10 @@ class _Step:
 
     def fixed(self, now: IntArray) -> IntArray:
         """Return what static parents add to the columns, which stays for all of a track."""
-        found: IntArray = np.zeros(now.shape[1], dtype=np.int64)
+        result: IntArray = np.zeros(now.shape[1], dtype=np.int64)
         for parent, stride in self._static:
-            found += stride * now[parent]
-        return found
+            result += stride * now[parent]
+        return result
 
     def take(
         self,
@@ -194,7 +194,7 @@ class _Step:
         cell = column * node.size + present
         left = (u - self._begin.take(cell)) * self._each.take(cell)
         value = after[self._row]
-        now[self.place] = present
+        now[self.index] = present
         value[:] = before[self._row]
         # Those below 0 have left their bin: they get their values further down.
         if self._rate > 0.0:
@@ -204,7 +204,7 @@ class _Step:
         moved = ((left < 0.0) | (left >= 1.0)).nonzero()[0]
         if len(moved):
             bins, rest = _drawn(node, column[moved], u[moved])
-            now[self.place, moved] = bins
+            now[self.index, moved] = bins
             value[moved] = self._low[bins] + self._width[bins] * rest
 
 

@@ -39,35 +39,35 @@ def convert_sets(
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
     check_file(path)
     try:
-        found = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
+        encounters = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
         if weights is not None:
-            found = replace(found, weights=_weights(weights, found))
+            encounters = replace(encounters, weights=_weights(weights, encounters))
         if path.suffix.lower() == SET:
-            write_set(path, {"made_by": "conversion"}, [found])
+            write_set(path, {"made_by": "conversion"}, [encounters])
         else:
-            write_file(path, waypoints_of(found))
+            write_file(path, waypoints_of(encounters))
     except InputFileError as error:
         raise UsageError(str(error)) from None
     except EncounterSetError as error:
         raise UsageError(*str(error).split("\n")) from None
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
-    say(f"{path}: {len(found)} encounters")
-    if found.skipped:
-        say(f"{found.skipped} damaged encounters were skipped")
+    say(f"{path}: {len(encounters)} encounters")
+    if encounters.skipped:
+        say(f"{encounters.skipped} damaged encounters were skipped")
 
 
-def _weights(text: str, found: EncounterSet) -> FloatArray:
+def _weights(text: str, encounters: EncounterSet) -> FloatArray:
     """Return the weights that a table with the columns ``encounter`` and ``weight`` gives."""
     table = read_table(text)
     number, wrong = numbers(table, "encounter", "--weights", flag=False)
     weight, also = numbers(table, "weight", "--weights", flag=False)
     kept_rows(table, [wrong, also], skip=False)
     known = dict(zip(number.astype(np.int64).tolist(), weight.tolist(), strict=True))
-    missing = [n for n in found.numbers.tolist() if n not in known]
+    missing = [n for n in encounters.numbers.tolist() if n not in known]
     if missing:
         raise UsageError(f"{text}: encounter {missing[0]}: weight is missing")
-    weights = np.array([known[n] for n in found.numbers.tolist()])
+    weights = np.array([known[n] for n in encounters.numbers.tolist()])
     if not (weights > 0.0).any():
         raise UsageError(f"{text}: all weights are 0")
     return weights
@@ -92,15 +92,15 @@ class Closest:
     course_deg: FloatArray
 
 
-def closest_approaches(found: EncounterSet, places: Sequence[int]) -> Closest:
+def closest_approaches(encounters: EncounterSet, indices: Sequence[int]) -> Closest:
     """Return the closest approaches of some encounters, exact along straight paths in the plane."""
-    rows = [_closest(found, place) for place in places]
-    return Closest(found.weights[list(places)], *np.array(rows).T)
+    rows = [_closest(encounters, index) for index in indices]
+    return Closest(encounters.weights[list(indices)], *np.array(rows).T)
 
 
-def _closest(found: EncounterSet, place: int) -> tuple[float, ...]:
+def _closest(encounters: EncounterSet, index: int) -> tuple[float, ...]:
     best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
-    for both, a, b in found.together(place):
+    for both, a, b in encounters.together(index):
         if len(both) < 2:
             continue
         apart, step = b - a, np.diff(b - a)
@@ -129,26 +129,31 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
         check_ending(path, PICTURES, "--figure")
         check_file(path, "--figure")
     try:
-        found = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
+        encounters = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
-    places = np.unique(np.linspace(0, len(found) - 1, min(most, len(found))).astype(int)).tolist()
-    closest = closest_approaches(found, places)
-    total, squares = math.fsum(found.weights), math.fsum(found.weights**2)
-    say(f"{found.source}: {len(found)} encounters of {found.kind}, {len(found.names)} flights")
+    indices = np.unique(
+        np.linspace(0, len(encounters) - 1, min(most, len(encounters))).astype(int)
+    ).tolist()
+    closest = closest_approaches(encounters, indices)
+    total, squares = math.fsum(encounters.weights), math.fsum(encounters.weights**2)
+    say(
+        f"{encounters.source}: {len(encounters)} encounters of {encounters.kind}, "
+        f"{len(encounters.names)} flights"
+    )
     say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
         else "all weights are 0")  # fmt: skip
-    if found.skipped:
-        say(f"{found.skipped} damaged encounters were skipped")
-    if len(places) < len(found):
-        say(f"closest approaches of {len(places)} of them, evenly spread")
+    if encounters.skipped:
+        say(f"{encounters.skipped} damaged encounters were skipped")
+    if len(indices) < len(encounters):
+        say(f"closest approaches of {len(indices)} of them, evenly spread")
     headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]
     print_table(console(), "", headings, _rows(closest), right=range(1, 5))
     print_table(console(), "", ["geometry", "encounters", "share of the weight"],
                 _classes(closest), right=range(1, 3))  # fmt: skip
     if path is not None:
         try:
-            _draw(found, places, closest, path)
+            _draw(encounters, indices, closest, path)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
         say(f"{path}")
@@ -177,7 +182,7 @@ def _classes(c: Closest) -> list[list[str]]:
     ]
 
 
-def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> None:
+def _draw(encounters: EncounterSet, indices: list[int], c: Closest, path: Path) -> None:
     """Draw histograms of the geometry, as drawn and as weighted, and a plan of a sample."""
     from dsa_des.record.drawing import drawing
 
@@ -205,10 +210,10 @@ def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> Non
             axis.set_ylabel("share of the encounters")
         axes.flat[0].legend()
         plan = axes.flat[5]
-        for place in places[:: max(1, len(places) // _DRAWN)][:_DRAWN]:
-            rows = range(int(found.first_rows[place]), int(found.first_rows[place + 1]))
+        for index in indices[:: max(1, len(indices) // _DRAWN)][:_DRAWN]:
+            rows = range(int(encounters.first_rows[index]), int(encounters.first_rows[index + 1]))
             for k, row in enumerate(rows):
-                _, north, east, _ = found.path(row)
+                _, north, east, _ = encounters.path(row)
                 plan.plot(
                     east / 1000, north / 1000, lw=0.8, color="#08519c" if k == 0 else "#d94801"
                 )
@@ -235,26 +240,27 @@ def split_encounters(
     check_ending(path, [SET])
     check_file(path)
     try:
-        found = read_set(resolve_home(file))
+        encounters = read_set(resolve_home(file))
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
     if scores is None or score is None:
-        near = np.array([nearness(found, place) for place in range(len(found))])
+        near = np.array([nearness(encounters, index) for index in range(len(encounters))])
     else:
-        near = _scores(scores, score, found)
+        near = _scores(scores, score, encounters)
     try:
         expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
     except ValueError as error:
         raise UsageError(f"--levels {levels} --copies {copies}: {error}") from None
-    lengths = np.diff(found.starts[found.first_rows])
+    lengths = np.diff(encounters.starts[encounters.first_rows])
     refuse_samples(f"--copies {copies}", float(np.sum(expected * lengths)))
-    made = split_set(found, expected, seed)
+    made = split_set(encounters, expected, seed)
     if not len(made):
         raise UsageError(f"{file}: no encounter is left; more copies are needed")
     write_set(path, {"made_by": "splitting", "of": str(file), "seed": seed}, [made])
     families = len(np.unique(made.extra["family"]))
-    say(f"{path}: {len(made)} encounters, copies of {families} of {len(found)}")
-    say(f"sum of weights {math.fsum(made.weights):.6g}, of the set {math.fsum(found.weights):.6g}")
+    say(f"{path}: {len(made)} encounters, copies of {families} of {len(encounters)}")
+    sums = math.fsum(made.weights), math.fsum(encounters.weights)
+    say(f"sum of weights {sums[0]:.6g}, of the set {sums[1]:.6g}")
 
 
 def _numbers(option: str, text: str) -> FloatArray:
@@ -264,7 +270,7 @@ def _numbers(option: str, text: str) -> FloatArray:
         raise UsageError(f"{option} {text}: must be numbers with commas between them") from None
 
 
-def _scores(text: str, column: str, found: EncounterSet) -> FloatArray:
+def _scores(text: str, column: str, encounters: EncounterSet) -> FloatArray:
     """Return each encounter's least value in a table or a study's folder."""
     table = read_table(text)
     number, wrong = numbers(table, "encounter", "--scores", flag=False)
@@ -273,7 +279,7 @@ def _scores(text: str, column: str, found: EncounterSet) -> FloatArray:
     least: dict[int, float] = {}
     for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
         least[n] = min(v, least.get(n, math.inf))
-    missing = [n for n in found.numbers.tolist() if n not in least]
+    missing = [n for n in encounters.numbers.tolist() if n not in least]
     if missing:
         raise UsageError(f"{text}: encounter {missing[0]}: {column} is missing")
-    return np.array([least[n] for n in found.numbers.tolist()])
+    return np.array([least[n] for n in encounters.numbers.tolist()])

@@ -41,32 +41,32 @@ def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) 
     if np.isnan(scores).any():
         raise ValueError("a score is missing")
     stage = (scores[:, np.newaxis] < levels).sum(axis=1)
-    found: FloatArray = copies[stage]
-    return found
+    result: FloatArray = copies[stage]
+    return result
 
 
 def drawn_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
     """Return how many copies there are of each: the whole part, and one more by chance."""
     uniform = EncounterDraws(seed, "splitting").few(numbers, 1)[0]
-    found: IntArray = np.floor(expected).astype(np.int64) + (uniform < expected % 1.0)
-    return found
+    result: IntArray = np.floor(expected).astype(np.int64) + (uniform < expected % 1.0)
+    return result
 
 
-def split_set(found: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
+def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
     """Return a set of copies, numbered from 0, that know their family."""
-    many = drawn_copies(found.numbers, expected, seed)
-    places = np.repeat(np.arange(len(found)), many)
-    family: AnyArray = found.extra.get(FAMILY, found.numbers)
-    made = found.take(places)
+    many = drawn_copies(encounters.numbers, expected, seed)
+    indices = np.repeat(np.arange(len(encounters)), many)
+    family: AnyArray = encounters.extra.get(FAMILY, encounters.numbers)
+    made = encounters.take(indices)
     return replace(
         made,
-        numbers=np.arange(len(places)),
-        weights=(found.weights / expected)[places],
-        extra=made.extra | {FAMILY: family[places]},
+        numbers=np.arange(len(indices)),
+        weights=(encounters.weights / expected)[indices],
+        extra=made.extra | {FAMILY: family[indices]},
     )
 
 
-def nearness(found: EncounterSet, place: int) -> float:
+def nearness(encounters: EncounterSet, index: int) -> float:
     """Return how near an encounter's flights come, in sizes of the NMAC cylinder.
 
     The least, over the times of both paths' samples and over intruders, of the larger of horizontal
@@ -74,7 +74,7 @@ def nearness(found: EncounterSet, place: int) -> float:
     between two samples is left out: it is a score, and no estimate rests on it.
     """
     best = np.inf
-    for times, own, other in found.together(place):
+    for times, own, other in encounters.together(index):
         if len(times):
             north, east, up = other - own
             horizontal = np.hypot(north, east) / _NMAC.horizontal_m

@@ -105,9 +105,9 @@ class TrackRules:
             self._speed_ft_s[0] = np.maximum(self._speed_ft_s[0], _SLOWEST_FIXED_WING_FT_S)
 
     def _at(self, label: str) -> int:
-        place = self.model.index_of(label)
-        assert place is not None
-        return place
+        index = self.model.index_of(label)
+        assert index is not None
+        return index
 
     def layers_ft(self, tracks: SampledTracks) -> tuple[FloatArray, FloatArray]:
         """Return the edges of the altitude layer of each track."""
@@ -117,8 +117,8 @@ class TrackRules:
     def altitude_ft(self, tracks: SampledTracks) -> FloatArray:
         """Return altitudes at time 0, uniform in their layers."""
         low, high = self.layers_ft(tracks)
-        found: FloatArray = low + (high - low) * tracks.left[self._layer]
-        return found
+        result: FloatArray = low + (high - low) * tracks.left[self._layer]
+        return result
 
     def commands(self, tracks: SampledTracks) -> Commands:
         """Return what tracks command, in feet and seconds."""
@@ -131,12 +131,12 @@ class TrackRules:
         )
 
     def _over_time(self, tracks: SampledTracks, label: str) -> FloatArray:
-        place, dynamic = self._at(label), self.model.dynamic
-        if place in dynamic:
-            found: FloatArray = tracks.changing[:, dynamic.index(place)]
-            return found
+        index, dynamic = self._at(label), self.model.dynamic
+        if index in dynamic:
+            result: FloatArray = tracks.changing[:, dynamic.index(index)]
+            return result
         return np.broadcast_to(
-            tracks.initial[place], (len(tracks.changing), len(tracks.numbers))
+            tracks.initial[index], (len(tracks.changing), len(tracks.numbers))
         ).copy()
 
     def accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
@@ -161,37 +161,37 @@ class TrackRules:
     def steepest_ft_s(self, tracks: SampledTracks) -> FloatArray:
         """Return the largest vertical rate that is accepted of each track."""
         # Rounding alone must not reject the value on the edge itself.
-        found: FloatArray = self._climb_ft_s[self._combination(tracks)] * (1.0 + 1e-9)
-        return found
+        result: FloatArray = self._climb_ft_s[self._combination(tracks)] * (1.0 + 1e-9)
+        return result
 
     def _combination(self, tracks: SampledTracks) -> IntArray:
         """Return the number of each track's area, airspace and layer."""
-        found: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
-        for place in self._given:
-            found = found * self.model.initial.sizes[place] + tracks.initial_bins[place]
-        return found
+        result: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
+        for index in self._given:
+            result = result * self.model.initial.sizes[index] + tracks.initial_bins[index]
+        return result
 
     def _limits(self, label: str) -> FloatArray:
         """Return the upper edges of the bins with both points, (2, areas x airspaces x layers)."""
-        place = self._at(label)
-        edges = self.model.bins[place].edges
+        index = self._at(label)
+        edges = self.model.bins[index].edges
         if edges is None:
             raise TrackError(f"variable {label!r} has no edges: its values are no rates")
-        table = conditional(self.model.initial, self._given, place)
+        table = conditional(self.model.initial, self._given, index)
         summed = np.cumsum(table, axis=1)
         low, high = (np.argmax(summed >= share - 1e-12, axis=1) for share in _SHARES)
-        found = np.stack([edges[low + 1], edges[high + 1]])
+        result = np.stack([edges[low + 1], edges[high + 1]])
         # Where both points lie in one bin, all of the bin is usual.
-        found[0] = np.where(low == high, edges[low], found[0])
-        return found
+        result[0] = np.where(low == high, edges[low], result[0])
+        return result
 
 
-def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArray:
+def conditional(network: BayesNetwork, given: list[int], index: int) -> FloatArray:
     """Return the exact distribution of a variable given some others, (combinations, bins).
 
     The last one given runs fastest; combinations that cannot be have the distribution over all.
     """
-    needed, todo = set(), [*given, place]
+    needed, todo = set(), [*given, index]
     while todo:
         item = todo.pop()
         if item not in needed:
@@ -200,7 +200,7 @@ def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArr
     order = sorted(needed)
     sizes = [network.sizes[item] for item in order]
     if np.prod(sizes, dtype=float) > _MOST_CELLS:
-        raise TrackError(f"variable {network.labels[place]!r} depends on too many others")
+        raise TrackError(f"variable {network.labels[index]!r} depends on too many others")
     cells = np.indices(sizes).reshape(len(order), -1)
     bins = {item: cells[k] for k, item in enumerate(order)}
     chance = np.ones(cells.shape[1])
@@ -214,12 +214,12 @@ def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArr
     count = 1
     for item in given:
         row, count = row * network.sizes[item] + bins[item], count * network.sizes[item]
-    size = network.sizes[place]
-    joint = np.bincount(row * size + bins[place], weights=chance, minlength=count * size)
+    size = network.sizes[index]
+    joint = np.bincount(row * size + bins[index], weights=chance, minlength=count * size)
     table = joint.reshape(count, size)
     table = np.where(table.sum(axis=1, keepdims=True) > 0.0, table, table.sum(axis=0))
-    found: FloatArray = table / table.sum(axis=1, keepdims=True)
-    return found
+    result: FloatArray = table / table.sum(axis=1, keepdims=True)
+    return result
 
 
 def accepted_tracks(

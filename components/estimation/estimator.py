@@ -271,9 +271,11 @@ def pair_measurement(
             spread[i] += selected(weight * expected.total[i, i], track)
     new = variance_of_what_is_new(variance, common, spread)
     learning = [one.innovation(new, track) for one in moments]
-    odds = np.empty_like(likelihoods)
-    for i, (one, apart) in enumerate(zip(learning, residuals, strict=True)):
-        odds[i] = log_likelihood(one, distance_squared(one.root, apart))
+    odds = None
+    if len(learning) > 1:  # the odds of a single model are known
+        odds = np.empty_like(likelihoods)
+        for i, (one, apart) in enumerate(zip(learning, residuals, strict=True)):
+            odds[i] = log_likelihood(one, distance_squared(one.root, apart))
     return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
 

@@ -10,26 +10,16 @@ from components.display.recorded_run import RecordedTables
 
 @dataclass
 class Alert:
-    """An alert of a target, or of a track, from when its level rises above 0 until it is 0 again.
-
-    Parameters
-    ----------
-    block : str
-        The alerting block.
-    target : str or None
-        The target; of a track the one it was near when the alert came, None for none.
-    track : int or None
-        The tracker's number, where alerts are of tracks.
-    levels : list of (time_s, level)
-        The changes, the first when the alert came.
-    end_s : float or None
-        When it ended; None if it lasts until the run ends.
-    """
+    """An alert of a target or a track, from when its level rises above 0 until it is 0 again."""
 
     block: str
+    #: Of a track the one it was near when the alert came, None for none.
     target: str | None
+    #: The tracker's number, where alerts are of tracks.
     track: int | None
+    #: Time, s, and level of each change, the first when the alert came.
     levels: list[tuple[float, int]]
+    #: None if it lasts until the run ends.
     end_s: float | None = None
 
     @property
@@ -60,7 +50,7 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
     if "alerts" not in run.tables:
         return []
     on: dict[Any, Alert] = {}
-    found = []
+    result = []
     rows = sorted(run.tables["alerts"].to_pylist(), key=_look)
     for (time_s, block), look in groupby(rows, key=_look):
         now = {(block, _about(row)): row for row in look}
@@ -74,10 +64,10 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
                     on.pop(about).end_s = time_s
             elif about not in on:
                 on[about] = Alert(block, row["target"], row.get("track"), [(time_s, level)])
-                found.append(on[about])
+                result.append(on[about])
             elif on[about].levels[-1][1] != level:
                 on[about].levels.append((time_s, level))
-    return found
+    return result
 
 
 def _look(row: dict[str, Any]) -> tuple[float, str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.display.picture import sights
 from components.display.recorded_run import OWNSHIP, RecordedTables
-from components.export.track_places import POSE, estimated_places, held_places
+from components.export.track_positions import POSE, estimated_positions, held_positions
 from components.formats.asterix_records import (
     ADS_B,
     NORTH_MARKER,
@@ -64,7 +64,7 @@ def asterix_bytes(run: RecordedTables) -> bytes:
 
 
 def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give a north marker with the radar's place for each of its scans, and its plots."""
+    """Give a north marker with the position of the radar for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = [run.numbers("detections", n) for n in ("azimuth_rad", "elevation_rad", "range_m")]
@@ -122,13 +122,13 @@ def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecor
     reported = {name: run.numbers("detections", f"reported_{name}") for name in names}
     address = run.values("detections", "address")
     blocks, targets = (run.texts("detections", name) for name in ("block", "target"))
-    told: set[tuple[str, int, float]] = set()
+    sent: set[tuple[str, int, float]] = set()
     for row in np.flatnonzero(_says_where(run)).tolist():
         say = {name: float(values[row]) for name, values in reported.items()}
         key = blocks[row] or "", int(address[row]), say["s"]
-        if key in told or not np.isfinite(say["s"]):
+        if key in sent or not np.isfinite(say["s"]):
             continue
-        told.add(key)
+        sent.add(key)
         values = {
             "sac": _SAC, "sic": sic[key[0]], "number": key[1] % 2**24, "simulated": 1,
             "name": callsign(targets[row] or ""), "lat_deg": say["lat_deg"],
@@ -147,21 +147,21 @@ def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecor
 def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
-    places = zip(*(run.numbers("scans", name).tolist() for name in POSE[:3]), strict=True)
+    positions = zip(*(run.numbers("scans", name).tolist() for name in POSE[:3]), strict=True)
     times = run.numbers("scans", "time_s").tolist()
-    for name, time_s, place in zip(run.texts("scans", "block"), times, places, strict=True):
+    for name, time_s, position in zip(run.texts("scans", "block"), times, positions, strict=True):
         if (name or "") in radars:
-            known = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+            known = dict(zip(("lat_deg", "lon_deg", "alt_m"), position, strict=True))
             values = {"sac": _SAC, "sic": sic[name or ""], "message": NORTH_MARKER}
             yield AsterixRecord(
-                SERVICE, time_s, values | (known if np.isfinite(place).all() else {})
+                SERVICE, time_s, values | (known if np.isfinite(position).all() else {})
             )
 
 
 def _track(
-    sic: int, number: int, name: str | None, time_s: float, place: FloatArray
+    sic: int, number: int, name: str | None, time_s: float, position: FloatArray
 ) -> tuple[float, dict[str, object]]:
-    lat, lon, alt = place.tolist()
+    lat, lon, alt = position.tolist()
     return time_s, {
         "sac": _SAC, "sic": sic, "number": number, "name": name, "simulated": 1, "tentative": 0,
         "last": 0, "coasted": 0, "lat_deg": lat, "lon_deg": lon, "alt_m": alt,
@@ -170,7 +170,7 @@ def _track(
 
 def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give estimated tracks, at the instants that their states speak of."""
-    rows, places = estimated_places(run)
+    rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
     origin = [run.numbers("state_tracks", name)[rows] for name in ORIGIN]
@@ -180,19 +180,19 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     earth = [
         moves[0] * n + moves[1] * e - moves[2] * u for n, e, u in zip(north, east, up, strict=True)
     ]
-    own_axes = local_axes(places[0], places[1])
+    own_axes = local_axes(positions[0], positions[1])
     along: list[Any] = [sum(v * a for v, a in zip(earth, axis, strict=True)) for axis in own_axes]
     errors = {
         name: np.sqrt(np.maximum(run.numbers("state_tracks", column)[rows], 0.0))
         for name, column in _ERRORS.items()
     }
-    told = np.asarray(np.isfinite(np.stack(list(errors.values()))).all(axis=0))
+    stated = np.asarray(np.isfinite(np.stack(list(errors.values()))).all(axis=0))
     blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
     numbers = run.values("state_tracks", "track")
     state_s = run.numbers("state_tracks", "state_s")
     for k, row in enumerate(rows.tolist()):
         time_s, values = _track(
-            sic[blocks[row] or ""], int(numbers[row]), None, float(state_s[row]), places[:, k]
+            sic[blocks[row] or ""], int(numbers[row]), None, float(state_s[row]), positions[:, k]
         )
         values |= {
             "tentative": int(statuses[row] == "tentative"),
@@ -202,14 +202,14 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
             "velocity_north_m_s": float(along[1][k]),
             "velocity_up_m_s": float(along[2][k]),
         }
-        if told[k]:
+        if stated[k]:
             values |= {name: float(error[k]) for name, error in errors.items()}
         yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
 
 
 def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give what trackers hold of each target, once for each measurement, at its instant."""
-    rows, places = held_places(run)
+    rows, positions = held_positions(run)
     if len(rows) == 0:
         return
     names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
@@ -218,7 +218,7 @@ def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRe
     for k, row in enumerate(rows.tolist()):
         key = blocks[row] or "", names[row] or ""
         number.setdefault(key, len(number) + 1)
-        what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), places[:, k]
+        what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), positions[:, k]
         yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
 
 

@@ -12,7 +12,7 @@ from components.export.globe_run import DETECTION_LASTS_S, Course, globe_run, wh
 def czml_text(run: RecordedTables) -> str:
     """Return a CZML document: paths of aircraft and tracks, rings of alerts, detections as points.
 
-    What has a place is shown while it is there: aircraft while they fly, alerts while they are on,
+    All is shown while it is there: aircraft while they fly, alerts while they are on,
     detections for `DETECTION_LASTS_S`.
     """
     shown = globe_run(run)
@@ -44,7 +44,7 @@ def czml_text(run: RecordedTables) -> str:
                 "id": f"detection/{number}",
                 "name": seen.name,
                 "availability": f"{when(seen.time_s)}/{when(seen.time_s + DETECTION_LASTS_S)}",
-                "position": {"cartographicDegrees": list(seen.place)},
+                "position": {"cartographicDegrees": list(seen.position)},
                 "point": {
                     "pixelSize": 4, "color": {"rgba": _rgba(shown.marks[seen.sensor].colour)},
                 },
@@ -54,7 +54,7 @@ def czml_text(run: RecordedTables) -> str:
 
 
 def _placed(number: str, one: Course) -> dict[str, Any]:
-    samples = np.column_stack([one.time_s, one.place]).ravel().tolist()
+    samples = np.column_stack([one.time_s, one.position]).ravel().tolist()
     return {
         "id": number,
         "name": one.name,

@@ -107,12 +107,12 @@ def csv_files(run: RecordedTables) -> dict[str, bytes]:
     """Return a CSV file for each table; what is not measured is an empty cell."""
     import pyarrow.csv as pa_csv
 
-    found = {}
+    result = {}
     for name, table in run.tables.items():
         stream = io.BytesIO()
         pa_csv.write_csv(_plain(table), stream)
-        found[f"{name}.csv"] = stream.getvalue()
-    return found
+        result[f"{name}.csv"] = stream.getvalue()
+    return result
 
 
 def _plain(table: Any) -> Any:
@@ -150,15 +150,15 @@ def mat_bytes(run: RecordedTables) -> bytes:
 
 
 def _struct(table: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name in table.column_names:
         column = table[name]
         if str(column.type) in ("string", "large_string") or "dictionary" in str(column.type):
             texts = ["" if text is None else text for text in column.to_pylist()]
-            found[name] = np.array(texts, dtype=object).reshape(-1, 1)
+            result[name] = np.array(texts, dtype=object).reshape(-1, 1)
         else:
-            found[name] = np.asarray(column.to_numpy(zero_copy_only=False))
-    return found
+            result[name] = np.asarray(column.to_numpy(zero_copy_only=False))
+    return result
 
 
 _OF_ONE_FILE: dict[str, Callable[[RecordedTables], bytes]] = {

@@ -55,13 +55,13 @@ def xyz_text(run: RecordedTables, step_s: float = STEP_S) -> str:
     there = local_axes(np.array([lat]), np.array([lon]))
 
     def columns(flight: Mapping[str, FloatArray]) -> list[FloatArray]:
-        place = flight["lat_deg"], flight["lon_deg"]
-        here = local_axes(*place)
+        position = flight["lat_deg"], flight["lon_deg"]
+        here = local_axes(*position)
         # Altitudes stay what they are; east and north are those of the point of the tangent plane's
         # frame that lies so high above the plane, straight above or below the place.
-        _, _, down = line_of_sight_ned(lat, lon, 0.0, *place, np.zeros_like(place[0]))
+        _, _, down = line_of_sight_ned(lat, lon, 0.0, *position, np.zeros_like(position[0]))
         height = (flight["alt_m"] + down) / _dot(here[2], there[2])
-        north, east, _ = line_of_sight_ned(lat, lon, 0.0, *place, height)
+        north, east, _ = line_of_sight_ned(lat, lon, 0.0, *position, height)
         moves = (
             flight["velocity_east_m_s"], flight["velocity_north_m_s"], -flight["velocity_down_m_s"],
         )  # fmt: skip

@@ -1,10 +1,8 @@
 """What globes show of a run: flights, tracks, alerts and detections, in the colours of the kit."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +10,11 @@ from components.display.picture import sights
 from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
 from components.export.alert_levels import Alert, alerts_of
-from components.export.track_places import POSE, estimated_places, held_places
-from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES
+from components.export.track_positions import POSE, estimated_positions, held_positions
+from components.messages.state_tracks import HELD
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark
+from dsa_des.errors import UsageError
 
 #: A run has no date; its second 0 is put here.
 START = datetime(2000, 1, 1, tzinfo=UTC)
@@ -26,41 +25,29 @@ _PLACE = ("lon_deg", "lat_deg", "alt_m")
 
 @dataclass(frozen=True)
 class Course:
-    """Where something was: a flight, a track, or what an alert was about while it lasted.
-
-    Parameters
-    ----------
-    name : str
-    colour : str
-        ``#rrggbb``.
-    time_s : (n,)
-        Ascending.
-    place : (n, 3)
-        Longitude, latitude (deg) and height above the ellipsoid (m).
-    group : str
-        The tracker or the alerting block; empty of a flight.
-    level : int
-        Of an alert, else 0.
-    """
+    """A flight, a track, or what an alert was about while it lasted, in ascending time."""
 
     name: str
     colour: str
     time_s: FloatArray
-    place: FloatArray
+    #: Longitude, latitude (deg) and height above the ellipsoid (m), (n, 3).
+    position: FloatArray
+    #: The tracker or the alerting block; empty of a flight.
     group: str = ""
+    #: Of an alert, else 0.
     level: int = 0
 
     def between(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
-        """Return times and places from start to end, both straight between the neighbours."""
+        """Return times and positions from start to end, both straight between the neighbours."""
         start_s, end_s = (float(np.clip(t, *self.time_s[[0, -1]])) for t in (start_s, end_s))
         inside = (self.time_s > start_s) & (self.time_s < end_s)
         time_s = np.unique(np.concatenate(([start_s], self.time_s[inside], [end_s])))
-        lon, lat, alt = self.place.T
+        lon, lat, alt = self.position.T
         # Across the date line longitudes go on.
         columns = (np.unwrap(lon, period=360.0), lat, alt)
-        found = np.stack([np.interp(time_s, self.time_s, column) for column in columns], axis=1)
-        found[:, 0] = (found[:, 0] + 180.0) % 360.0 - 180.0
-        return time_s, found
+        result = np.stack([np.interp(time_s, self.time_s, column) for column in columns], axis=1)
+        result[:, 0] = (result[:, 0] + 180.0) % 360.0 - 180.0
+        return time_s, result
 
 
 @dataclass(frozen=True)
@@ -70,7 +57,7 @@ class Seen:
     sensor: str
     target: str
     time_s: float
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
 
     @property
     def name(self) -> str:
@@ -101,11 +88,11 @@ def globe_run(run: RecordedTables) -> GlobeRun:
         for name, flight in run.flights().items()
     ]  # fmt: skip
     end_s = max(float(one.time_s[-1]) for one in flights)
-    seen = list(seen_places(run))
+    seen = list(seen_positions(run))
     tracks = [*_estimated(run), *_held(run)]
     marks = marks_in(run, {one.sensor for one in seen} | {one.group for one in tracks})
     painted = [
-        Course(one.name, marks[one.group].colour, one.time_s, one.place, one.group)
+        Course(one.name, marks[one.group].colour, one.time_s, one.position, one.group)
         for one in tracks
     ]
     alerts = [
@@ -131,12 +118,9 @@ def when(time_s: float) -> str:
 def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
     """Return how blocks of a run are marked, by the types that its scene gives them."""
     try:
-        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
-        blocks: Any = scene.get("blocks", {})
-        types = {name: str(blocks.get(name, {}).get("type", "")) for name in names}
-    except (OSError, ValueError, AttributeError):
-        types = dict.fromkeys(names, "")
-    return block_marks(types)
+        return block_marks(run.block_types(names))
+    except (UsageError, AttributeError):  # another program's scene
+        return block_marks(dict.fromkeys(names, ""))
 
 
 def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) -> Course | None:
@@ -149,7 +133,7 @@ def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) ->
     return max(mine, key=lambda one: float(one.time_s[-1]), default=None)
 
 
-def seen_places(run: RecordedTables) -> Iterator[Seen]:
+def seen_positions(run: RecordedTables) -> Iterator[Seen]:
     """Give the detections that have a range."""
     if "detections" not in run.tables:
         return
@@ -165,14 +149,16 @@ def seen_places(run: RecordedTables) -> Iterator[Seen]:
     directions = number["azimuth_rad"], number["elevation_rad"], number["range_m"]
     _, (lat, lon, alt) = sights(*directions, [number[name] for name in POSE])
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
-    places = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
-    for row, time_s, place in zip(there.tolist(), number["time_s"].tolist(), places, strict=True):
-        yield Seen(sensors[row] or "", targets[row] or "", time_s, place)
+    positions = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
+    for row, time_s, position in zip(
+        there.tolist(), number["time_s"].tolist(), positions, strict=True
+    ):
+        yield Seen(sensors[row] or "", targets[row] or "", time_s, position)
 
 
 def _estimated(run: RecordedTables) -> Iterator[Course]:
     """Give tracks that were ever confirmed, until they are deleted."""
-    rows, places = estimated_places(run)
+    rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
     status = np.array(run.texts("state_tracks", "track_status"), dtype=object)[rows]
@@ -180,33 +166,35 @@ def _estimated(run: RecordedTables) -> Iterator[Course]:
     blocks = run.texts("state_tracks", "block")
     names = [(blocks[row] or "", f"#{n}") for row, n in zip(rows.tolist(), numbers, strict=True)]
     lives = status != "deleted"
-    sure = np.isin(status, [STATUSES[CONFIRMED], STATUSES[COASTED]])
+    sure = np.isin(status, HELD)
     for name, mine in _grouped(names):
         if sure[mine].any():
             mine = mine[lives[mine]]
-            yield _course(name, run.numbers("state_tracks", "state_s")[rows[mine]], places[:, mine])
+            yield _course(
+                name, run.numbers("state_tracks", "state_s")[rows[mine]], positions[:, mine]
+            )
 
 
 def _held(run: RecordedTables) -> Iterator[Course]:
-    rows, places = held_places(run)
+    rows, positions = held_positions(run)
     blocks, targets = (
         (run.texts("tracks", name) for name in ("block", "target")) if len(rows) else ([], [])
     )
     names = [(blocks[row] or "", targets[row] or "") for row in rows.tolist()]
     for name, mine in _grouped(names):
-        yield _course(name, run.numbers("tracks", "measured_s")[rows[mine]], places[:, mine])
+        yield _course(name, run.numbers("tracks", "measured_s")[rows[mine]], positions[:, mine])
 
 
 def _grouped(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
-    """Give each name and the places in the sequence at which it stands, in order of names."""
-    found: dict[tuple[str, str], list[int]] = {}
-    for place, name in enumerate(names):
-        found.setdefault(name, []).append(place)
-    for name, places in sorted(found.items()):
-        yield name, np.array(places)
+    """Give each name and its indices in the sequence, in order of names."""
+    result: dict[tuple[str, str], list[int]] = {}
+    for position, name in enumerate(names):
+        result.setdefault(name, []).append(position)
+    for name, positions in sorted(result.items()):
+        yield name, np.array(positions)
 
 
-def _course(name: tuple[str, str], time_s: FloatArray, places: FloatArray) -> Course:
+def _course(name: tuple[str, str], time_s: FloatArray, positions: FloatArray) -> Course:
     time_s, first = np.unique(time_s, return_index=True)
-    lat, lon, alt = places[:, first]
+    lat, lon, alt = positions[:, first]
     return Course(" ".join(name), "", time_s, np.stack([lon, lat, alt], axis=1), name[0])

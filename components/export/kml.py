@@ -1,6 +1,5 @@
 """A run as KML (OGC 07-147r2, with Google's tracks), whose heights are above sea level."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
@@ -8,6 +7,7 @@ from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK
 from components.export.globe_run import Course, GlobeRun, Seen, globe_run, when
 from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
 from dsa_des.text.safe_text import printable
 
 #: Google's icons, which globes know by their addresses, for markers of figures.
@@ -23,10 +23,9 @@ _DOT, _RING, _PLANE = "shaded_dot", "donut", "airports"
 def undulation_of(run: RecordedTables) -> float | None:
     """Return the geoid's height above the ellipsoid (m) that a run's scene says of its terrain."""
     try:
-        scene = tomllib.loads((run.folder / "scene.toml").read_text(encoding="utf-8"))
-        terrain = scene.get("terrain", {})
+        terrain = run.scene.get("terrain", {})
         return float(terrain["raster_offset_m"]) if "raster" in terrain else None
-    except (OSError, ValueError, LookupError, TypeError):
+    except (UsageError, ValueError, LookupError, TypeError):
         return None
 
 
@@ -60,7 +59,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
 
 def _look_at(shown: GlobeRun, geoid_m: float) -> list[str]:
     """Return where a globe looks when it opens the file: at where the ownship begins."""
-    lon, lat, alt = shown.flights[0].place[0].tolist()
+    lon, lat, alt = shown.flights[0].position[0].tolist()
     return [
         "<LookAt>",
         f"<longitude>{lon}</longitude><latitude>{lat}</latitude>",
@@ -128,21 +127,21 @@ def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]
             f"<styleUrl>#{_id(of_one)}</styleUrl><gx:Track>",
             "<altitudeMode>absolute</altitudeMode>",
             *(f"<when>{when(t)}</when>" for t in one.time_s.tolist()),
-            *_coordinates(one.place, geoid_m),
+            *_coordinates(one.position, geoid_m),
             "</gx:Track></Placemark>",
         ]
     return lines
 
 
-def _coordinates(place: FloatArray, geoid_m: float) -> Iterator[str]:
-    for lon, lat, alt in place.tolist():
+def _coordinates(position: FloatArray, geoid_m: float) -> Iterator[str]:
+    for lon, lat, alt in position.tolist():
         yield f"<gx:coord>{lon} {lat} {alt - geoid_m}</gx:coord>"
 
 
 def _points(seen: Sequence[Seen], geoid_m: float) -> list[str]:
     lines = []
     for one in seen:
-        lon, lat, alt = one.place
+        lon, lat, alt = one.position
         lines += [
             f"<Placemark><name>{_xml(one.name)}</name>",
             f"<TimeStamp><when>{when(one.time_s)}</when></TimeStamp>",

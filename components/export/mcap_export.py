@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_run import RecordedTables
-from components.export.globe_run import DETECTION_LASTS_S, START, Seen, marks_in, seen_places
+from components.export.globe_run import DETECTION_LASTS_S, START, Seen, marks_in, seen_positions
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors.extras import library
@@ -123,8 +123,8 @@ def _described(field: Any) -> dict[str, Any]:
         kind = "number"
     said = {k.decode(): v.decode() for k, v in (field.metadata or {}).items()}
     words = [said[key] for key in ("unit", "frame", "meaning") if said.get(key)]
-    found: dict[str, Any] = {"type": [kind, "null"]}
-    return found | ({"description": "; ".join(words)} if words else {})
+    result: dict[str, Any] = {"type": [kind, "null"]}
+    return result | ({"description": "; ".join(words)} if words else {})
 
 
 def _drawn(run: RecordedTables) -> Iterator[_Message]:
@@ -132,11 +132,11 @@ def _drawn(run: RecordedTables) -> Iterator[_Message]:
     flights = run.flights() if "truth" in run.tables else {}
     origin: tuple[float, ...] | None = None
     for name, flight in flights.items():
-        place = [flight[key] for key in ("lat_deg", "lon_deg", "alt_m")]
-        origin = origin or tuple(float(part[0]) for part in place)
+        position = [flight[key] for key in ("lat_deg", "lon_deg", "alt_m")]
+        origin = origin or tuple(float(part[0]) for part in position)
         turned = _orientations(*(flight[f"{a}_rad"] for a in ("heading", "pitch", "roll")))
-        poses = zip(_offsets(origin, *place), turned, strict=True)
-        rows = zip(flight["time_s"].tolist(), *(part.tolist() for part in place), strict=True)
+        poses = zip(_offsets(origin, *position), turned, strict=True)
+        rows = zip(flight["time_s"].tolist(), *(part.tolist() for part in position), strict=True)
         for (time_s, lat, lon, alt), (offset, turn) in zip(rows, poses, strict=True):
             when = _instant(time_s)
             fix = {
@@ -147,10 +147,10 @@ def _drawn(run: RecordedTables) -> Iterator[_Message]:
             pose = {"timestamp": _stamp(when), "frame_id": _FRAME,
                     "pose": {"position": offset, "orientation": turn}}  # fmt: skip
             yield _message(f"/aircraft/{name}/pose", "foxglove.PoseInFrame", when, pose)
-    ends = list(seen_places(run))
+    ends = list(seen_positions(run))
     if not ends:
         return
-    lon, lat, alt = np.array([end.place for end in ends]).T
+    lon, lat, alt = np.array([end.position for end in ends]).T
     origin = origin or (float(lat[0]), float(lon[0]), float(alt[0]))
     marks = marks_in(run, {end.sensor for end in ends})
     for number, (end, offset) in enumerate(zip(ends, _offsets(origin, lat, lon, alt), strict=True)):

@@ -43,14 +43,14 @@ def operator_csv(run: RecordedTables) -> bytes:
 
 def _alerts(run: RecordedTables) -> list[tuple[dict[str, Any], set[str | None]]]:
     """Return the alerts in the order in which they came, and the names of what each is about."""
-    found = []
+    result = []
     for alert in alerts_of(run):
         row = {
             "target": alert.name, "alert_s": alert.start_s,
             "highest_level": max(level for _, level in alert.levels), "ended_s": alert.end_s,
         }  # fmt: skip
-        found.append((row, {alert.target, alert.track_name} - {None}))
-    return found
+        result.append((row, {alert.target, alert.track_name} - {None}))
+    return result
 
 
 def _answered(

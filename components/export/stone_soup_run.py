@@ -103,16 +103,16 @@ def recorded_run(
     origin = origin or _origin(run, pose)
     lat, lon, alt = (np.full(pose.shape[1], value) for value in origin)
     moves = np.stack([columns[name] for name in _MOVES]) if range_rates else None
-    place = pose_in_frame(
+    position = pose_in_frame(
         (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5]), moves
     )
     paths = {name: _path(name, flight, origin) for name, flight in flights.items()}
     own = paths.pop(OWNSHIP, None)
     detector = RecordedDetector()
-    detector.looks = list(_looks(run, columns, Poses(place)))
+    detector.looks = list(_looks(run, columns, Poses(position)))
     return StoneSoupRun(
         detector,
-        _platform(columns["time_s"], place, flights.get(OWNSHIP), origin),
+        _platform(columns["time_s"], position, flights.get(OWNSHIP), origin),
         set(paths.values()),
         own,
         origin,
@@ -186,28 +186,28 @@ def _looks(
     """Give looks by their instants; those of one instant with ranges first, then by name."""
     block, time_s = columns["block"], columns["time_s"]
     ranged = set(block[np.isfinite(columns["range_m"])])
-    found: dict[tuple[float, bool, str], list[int]] = {}
+    result: dict[tuple[float, bool, str], list[int]] = {}
     for i, (name, when) in enumerate(zip(block.tolist(), time_s.tolist(), strict=True)):
-        found.setdefault((when, name not in ranged, name), []).append(i)
+        result.setdefault((when, name not in ranged, name), []).append(i)
     sweeping = set(block[np.isfinite(columns["illuminated_s"])])
     if "scans" in run.tables:
         names = run.values("scans", "block")
         for name, when in zip(names, run.numbers("scans", "time_s").tolist(), strict=True):
             if name not in sweeping:  # a scan of a sweeping beam has no one instant
-                found.setdefault((when, name not in ranged, name), [])
+                result.setdefault((when, name not in ranged, name), [])
     values = np.stack([columns[name] for name in _MEASURED])
     variances = np.stack([columns[name] for name in _VARIANCES])
-    for (when, _, name), rows_of in sorted(found.items()):
+    for (when, _, name), rows_of in sorted(result.items()):
         says = [{"sensor": name, "scan": int(columns["scan"][i])} for i in rows_of]
         at = instant(when)
         yield at, detections(poses, rows_of, at, values[:, rows_of], variances[:, rows_of], says)
 
 
 def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> GroundTruthPath:
-    place = [np.ascontiguousarray(flight[key]) for key in _POSE[:3]]
-    here = [np.full(len(place[0]), value) for value in origin]
-    north, east, up = north_east_up(*here, *place)
-    states = state_vectors(np.stack([north, east, -up]), _velocity(flight, place, here))
+    position = [np.ascontiguousarray(flight[key]) for key in _POSE[:3]]
+    here = [np.full(len(position[0]), value) for value in origin]
+    north, east, up = north_east_up(*here, *position)
+    states = state_vectors(np.stack([north, east, -up]), _velocity(flight, position, here))
     return GroundTruthPath(
         [
             GroundTruthState(state, timestamp=instant(time_s), metadata={"name": name})
@@ -218,10 +218,10 @@ def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> Ground
 
 
 def _velocity(
-    flight: Mapping[str, FloatArray], place: list[FloatArray], here: list[FloatArray]
+    flight: Mapping[str, FloatArray], position: list[FloatArray], here: list[FloatArray]
 ) -> FloatArray:
     """Return velocities along the frame's axes, of those along the aircraft's own horizon."""
-    east, north, up = local_axes(place[0], place[1])
+    east, north, up = local_axes(position[0], position[1])
     along_east, along_north, along_up = local_axes(here[0], here[1])
     earth = [
         flight[_VELOCITY[0]] * n + flight[_VELOCITY[1]] * e - flight[_VELOCITY[2]] * u
@@ -235,7 +235,7 @@ def _velocity(
 
 
 def _platform(
-    time_s: FloatArray, place: Any, own: Mapping[str, FloatArray] | None, origin: Origin
+    time_s: FloatArray, position: Any, own: Mapping[str, FloatArray] | None, origin: Origin
 ) -> MovingPlatform:
     when, first = np.unique(time_s, return_index=True)
     velocity = np.full((3, len(when)), np.nan)
@@ -243,8 +243,8 @@ def _platform(
         at = [np.ascontiguousarray(own[key]) for key in _POSE[:3]]
         known = _velocity(own, at, [np.full(len(at[0]), value) for value in origin])
         velocity = np.stack([np.interp(when, own["time_s"], part) for part in known])
-    states = state_vectors(place.position_m[:, first], velocity)
-    poses = Poses(place.take(first))
+    states = state_vectors(position.position_m[:, first], velocity)
+    poses = Poses(position.take(first))
     movement = RecordedMovement(
         states=[
             GroundTruthState(

@@ -186,8 +186,8 @@ def _held(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
     """Carry the last yaw of a moving sample over those that stand still."""
     if moving.all():
         return yaw
-    place = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))
-    last = np.maximum.accumulate(np.where(moving, place, -1), axis=0)
+    index = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))
+    last = np.maximum.accumulate(np.where(moving, index, -1), axis=0)
     held = np.where(last >= 0, last, np.argmax(moving, axis=0))
     return np.where(moving.any(axis=0), np.take_along_axis(yaw, held, axis=0), 0.0)
 
@@ -221,7 +221,7 @@ def scene_wind(weather: Any) -> Wind | None:
 def heading_and_airspeed(
     track_rad: FloatArray, ground_speed_mps: FloatArray, wind: Wind
 ) -> tuple[FloatArray, FloatArray]:
-    """Return heading (rad) and level airspeed (m/s) of who flies along a track over the ground.
+    """Return heading (rad) and level airspeed (m/s) along a track over the ground.
 
     The velocity through the air is that over the ground less the wind; below 0.5 m/s of either,
     which point nowhere, the heading is the track.

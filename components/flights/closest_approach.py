@@ -3,7 +3,7 @@
 Distances are compared at given times. A target that is d away at one of them is nowhere nearer
 than d - v·dt up to a time dt before or after it, with v the sum of the two largest speeds: a
 stretch of time in which that leaves nothing nearer than what is known already is not looked at.
-What is found is what looking at every time would find, to the bit.
+The result is that of looking at every time, to the bit.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _DIGITS = 9
 
 
 def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
-    """Return the times of some places of a regular grid that starts at 0, s.
+    """Return the times of some points of a regular grid that starts at 0, s.
 
     They are rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
     """
@@ -31,7 +31,7 @@ def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
 
 
 def regular_count(step_s: float, duration_s: float) -> int:
-    """Return how many places a regular grid over a duration has."""
+    """Return how many points a regular grid over a duration has."""
     return int(duration_s / step_s) + 1
 
 

@@ -24,7 +24,7 @@ _ROUNDS = 6
 class Approach:
     """What two aircraft do at their closest approach; arrays (2, encounters), the ownship's first.
 
-    The place is the ownship's, and its altitude alone counts. Miss distances (encounters,): to the
+    The position is the ownship's, altitude alone counts. Miss distances (encounters,): to the
     right of the intruder's relative way where positive, seen from above; intruder above ownship.
     """
 
@@ -53,13 +53,13 @@ def intruder_heading(
     with np.errstate(invalid="ignore"):
         root = np.sqrt(along**2 - own_speed**2 + intruder_speed**2)
         sizes = (-along + root, -along - root)
-        found = []
+        headings = []
         for size in sizes:
             good = size > 1e-9
             north = own_speed - size * np.cos(bearing_rad)
             east = -size * np.sin(bearing_rad)
-            found.append(np.where(good, own_heading_rad + np.arctan2(east, north), np.nan))
-    return found[0], found[1]
+            headings.append(np.where(good, own_heading_rad + np.arctan2(east, north), np.nan))
+    return headings[0], headings[1]
 
 
 def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
@@ -99,7 +99,7 @@ def _placed(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray, Flo
     distance = np.abs(a.horizontal_m)
     altitude = a.altitude_m[0] + a.vertical_m
     up = a.vertical_m.copy()
-    for _ in range(3):  # until the point has its altitude, and its place in the level plane
+    for _ in range(3):  # until the point has its altitude, and its position in the level plane
         lat, lon, got = enu_to_geodetic(
             distance * np.sin(angle), distance * np.cos(angle), up, reference_lat_deg=a.lat_deg,
             reference_lon_deg=a.lon_deg, reference_alt_m=a.altitude_m[0],
@@ -153,7 +153,7 @@ def flown(
 def in_plane(
     lat_deg: FloatArray, lon_deg: FloatArray, reference_deg: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return north and east (m) of places in the plane that touches the ellipsoid at a reference.
+    """Return north and east (m) of points in the plane that touches the ellipsoid at a reference.
 
     `enu_to_geodetic` with up 0 leads back to the same latitude and longitude.
     """

@@ -97,7 +97,7 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
     closing = (targets.max_speeds_mps + own.max_speeds_mps[run]) * _SPEED_MARGIN
     target = np.arange(len(closing))
     piece: FloatArray = np.zeros(len(closing))
-    found = [(target[:0], closing[:0], closing[:0])]
+    kept = [(target[:0], closing[:0], closing[:0])]
     length = float(end_s)
     while len(target):
         start: FloatArray = piece * length
@@ -109,12 +109,12 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
         maybe = there & (range_m <= reach_m + drift)
         fine = length <= FINEST_S or _too_many(run[target], of_run)
         settled = maybe & ((range_m <= reach_m - drift) | fine)
-        found.append((target[settled], start[settled], start[settled] + length))
+        kept.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
         target, piece = np.repeat(target[cut], 2), np.repeat(2.0 * piece[cut], 2)
         piece[1::2] += 1
         length = half
-    near, begin, end = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    near, begin, end = (np.concatenate(parts) for parts in zip(*kept, strict=True))
     start, end = np.maximum(begin, present_s[0][near]), np.minimum(end, present_s[1][near])
     some = start <= end
     return _merged(near[some], start[some], end[some])
@@ -149,7 +149,7 @@ def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearInt
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
-# Steering keeps the speed to 1e-4 unless another one is told.
+# Steering keeps the speed to 1e-4 unless another one is commanded.
 _OWN_SPEED_MARGIN = 1.05
 
 
@@ -193,15 +193,15 @@ class SteeredCulling:
         begins[1:] |= fastest[1:] != fastest[:-1]
         first = np.flatnonzero(begins)
         of, number = run[first], epoch[first]
-        found = self._range_m[of]
+        range_m = self._range_m[of]
         new = np.flatnonzero(self._last[of] != number)
         if len(new):
             begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
             target = (begun[:, np.newaxis] * width + np.arange(width)).reshape(-1)
             there = self._targets.each(target, np.repeat(start_s, width))
             here = own.each(begun, start_s).reshaped((len(new), 1))
-            found[new] = ranges_m(here, there.reshaped((len(new), width)))
-        self._last[of], self._range_m[of] = number, found
+            range_m[new] = ranges_m(here, there.reshaped((len(new), width)))
+        self._last[of], self._range_m[of] = number, range_m
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
-        return np.asarray((found <= within_m)[np.cumsum(begins) - 1])
+        return np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])

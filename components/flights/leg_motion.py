@@ -166,7 +166,7 @@ class Segment:
 def hold_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate aircraft that stay over one place; see `Segment` for the table's rows."""
+    """Evaluate aircraft that stay in one position; see `Segment` for the table's rows."""
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
     yaw = past(table[4] + table[5] * elapsed, TWO_PI)

@@ -239,7 +239,7 @@ class LegBuilder:
             raise ValueError(
                 f"speed_mps is {self.speed:g}: it must be positive to reach a waypoint"
             )
-        lat, lon, alt = self._place(point)
+        lat, lon, alt = self._position_of(point)
         line = Geodesic.WGS84.Inverse(self.position[0], self.position[1], lat, lon)
         distance, rise = line["s12"], alt - self.position[2]
         if distance < 1e-3:
@@ -255,7 +255,7 @@ class LegBuilder:
         self._straight(rise / duration, duration)
         self.position = (lat, lon, alt)
 
-    def _place(self, point: Waypoint) -> Position:
+    def _position_of(self, point: Waypoint) -> Position:
         """Find a waypoint's geodetic position; an altitude left out is the one before."""
         before = self.position[2]
         if point.lat_deg is not None and point.lon_deg is not None:

@@ -203,18 +203,18 @@ class SteeredFleet(Fleet):
             for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
         ]
         new = flown_from("ownship", around, time_s, manoeuvres, before)
-        found = copy(self)
-        found._parts = ScriptedFleet.joined(self._parts, ScriptedFleet(new))
-        place = self.manoeuvre_count[ownship]
-        room = len(self), int(int(place.max()) + 2 > self._start_s.shape[1])
-        found._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
-        found._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
-        found._start_s[ownship, place] = time_s
-        found._part[ownship, place] = len(self._flown) + np.arange(len(new))
-        found.manoeuvre_count = self.manoeuvre_count.copy()
-        found.manoeuvre_count[ownship] += 1
-        found._flown = self._flown + new
-        return found
+        fleet = copy(self)
+        fleet._parts = ScriptedFleet.joined(self._parts, ScriptedFleet(new))
+        index = self.manoeuvre_count[ownship]
+        room = len(self), int(int(index.max()) + 2 > self._start_s.shape[1])
+        fleet._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
+        fleet._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
+        fleet._start_s[ownship, index] = time_s
+        fleet._part[ownship, index] = len(self._flown) + np.arange(len(new))
+        fleet.manoeuvre_count = self.manoeuvre_count.copy()
+        fleet.manoeuvre_count[ownship] += 1
+        fleet._flown = self._flown + new
+        return fleet
 
 
 _NOBODY: IntArray = np.empty(0, dtype=np.int64)

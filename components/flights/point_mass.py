@@ -90,11 +90,11 @@ def fly_euler(
 
 def summed(start: FloatArray, rates: FloatArray) -> FloatArray:
     """Return start, start + rates[0], start + rates[0] + rates[1], ... along the first axis."""
-    found = np.empty_like(rates)
-    found[0] = start
-    np.cumsum(rates[:-1], axis=0, out=found[1:])
-    found[1:] += start
-    return found
+    total = np.empty_like(rates)
+    total[0] = start
+    np.cumsum(rates[:-1], axis=0, out=total[1:])
+    total[1:] += start
+    return total
 
 
 def fly_point_mass(
@@ -199,18 +199,18 @@ def _flyable(rates: Iterable[tuple[float, float]]) -> Rates:
     What is turned more slowly is turned at that rate in a part of the time, up to a second of it
     together, and the rest is flown straight.
     """
-    found: Rates = []
+    flown: Rates = []
     slow_s = slow_deg = 0.0
     for lasts_s, rate_deg_s in [*rates, (0.0, math.inf)]:
         is_slow = abs(rate_deg_s) < SLOWEST_TURN_DEG_S
         if slow_s and (not is_slow or slow_s + lasts_s > 1.0):
             turns_s = abs(slow_deg) / SLOWEST_TURN_DEG_S
             if turns_s > _SHORTEST_S:
-                found.append((turns_s, math.copysign(SLOWEST_TURN_DEG_S, slow_deg)))
-            found.append((slow_s - turns_s, 0.0))
+                flown.append((turns_s, math.copysign(SLOWEST_TURN_DEG_S, slow_deg)))
+            flown.append((slow_s - turns_s, 0.0))
             slow_s = slow_deg = 0.0
         if is_slow:
             slow_s, slow_deg = slow_s + lasts_s, slow_deg + lasts_s * rate_deg_s
         elif lasts_s:
-            found.append((lasts_s, rate_deg_s))
-    return found
+            flown.append((lasts_s, rate_deg_s))
+    return flown

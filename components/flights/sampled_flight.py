@@ -169,13 +169,13 @@ class SampledTrajectory:
         alt_m: FloatArray,
     ) -> list[SampledTrajectory]:
         """Return aircraft that are known at the same times, as each would be made alone."""
-        found: list[SampledTrajectory] = []
+        flights: list[SampledTrajectory] = []
         width = max(1, CELLS_AT_ONCE // max(1, len(time_s)))
         for first in range(0, len(names), width):
             block = slice(first, first + width)
-            place = [np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)]
-            found += cls._alike(names[block], time_s, *place)
-        return found
+            position = [np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)]
+            flights += cls._alike(names[block], time_s, *position)
+        return flights
 
     @classmethod
     def _alike(
@@ -192,13 +192,13 @@ class SampledTrajectory:
             checked_samples(
                 names[number], time_s=time_s, **{k: v[:, number] for k, v in columns.items()}
             )
-        place = (lat_deg, wrap_longitude_deg(lon_deg), alt_m)
-        yaw, pitch, roll = attitude_from_path(time_s, *place)
+        position = (lat_deg, wrap_longitude_deg(lon_deg), alt_m)
+        yaw, pitch, roll = attitude_from_path(time_s, *position)
         attitude = wrap_heading_rad(yaw), pitch, roll
-        tables = fit_segments(time_s, place, attitude)
-        rows = [np.ascontiguousarray(part.T) for part in (*place, *attitude)]
-        speeds = _mean_speed_bound(time_s, *place)
-        found = [one]
+        tables = fit_segments(time_s, position, attitude)
+        rows = [np.ascontiguousarray(part.T) for part in (*position, *attitude)]
+        speeds = _mean_speed_bound(time_s, *position)
+        flights = [one]
         for number, name in enumerate(names[1:], start=1):
             made = copy(one)
             made.name = name
@@ -206,8 +206,8 @@ class SampledTrajectory:
             made.yaw_rad, made.pitch_rad, made.roll_rad = (part[number] for part in rows[3:])
             made.coefficients = np.ascontiguousarray(tables[..., number])
             made.max_speed_mps = float(speeds[number])
-            found.append(made)
-        return found
+            flights.append(made)
+        return flights
 
     def in_wind(self, east_mps: float, north_mps: float) -> SampledTrajectory:
         """Return the same flight with what was derived of its attitude derived with a wind."""
@@ -245,8 +245,8 @@ class SampledTrajectory:
         A cubic's velocity is a mix of its end velocities (weights adding up to 1 at most) and of
         1.5 times its mean velocity at most.
         """
-        place = self.lat_deg, self.lon_deg, self.alt_m
-        mean = float(_mean_speed_bound(self.sample_times_s, *place))
+        position = self.lat_deg, self.lon_deg, self.alt_m
+        mean = float(_mean_speed_bound(self.sample_times_s, *position))
         if self.velocity_enu_mps is None or len(self.sample_times_s) < 2:
             return mean
         east, north, up = self.velocity_enu_mps
@@ -268,8 +268,8 @@ class SampledFleet(Fleet):
     def __len__(self) -> int:
         return len(self._flights)
 
-    def __getitem__(self, place: int) -> SampledTrajectory:  # type: ignore[override]
-        return self._flights[place]
+    def __getitem__(self, index: int) -> SampledTrajectory:  # type: ignore[override]
+        return self._flights[index]
 
     @cached_property
     def _find(self) -> PieceSearch:

@@ -36,15 +36,15 @@ _ROWS = 25
 
 def fit_segments(
     time_s: FloatArray,
-    place: tuple[FloatArray, FloatArray, FloatArray],
+    position: tuple[FloatArray, FloatArray, FloatArray],
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_enu_mps: Vector | None = None,
 ) -> FloatArray:
     """Tabulate each segment's polynomials, (25, n), or (25, n, aircraft) at the same times.
 
-    The last sample is a segment of its own; place is latitude, longitude (deg) and altitude (m).
+    The last sample is a segment of its own; positions are latitude, longitude (deg), altitude (m).
     """
-    lat_deg, lon_deg, alt_m = place
+    lat_deg, lon_deg, alt_m = position
     yaw_rad, pitch_rad, roll_rad = attitude_rad
     table = np.zeros((_ROWS, *lat_deg.shape))
     _, _, normal = local_axes(lat_deg, lon_deg)

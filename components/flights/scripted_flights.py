@@ -116,8 +116,8 @@ class ScriptedTrajectory:
             east_m, north_m, up_m,
             reference_lat_deg=lat_deg, reference_lon_deg=lon_deg, reference_alt_m=alt_m,
         )  # fmt: skip
-        place: Any = {"lat_deg": float(lat), "lon_deg": float(lon), "alt_m": float(alt)}
-        return cls(name, **place, reference=reference, **others)
+        position: Any = {"lat_deg": float(lat), "lon_deg": float(lon), "alt_m": float(alt)}
+        return cls(name, **position, reference=reference, **others)
 
     @classmethod
     def of_segments(cls, *known: Any) -> ScriptedTrajectory:
@@ -207,9 +207,9 @@ class ScriptedFleet(Fleet):
     @classmethod
     def of_columns(cls, *columns: Any) -> ScriptedFleet:
         """Return flights whose columns are known already; see `_set`."""
-        found = cls.__new__(cls)
-        found._set(*columns)
-        return found
+        fleet = cls.__new__(cls)
+        fleet._set(*columns)
+        return fleet
 
     @classmethod
     def joined(cls, one: ScriptedFleet, other: ScriptedFleet) -> ScriptedFleet:
@@ -233,8 +233,8 @@ class ScriptedFleet(Fleet):
     def __len__(self) -> int:
         return len(self._columns)
 
-    def __getitem__(self, place: int) -> ScriptedTrajectory:  # type: ignore[override]
-        number = int(self._columns[place])
+    def __getitem__(self, index: int) -> ScriptedTrajectory:  # type: ignore[override]
+        number = int(self._columns[index])
         first, last = int(self._find.first[number]), int(self._find.last[number])
         legs = enumerate(self._legs[:, first : last + 1].T.tolist(), first)
         segments = []
@@ -323,7 +323,7 @@ class ScriptedFleet(Fleet):
 
     @cached_property
     def _parts(self) -> tuple[list[_Group], IntArray]:
-        """Flights of one leg each, straight or held, by formula; and the others' places."""
+        """Flights of one leg each, straight or held, by formula; and the indices of the others."""
         flights = self._columns
         leg = self._find.first[flights]
         kinds = np.where(self._counts[flights] == 1, self._kind[leg], -1)

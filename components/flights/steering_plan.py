@@ -20,7 +20,7 @@ from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray
 
 # Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
-# place is right to 0.0625 m on the way, and exact at the end.
+# position is right to 0.0625 m on the way, and exact at the end.
 _SPEED_STEP_S = 0.5
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
@@ -228,12 +228,12 @@ def flown_from(
     # Ends of the chord seen from its middle, so that the track is the one there.
     ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     north, east, _ = line_of_sight_ned(*middle, *ends)
-    found = []
+    flown = []
     base_s = np.ptp(times_around_s(time_s), axis=1).tolist()
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
-        place = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
+        position = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
         if earlier is None:
             along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
             heading_deg = math.degrees(math.atan2(along[1], along[0]))
@@ -256,8 +256,8 @@ def flown_from(
             rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
-        found.append(_flown_from(name, place, heading_deg, at_s, plan))
-    return found
+        flown.append(_flown_from(name, position, heading_deg, at_s, plan))
+    return flown
 
 
 def _turned(turns: Pieces, elapsed_s: float) -> float:
@@ -282,16 +282,16 @@ def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
 @lru_cache(maxsize=4096)
 def _flown_from(
     name: str,
-    place: tuple[float, float, float],
+    position: tuple[float, float, float],
     heading_deg: float,
     time_s: float,
     plan: SteeringPlan,
 ) -> SteeredPart:
     part = SteeredPart(
         name,
-        lat_deg=place[0],
-        lon_deg=place[1],
-        alt_m=place[2],
+        lat_deg=position[0],
+        lon_deg=position[1],
+        alt_m=position[2],
         heading_deg=heading_deg,
         speed_mps=plan.speed_mps,
         legs=plan.legs(),

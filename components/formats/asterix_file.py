@@ -77,8 +77,8 @@ def read_asterix(path: str | PathLike[str], ownship: str | None = None) -> Traff
     records, notes = _records(path)
     problems = Problems(str(path), of="record")
     names = _names(records)
-    places = {name: SampleColumn(k + 1, name, 1.0) for k, name in enumerate(_NUMBERS)}
-    table = SampleTable(problems, 0, places, optional=_MOVES)
+    cells = {name: SampleColumn(k + 1, name, 1.0) for k, name in enumerate(_NUMBERS)}
+    table = SampleTable(problems, 0, cells, optional=_MOVES)
     table.notes = notes
     rows: dict[tuple[object, ...], dict[float, int]] = {}
     samples: dict[int, list[str]] = {}
@@ -211,29 +211,29 @@ def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
         if record.category in _AIRCRAFT and record.values.get("name"):
             said.setdefault(_key(record), record.values["name"])
     named = list(said.values())
-    found = {}
+    result = {}
     for record in records:
-        if record.category not in _AIRCRAFT or (key := _key(record)) in found:
+        if record.category not in _AIRCRAFT or (key := _key(record)) in result:
             continue
         number = f"{key[-1]:06X}" if key[0] == ADS_B else f"{_source(record)}/{key[-1]}"
         name = said.get(key)
-        found[key] = number if name is None else name if named.count(name) == 1 else (
+        result[key] = number if name is None else name if named.count(name) == 1 else (
             f"{name} {number}"
         )  # fmt: skip
-    return found
+    return result
 
 
 def _sample(record: AsterixRecord) -> tuple[float, ...] | None:
     """Return time, position and velocity of a record, NaN for no velocity."""
     values = record.values
-    place = [
+    position = [
         next((values[name] for name in names if name in values), None)
         for names in (
             ("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg"),
             ("alt_m", "barometric_m", "flight_level_m"),
         )
     ]  # fmt: skip
-    if None in place:
+    if None in position:
         return None
     east, north = values.get("velocity_east_m_s"), values.get("velocity_north_m_s")
     if "speed_m_s" in values and "track_deg" in values:
@@ -241,4 +241,4 @@ def _sample(record: AsterixRecord) -> tuple[float, ...] | None:
         east, north = values["speed_m_s"] * np.sin(track), values["speed_m_s"] * np.cos(track)
     up = values.get("velocity_up_m_s", values.get("barometric_climb_m_s"))
     moves = (east, north, up) if None not in (east, north, up) else (np.nan,) * 3
-    return record.time_s, *place, *moves
+    return record.time_s, *position, *moves

@@ -169,12 +169,12 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
         return tuple((part, raw[name]) for part, name in parts) if parts[0][1] in raw else None
 
     common = {"010": group(("SAC", "sac"), ("SIC", "sic"))}
-    place = (("LAT", "lat_deg"), ("LON", "lon_deg"))
+    position = (("LAT", "lat_deg"), ("LON", "lon_deg"))
     if record.category == SERVICE:
         return common | {
             "000": raw["message"],
             "030": raw["time_of_day_s"],
-            "120": group(("HGT", "alt_m"), *place),
+            "120": group(("HGT", "alt_m"), *position),
         }
     if record.category == PLOTS:
         height = (0, ("3DH", raw["alt_m"])) if "alt_m" in raw else None
@@ -198,7 +198,7 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
                   ("SUC", 0), ("AAC", 0), None)  # fmt: skip
         return common | {
             "070": raw["time_of_day_s"],
-            "105": group(*place),
+            "105": group(*position),
             "185": group(("VX", "velocity_east_m_s"), ("VY", "velocity_north_m_s")),
             "220": raw.get("velocity_up_m_s"),
             "040": raw["number"],
@@ -224,7 +224,7 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
              0, None),
         ),
         "080": raw["number"],
-        "131": group(*place),
+        "131": group(*position),
         "140": raw.get("alt_m"),
         "145": raw.get("flight_level_m"),
         "155": (("RE", 0), ("BVR", raw["barometric_climb_m_s"]))
@@ -274,13 +274,13 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
         if category not in cats:
             left_out[category] = left_out.get(category, 0) + 1
             continue
-        found = cats[category].cv_uap.parse(raw)
-        if isinstance(found, ValueError):
+        parsed = cats[category].cv_uap.parse(raw)
+        if isinstance(parsed, ValueError):
             raise _wrong(
                 path, at, f"its records are none of category {category:03d}, edition "
-                f"{'.'.join(map(str, cats[category].cv_edition))} ({found})"
+                f"{'.'.join(map(str, cats[category].cv_edition))} ({parsed})"
             )  # fmt: skip
-        for one in found:
+        for one in parsed:
             values = _values(category, one)
             time_s = values.pop("time_of_day_s", values.get("applicable_s"))
             if time_s is None:
@@ -321,7 +321,7 @@ def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, Any]]:
 
 def _values(category: int, record: Any) -> dict[str, Any]:
     """Return the quantities of a record that are there."""
-    found: dict[str, Any] = {}
+    quantities: dict[str, Any] = {}
     for name, field in FIELDS[category].items():
         item = record.get_item(field.item)
         for part in field.part.split("/") if field.part is not None else ():
@@ -330,10 +330,10 @@ def _values(category: int, record: Any) -> dict[str, Any]:
             continue
         content = item.variation.content
         if name == "name":
-            found[name] = content.as_string().strip()
+            quantities[name] = content.as_string().strip()
             continue
         steps = content.as_uint()
         if field.signed and steps >= 2 ** (field.bits - 1):
             steps -= 2**field.bits
-        found[name] = steps * field.step
-    return found
+        quantities[name] = steps * field.step
+    return quantities

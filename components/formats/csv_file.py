@@ -17,7 +17,7 @@ from components.formats.sample_table import (
     SampleTable,
     complete_velocity,
     enu_velocity,
-    places_of,
+    indices_of,
     unit_factor,
 )
 from components.formats.text_rows import (
@@ -112,11 +112,11 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
     """Match the headers; a missing required column ends the reading."""
     parsed = [_name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
-    found: dict[str, SampleColumn] = {}
-    places = places_of(COLUMNS, names)
-    shown = shown_columns(headers, bool(places))
+    columns: dict[str, SampleColumn] = {}
+    indices = indices_of(COLUMNS, names)
+    shown = shown_columns(headers, bool(indices))
     for quantity, spec in COLUMNS.items():
-        if quantity not in places:
+        if quantity not in indices:
             if spec.required:
                 hint = did_you_mean(quantity, names).replace("did you mean", "is it")
                 problems.add(
@@ -125,20 +125,20 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
                     line=line,
                 )
             continue
-        index = places[quantity]
+        index = indices[quantity]
         factor = 1.0
         if quantity in UNITS:
             unit = parsed[index][1] or spec.unit
             factor = unit_factor(problems, quantity, unit, line=line, header=headers[index])
-        found[quantity] = SampleColumn(index, headers[index], factor)
+        columns[quantity] = SampleColumn(index, headers[index], factor)
     problems.raise_if_any()
-    if "trk" not in found and not complete_velocity(found) and "yaw" in found:
+    if "trk" not in columns and not complete_velocity(columns) and "yaw" in columns:
         # Receivers that log velocity call the track "heading".
-        found["trk"] = found["yaw"]
-    kept = complete_velocity(found)
+        columns["trk"] = columns["yaw"]
+    kept = complete_velocity(columns)
     for quantity in {q for parts in VELOCITIES for q in parts} - set(kept):
-        found.pop(quantity, None)
-    return found
+        columns.pop(quantity, None)
+    return columns
 
 
 def _name_and_unit(header: str) -> tuple[str, str | None]:

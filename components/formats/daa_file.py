@@ -15,7 +15,7 @@ from components.formats.sample_table import (
     SampleTable,
     complete_velocity,
     enu_velocity,
-    places_of,
+    indices_of,
     unit_factor,
 )
 from components.formats.text_rows import (
@@ -121,12 +121,12 @@ def _table(
     lines = read_lines(Path(path), problems)
     header_line, header_text = lines[0]
     headers = tokens(header_text)
-    places = _find_columns(problems, headers, header_line, extra)
+    indices = _find_columns(problems, headers, header_line, extra)
     notes: list[str] = []
-    units, body = _find_units(problems, headers, places, lines[1:], notes)
+    units, body = _find_units(problems, headers, indices, lines[1:], notes)
     columns = {}
-    for quantity in [*_wanted(places), *(q for q in extra if q in places)]:
-        index = places[quantity]
+    for quantity in [*_wanted(indices), *(q for q in extra if q in indices)]:
+        index = indices[quantity]
         line, token = units[quantity]
         if quantity in _OPTIONAL and clean_token(token) not in UNITS[quantity]:
             notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
@@ -136,14 +136,14 @@ def _table(
     ignored = [
         h
         for i, h in enumerate(headers)
-        if i != places["name"] and i not in {c.index for c in columns.values()}
+        if i != indices["name"] and i not in {c.index for c in columns.values()}
     ]
     if ignored:
         notes.append(f"columns ignored: {', '.join(ignored)}")
-    table = SampleTable(problems, places["name"], columns, optional=_OPTIONAL)
+    table = SampleTable(problems, indices["name"], columns, optional=_OPTIONAL)
     table.notes = notes
     for number, text in body:
-        row = cells(text, len(headers), places["name"])
+        row = cells(text, len(headers), indices["name"])
         if row is None:
             problems.add(
                 f"the row has {cell_count(text)} values: the header names {len(headers)} columns",
@@ -159,34 +159,34 @@ def _find_columns(
 ) -> dict[str, int]:
     """Find which column holds what; a missing required one ends the reading."""
     plain = [header.lower() for header in headers]
-    places = places_of({**COLUMNS, **{q: EXTRA_COLUMNS[q] for q in extra}}, plain)
-    offsets = any(q in places for q in ("sx", "sy", "sz")) and "lat" not in places
+    indices = indices_of({**COLUMNS, **{q: EXTRA_COLUMNS[q] for q in extra}}, plain)
+    offsets = any(q in indices for q in ("sx", "sy", "sz")) and "lat" not in indices
     required = ("name", "time", *(("sx", "sy", "sz") if offsets else ("lat", "lon", "alt")))
-    unused = [h for i, h in enumerate(plain) if i not in places.values()]
+    unused = [h for i, h in enumerate(plain) if i not in indices.values()]
     for quantity in required:
-        if quantity not in places:
+        if quantity not in indices:
             hint = did_you_mean(quantity, unused).replace("did you mean", "is it")
             problems.add(
-                f"there is no column {quantity!r} among {shown_columns(headers, bool(places))}"
+                f"there is no column {quantity!r} among {shown_columns(headers, bool(indices))}"
                 f"{hint}",
                 line=line,
             )
     problems.raise_if_any()
     for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):
-        places.pop(quantity, None)
-    return places
+        indices.pop(quantity, None)
+    return indices
 
 
-def _wanted(places: dict[str, int]) -> list[str]:
+def _wanted(indices: dict[str, int]) -> list[str]:
     """List the quantities to read: time, position and one complete velocity."""
-    wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in places]
-    return [*wanted, *complete_velocity(places)]
+    wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in indices]
+    return [*wanted, *complete_velocity(indices)]
 
 
 def _find_units(
     problems: Problems,
     headers: list[str],
-    places: dict[str, int],
+    indices: dict[str, int],
     lines: list[tuple[int, str]],
     notes: list[str],
 ) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
@@ -200,7 +200,7 @@ def _find_units(
     bracketed = "[" in text
     known = sum(clean_token(token) in ALL_TOKENS for token in row)
     if not bracketed and known < max(2, len(row) // 2):
-        used = [f"{headers[places[q]]} [{u}]" for q, u in assumed.items() if q in places]
+        used = [f"{headers[indices[q]]} [{u}]" for q, u in assumed.items() if q in indices]
         notes.append(f"there is no row of units; assumed {', '.join(used)}")
         return defaults, lines
     if len(row) != len(headers):
@@ -209,7 +209,7 @@ def _find_units(
             line=line,
         )
     units: dict[str, tuple[int | None, str]] = {
-        q: (line, row[places[q]]) for q in places if q in UNITS
+        q: (line, row[indices[q]]) for q in indices if q in UNITS
     }
     return units, lines[1:]
 

@@ -1,4 +1,4 @@
-"""Sets of encounters as arrays: who flies where in each of thousands, and what each weighs.
+"""Sets of encounters as arrays: the flights of each of thousands, and its weight.
 
 An aircraft is a row; rows of an encounter stand together, the ownship's first. A row holds either
 an initial state and *events* (climb, turn and acceleration, held from an instant on), or a sampled
@@ -67,33 +67,33 @@ class EncounterSet:
             f"{self.numbers[0]} to {self.numbers[-1]}; the nearest is {close}"
         )
 
-    def take(self, places: IntArray) -> "EncounterSet":
-        """Return the encounters at some places, as often as each stands there."""
+    def take(self, indices: IntArray) -> "EncounterSet":
+        """Return the encounters of some indices, as often as each is given."""
         counts, lengths = np.diff(self.first_rows), np.diff(self.starts)
-        rows = _runs(self.first_rows[places], counts[places])
+        rows = _runs(self.first_rows[indices], counts[indices])
         entries = _runs(self.starts[rows], lengths[rows])
         return replace(
             self,
-            numbers=self.numbers[places],
-            weights=self.weights[places],
-            first_rows=np.concatenate([[0], np.cumsum(counts[places])]),
+            numbers=self.numbers[indices],
+            weights=self.weights[indices],
+            first_rows=np.concatenate([[0], np.cumsum(counts[indices])]),
             names=tuple(self.names[row] for row in rows.tolist()),
             state={name: values[rows] for name, values in self.state.items()},
             starts=np.concatenate([[0], np.cumsum(lengths[rows])]),
             lists={name: values[entries] for name, values in self.lists.items()},
-            extra={name: values[places] for name, values in self.extra.items()},
+            extra={name: values[indices] for name, values in self.extra.items()},
         )
 
-    def without(self, places: Sequence[int]) -> "EncounterSet":
+    def without(self, indices: Sequence[int]) -> "EncounterSet":
         """Return the set without some encounters, which are counted."""
-        kept = self.take(np.delete(np.arange(len(self)), places))
-        return replace(kept, skipped=self.skipped + len(places))
+        kept = self.take(np.delete(np.arange(len(self)), indices))
+        return replace(kept, skipped=self.skipped + len(indices))
 
-    def together(self, place: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    def together(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         """Give for each intruder the times (n,) of both paths' samples at which both are there, and
         north, east and altitude (3, n) of the ownship and of the intruder.
         """
-        first, end = (int(self.first_rows[place + k]) for k in (0, 1))
+        first, end = (int(self.first_rows[index + k]) for k in (0, 1))
         own = self.path(first)
         for row in range(first + 1, end):
             other = self.path(row)
@@ -112,8 +112,8 @@ class EncounterSet:
         if self.kind == TRACKS:
             lists = self._lists(row)
             return lists["time_s"], lists["north_m"], lists["east_m"], lists["altitude_m"]
-        time_s, *place = flown_events([(self, row)], dynamics)
-        return time_s, *(part[:, 0] for part in place)  # type: ignore[return-value]
+        time_s, *position = flown_events([(self, row)], dynamics)
+        return time_s, *(part[:, 0] for part in position)  # type: ignore[return-value]
 
     def seconds(self, row: int) -> int:
         """Return how many whole seconds an aircraft of a set of events flies."""
@@ -135,11 +135,11 @@ def flown_events(
     whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
     state = {name: np.array([s.state[name][row] for s, row in aircraft]) for name in STATE}
     commands = np.empty((3, len(whole), len(aircraft)))
-    for column, (found, row) in enumerate(aircraft):
-        start, end = found.starts[row], found.starts[row + 1]
-        at = start + np.searchsorted(found.lists["time_s"][start:end], whole, side="right") - 1
+    for column, (of, row) in enumerate(aircraft):
+        start, end = of.starts[row], of.starts[row + 1]
+        at = start + np.searchsorted(of.lists["time_s"][start:end], whole, side="right") - 1
         for k, name in enumerate(LISTS[EVENTS][1:]):
-            commands[k, :, column] = found.lists[name][at]
+            commands[k, :, column] = of.lists[name][at]
     climb, turn, acceleration = commands
     flown = DYNAMICS[dynamics](
         state["altitude_m"] / FOOT_M,
@@ -162,8 +162,8 @@ def _runs(firsts: IntArray, lengths: IntArray) -> IntArray:
     """Return first, first + 1, ... of every run, one run after the other."""
     ends = np.cumsum(lengths)
     total = int(ends[-1]) if len(ends) else 0
-    found: IntArray = np.arange(total) + np.repeat(firsts - (ends - lengths), lengths)
-    return found
+    entries: IntArray = np.arange(total) + np.repeat(firsts - (ends - lengths), lengths)
+    return entries
 
 
 NAMES = ("ownship", "intruder")
@@ -183,8 +183,10 @@ def geometry_class(course_deg: FloatArray) -> AnyArray:
     """
     off = np.abs((course_deg + 180.0) % 360.0 - 180.0)
     side = np.where(course_deg % 360.0 < 180.0, "crossing from the left", "crossing from the right")
-    found: AnyArray = np.where(off >= 160.0, "head-on", np.where(off <= 70.0, "overtaking", side))
-    return found
+    geometry: AnyArray = np.where(
+        off >= 160.0, "head-on", np.where(off <= 70.0, "overtaking", side)
+    )
+    return geometry
 
 
 #: The column of a set that says of which encounter each is a copy.

@@ -129,9 +129,9 @@ def _of_asterix(path: Path, radar: str | None) -> Measurements:
     time_s = plots.scan_s[mine]
     if (plots.time_s[of] != time_s[scan]).any():
         entries["illuminated_s"] = plots.time_s[of]
-    place = (plots.own_lat_deg, plots.own_lon_deg, plots.own_alt_m)
-    pose = [*(values[mine] for values in place), *np.zeros((3, len(time_s)))]
-    # A plot may come before its scan is over: the look is told when its last one is there.
+    position = (plots.own_lat_deg, plots.own_lon_deg, plots.own_alt_m)
+    pose = [*(values[mine] for values in position), *np.zeros((3, len(time_s)))]
+    # A plot may come before its scan is over: the look arrives with its last one.
     arrival_s = time_s.copy()
     np.maximum.at(arrival_s, scan, plots.time_s[of])
     return Measurements(
@@ -168,10 +168,10 @@ def _of_csv(table: _Table) -> list[str]:
         raise AssertionError
 
     names, rows = csv_table(read_input_text(table.path), fail)
-    found = list(rows)
-    table.line = np.array([line for line, _ in found], dtype=np.int64)
-    for place, name in enumerate(names):
-        cells = [row[place] for _, row in found]
+    content = list(rows)
+    table.line = np.array([line for line, _ in content], dtype=np.int64)
+    for index, name in enumerate(names):
+        cells = [row[index] for _, row in content]
         if name in ("block", "target"):
             table.texts[name] = [cell or None for cell in cells]
         elif name in LIMITS or name in ("declared", "cued"):
@@ -284,9 +284,9 @@ def _looks(table: _Table, scans: _Table | None) -> Measurements:
     time_s, first = np.unique(of.numbers["time_s"], return_index=True)
     arrival_s = of.numbers.get("arrival_s", of.numbers["time_s"])[first]
     if scans is not None and "arrival_s" in table.numbers:  # detections alone may say it
-        place = np.searchsorted(time_s, table.numbers["time_s"])
+        index = np.searchsorted(time_s, table.numbers["time_s"])
         arrival_s = arrival_s.copy()
-        arrival_s[place] = table.numbers["arrival_s"]
+        arrival_s[index] = table.numbers["arrival_s"]
     if "scan" in of.numbers:
         scan = np.nan_to_num(of.numbers["scan"][first]).astype(np.int64)
     else:

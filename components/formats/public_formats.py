@@ -104,24 +104,24 @@ def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int,
     return encounters, damaged
 
 
-def waypoints_of(found: EncounterSet, dynamics: str = "euler") -> bytes:
+def waypoints_of(encounters: EncounterSet, dynamics: str = "euler") -> bytes:
     """Return a set as a file of waypoints."""
-    counts = np.unique(np.diff(found.first_rows))
+    counts = np.unique(np.diff(encounters.first_rows))
     if len(counts) > 1:
         raise EncounterSetError(
-            f"{found.source}: encounters have {counts.min()} to {counts.max()} aircraft: a file of "
-            "waypoints has the same number in all"
+            f"{encounters.source}: encounters have {counts.min()} to {counts.max()} aircraft: a "
+            "file of waypoints has the same number in all"
         )
-    parts = [struct.pack("<II", len(found), int(counts[0]))]
-    for place in range(len(found)):
-        rows = range(int(found.first_rows[place]), int(found.first_rows[place + 1]))
-        paths = [np.stack(found.path(row, dynamics)) for row in rows]
+    parts = [struct.pack("<II", len(encounters), int(counts[0]))]
+    for index in range(len(encounters)):
+        rows = range(int(encounters.first_rows[index]), int(encounters.first_rows[index + 1]))
+        paths = [np.stack(encounters.path(row, dynamics)) for row in rows]
         for path in paths:
             path[1:] /= FOOT_M
             if path.shape[1] > 65_535:
                 raise EncounterSetError(
-                    f"{found.source}: encounter {found.numbers[place]}: {path.shape[1]} samples: a "
-                    "file of waypoints holds 65,535 of each aircraft at most"
+                    f"{encounters.source}: encounter {encounters.numbers[index]}: {path.shape[1]} "
+                    "samples: a file of waypoints holds 65,535 of each aircraft at most"
                 )
             parts.append(path[1:, 0].astype("<f8").tobytes())
         for path in paths:
@@ -146,8 +146,8 @@ def read_encounters(
     """
     kinds = {path.suffix.lower() for path in paths}
     if kinds == {SET} and len(paths) == 1:
-        found = read_set(paths[0], skip_damaged)
-        return found if at is None else replace(found, reference_deg=at)
+        encounter_set = read_set(paths[0], skip_damaged)
+        return encounter_set if at is None else replace(encounter_set, reference_deg=at)
     if len(paths) == 1 and kinds <= set(WAYPOINTS):
         return _waypoints(paths[0], at or (0.0, 0.0), skip_damaged)
     if not paths or not kinds <= {TEXT, TABLE, MATRIX}:
@@ -210,5 +210,7 @@ def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> Encou
     if not encounters:
         raise EncounterSetError(f"{path}: holds no encounter")
     every = range(len(encounters))
-    found = set_of_tracks(str(path), every, np.ones(len(encounters)).tolist(), encounters, at)
-    return found.without(sorted(damaged)) if damaged else found
+    encounter_set = set_of_tracks(
+        str(path), every, np.ones(len(encounters)).tolist(), encounters, at
+    )
+    return encounter_set.without(sorted(damaged)) if damaged else encounter_set

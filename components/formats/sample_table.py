@@ -82,10 +82,10 @@ class ColumnSpec:
     required: bool = False
 
 
-def places_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
+def indices_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
     """Return in which column of a file each quantity stands that is there."""
-    found = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
-    return {quantity: names.index(name) for quantity, name in found.items() if name is not None}
+    name_of = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
+    return {quantity: names.index(name) for quantity, name in name_of.items() if name is not None}
 
 
 def complete_velocity(there: Collection[str]) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ def complete_velocity(there: Collection[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class SampleColumn:
-    """A column that is read: its place in the row, its header and its factor to s, m, m/s, deg."""
+    """A column that is read: its index in the row, its header and its factor to s, m, m/s, deg."""
 
     index: int
     header: str

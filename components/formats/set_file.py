@@ -116,29 +116,29 @@ class _SetReader:
         wrong = self.wrong_rows(starts, lists, flat, weights, names) | wrong
         said: dict[int, str] = {}
         for row in sorted(wrong):
-            place = int(np.searchsorted(bounds, row, side="right")) - 1
-            said.setdefault(place, wrong[row])
-        for place in np.flatnonzero(np.diff(bounds) < 2).tolist():
-            said.setdefault(place, "has one aircraft: an ownship and an intruder are needed")
+            index = int(np.searchsorted(bounds, row, side="right")) - 1
+            said.setdefault(index, wrong[row])
+        for index in np.flatnonzero(np.diff(bounds) < 2).tolist():
+            said.setdefault(index, "has one aircraft: an ownship and an intruder are needed")
         with np.errstate(invalid="ignore"):
             same = np.add.reduceat(
                 np.abs(weights - np.repeat(weights[first], np.diff(bounds))), first
             )
-        for place in np.flatnonzero(same > 0.0).tolist():
-            said.setdefault(place, "its aircraft have different weights")
+        for index in np.flatnonzero(same > 0.0).tolist():
+            said.setdefault(index, "its aircraft have different weights")
         if said and (not skip_damaged or len(said) == len(rows_of)):
-            places = sorted(said)
-            lines = [f"{self.path}: encounter {rows_of[p]}: {said[p]}" for p in places]
+            indices = sorted(said)
+            lines = [f"{self.path}: encounter {rows_of[p]}: {said[p]}" for p in indices]
             more = [f"and {len(lines) - _MOST_SAID} more"] if len(lines) > _MOST_SAID else []
             raise EncounterSetError("\n".join([*lines[:_MOST_SAID], *more]))
         if not (weights > 0.0).any():
             raise self.fail("all weights are 0")
         reference, extra = self.reference(), self.extra(first)
-        found = EncounterSet(
+        result = EncounterSet(
             str(self.path), self.kind, rows_of, weights[first], bounds, tuple(map(str, names)),
             flat, starts, lists, reference, extra,
         )  # fmt: skip
-        return found.without(sorted(said)) if said else found
+        return result.without(sorted(said)) if said else result
 
     def column(self, name: str) -> FloatArray:
         column = self.table[name]
@@ -153,7 +153,7 @@ class _SetReader:
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        found, wrong = {}, dict[int, str]()
+        lists, wrong = {}, dict[int, str]()
         starts: IntArray | None = None
         for name in self.lists:
             column = self.table[name].combine_chunks()
@@ -182,9 +182,9 @@ class _SetReader:
                 same = wanted == lengths
                 whole[np.repeat(same, wanted)] = values[np.repeat(same, lengths)]
                 values = whole
-            found[name] = values
+            lists[name] = values
         assert starts is not None
-        return starts, found, wrong
+        return starts, lists, wrong
 
     def wrong_rows(
         self,
@@ -195,12 +195,12 @@ class _SetReader:
         names: list[Any],
     ) -> dict[int, str]:
         """Return row → the first thing that is wrong with it."""
-        found: dict[int, str] = {}
+        problems: dict[int, str] = {}
         row_of = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
         def note(rows: AnyArray, what: str) -> None:
             for row in np.unique(rows).tolist():
-                found.setdefault(row, what.format(aircraft=names[row]))
+                problems.setdefault(row, what.format(aircraft=names[row]))
 
         with np.errstate(invalid="ignore"):
             note(np.flatnonzero(np.isnan(weights)), "weight is missing")
@@ -234,7 +234,7 @@ class _SetReader:
             firsts = starts[:-1][np.diff(starts) > 0]
             late = firsts[time_s[firsts] != 0.0]
             note(row_of[late], "{aircraft}: the first event must be at time_s 0")
-        return found
+        return problems
 
     def reference(self) -> tuple[float, float]:
         try:

@@ -129,27 +129,27 @@ class Problems:
     def __init__(self, path: str, of: str = "line") -> None:
         self.path, self._of = path, of
         #: Line (infinite for none) and text.
-        self._found: list[tuple[float, str]] = []
+        self._lines: list[tuple[float, str]] = []
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         """Note a problem, with its line and column where it has them."""
-        place = [f"{self._of} {line}"] if line is not None else []
-        place += [f"column {column}"] if column is not None else []
-        if len(self._found) < MOST_PROBLEMS:
-            text = f"{', '.join(place)}: {problem}" if place else problem
-            self._found.append((math.inf if line is None else line, text))
+        where = [f"{self._of} {line}"] if line is not None else []
+        where += [f"column {column}"] if column is not None else []
+        if len(self._lines) < MOST_PROBLEMS:
+            text = f"{', '.join(where)}: {problem}" if where else problem
+            self._lines.append((math.inf if line is None else line, text))
         else:
             self._more += 1
 
     def raise_if_any(self) -> None:
         """Raise one `TrafficFileError` with all problems so far, in order of their lines."""
-        if not self._found:
+        if not self._lines:
             return
-        found = [text for _, text in sorted(self._found, key=lambda one: one[0])]
+        lines = [text for _, text in sorted(self._lines, key=lambda one: one[0])]
         if self._more:
-            found[-1] += f" (and {self._more} more problems)"
-        raise TrafficFileError(self.path, found)
+            lines[-1] += f" (and {self._more} more problems)"
+        raise TrafficFileError(self.path, lines)
 
     def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         """Note a problem that makes reading on pointless, and raise."""

@@ -67,7 +67,7 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
     return values
 
 
-def _places(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
+def _indices(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     for name in wanted:
         if name not in names:
             raise _wrong(path, f"there is no column {name!r}{did_you_mean(name, names)}", 1)
@@ -78,20 +78,20 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
     """Read the tracks of a CSV table; one for each ``ID``, in order of their first rows."""
     names, rows = _table(path)
     wanted = _PLANE if "time_s" in names else _GEODETIC
-    places = _places(path, names, wanted)
-    found: dict[str, list[list[float]]] = {}
+    indices = _indices(path, names, wanted)
+    rows_of: dict[str, list[list[float]]] = {}
     for line, row in rows:
-        who = row[places[0]] if wanted is _GEODETIC else ""
-        values = _numbers(path, line, [row[k] for k in places[wanted is _GEODETIC :]])
+        name = row[indices[0]] if wanted is _GEODETIC else ""
+        values = _numbers(path, line, [row[k] for k in indices[wanted is _GEODETIC :]])
         if wanted is _GEODETIC and not (abs(values[1]) <= 90.0 and abs(values[2]) <= 360.0):
             said = f"lat, lon = {values[1]:g}, {values[2]:g}: must lie within ±90 and ±360 degrees"
             raise _wrong(path, said, line)
-        found.setdefault(who, []).append(values)
-    if not found:
+        rows_of.setdefault(name, []).append(values)
+    if not rows_of:
         raise _wrong(path, "a row of column names and rows of samples are needed")
-    tracks = [np.array(samples).T for samples in found.values()]
-    for who, samples in zip(found, tracks, strict=True):
-        _rising(path, who, samples[0])
+    tracks = [np.array(samples).T for samples in rows_of.values()]
+    for name, samples in zip(rows_of, tracks, strict=True):
+        _rising(path, name, samples[0])
     if wanted is _PLANE:
         return [_feet(t, x, y, z) for t, x, y, z in tracks], None
     origin = at or (float(tracks[0][1, 0]), float(tracks[0][2, 0]))
@@ -138,7 +138,7 @@ def read_track_matrices(path: Path) -> Tracks:
         raise EncounterSetError(
             f"{path}: is no MATLAB file of version 7 or less: {str(error)[:200]}"
         ) from None
-    found: list[FloatArray] = []
+    matrices: list[FloatArray] = []
     classes: list[str] = []
 
     def number(name: str) -> list[object]:
@@ -163,7 +163,7 @@ def read_track_matrices(path: Path) -> Tracks:
             and value.shape[1] >= 2
         ):
             matrix = value.astype(float)
-            found.extend([matrix] if value.ndim == 2 else np.moveaxis(matrix, 2, 0))
+            matrices.extend([matrix] if value.ndim == 2 else np.moveaxis(matrix, 2, 0))
 
     for name in sorted((n for n in content if not n.startswith("__")), key=number):
         gather(content[name])
@@ -173,28 +173,28 @@ def read_track_matrices(path: Path) -> Tracks:
             "outside of MATLAB: its initial states and events are the columns of a set (.parquet), "
             f"its flown tracks are matrices of {_ROWS} rows"
         )
-    if not found and any(np.ndim(v) == 2 and np.shape(v)[1] == 4 for v in content.values()):
+    if not matrices and any(np.ndim(v) == 2 and np.shape(v)[1] == 4 for v in content.values()):
         raise EncounterSetError(
             f"{path}: holds events (4 columns: time, vertical rate, turn rate, acceleration) and "
             "no initial state: both together are the columns of a set (.parquet)"
         )
-    if not found:
+    if not matrices:
         raise EncounterSetError(
             f"{path}: holds no matrix of {_ROWS} rows (time in s, north, east, altitude in ft, "
             "velocities), one for each aircraft"
         )
-    for k, matrix in enumerate(found):
+    for k, matrix in enumerate(matrices):
         if not np.isfinite(matrix[:4]).all():
             raise EncounterSetError(f"{path}: aircraft {k + 1}: holds something else than numbers")
         if matrix[0, 0] < 0.0:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: time is negative")
         _rising(path, f"aircraft {k + 1}", matrix[0])
-    return [_feet(*matrix[:4]) for matrix in found], None
+    return [_feet(*matrix[:4]) for matrix in matrices], None
 
 
-def _rising(path: Path, who: str, time_s: FloatArray) -> None:
+def _rising(path: Path, name: str, time_s: FloatArray) -> None:
     if (np.diff(time_s) <= 0.0).any():
-        raise EncounterSetError(f"{path}: {who or 'the track'}: times must rise")
+        raise EncounterSetError(f"{path}: {name or 'the track'}: times must rise")
 
 
 def _feet(time_s: FloatArray, north: FloatArray, east: FloatArray, up: FloatArray) -> Track:
@@ -210,24 +210,24 @@ def encounter_of(tracks: list[Track]) -> list[tuple[str, Track]]:
 def read_paired_text(path: Path) -> list[tuple[str, Track]]:
     """Read one encounter of paired tracks: a row of names, one of units, and samples."""
     names, rows = _table(path)
-    places = _places(path, names, _PAIRED)
+    indices = _indices(path, names, _PAIRED)
     line, units = next(rows, (0, [""] * len(names)))
     factors = []
-    for name, place in zip(_PAIRED[1:], places[1:], strict=True):
-        unit = units[place].strip("[]").lower()
+    for name, index in zip(_PAIRED[1:], indices[1:], strict=True):
+        unit = units[index].strip("[]").lower()
         known = {"s": 1.0} if name == "time" else {"ft": FOOT_M, "m": 1.0}
         if unit not in known:
             raise _wrong(path, f"{name} is in {unit!r}: must be {' or '.join(known)}", line)
         factors.append(known[unit])
-    found: dict[str, list[list[float]]] = {}
+    rows_of: dict[str, list[list[float]]] = {}
     for line, row in rows:
-        found.setdefault(row[places[0]], []).append(
-            _numbers(path, line, [row[place] for place in places[1:]])
+        rows_of.setdefault(row[indices[0]], []).append(
+            _numbers(path, line, [row[index] for index in indices[1:]])
         )
-    if len(found) < 2:
+    if len(rows_of) < 2:
         raise _wrong(path, "has one aircraft: an ownship and an intruder are needed")
     encounter = []
-    for name, samples in found.items():
+    for name, samples in rows_of.items():
         time_s, east, north, up = np.array(samples).T * np.array(factors)[:, np.newaxis]
         _rising(path, name, time_s)
         encounter.append((name.lower(), (time_s, north, east, up)))

@@ -251,10 +251,10 @@ class ScanningLaser(SweepingSensor):
         return self._probability(*self.snr_and_shots(cells))
 
     def _probability(self, snr: FloatArray, shots: FloatArray) -> FloatArray:
-        found: FloatArray = scan_detection_probability(
+        pd: FloatArray = scan_detection_probability(
             snr, shots, threshold=self.threshold, needed=self.p.hits_needed
         )
-        return found
+        return pd
 
     def look(self, cells: Cells) -> Look:
         """Decide by one draw whether a scan detects each target, and how strong its echo was."""

@@ -14,6 +14,14 @@ from dsa_des.block.message import Column, Message, Text, column, columns, static
 #: What a track may be, in the order of its numbers.
 STATUSES = ("tentative", "confirmed", "coasted", "deleted")
 TENTATIVE, CONFIRMED, COASTED, DELETED = range(4)
+#: Statuses of tracks that are believed in.
+HELD = STATUSES[CONFIRMED], STATUSES[COASTED]
+
+
+def held(status: Text) -> BoolArray:
+    """Return which rows of a column of statuses are of confirmed or coasted tracks."""
+    return np.isin(status.codes, [k for k, name in enumerate(status.names) if name in HELD])
+
 
 _UNITS = (("m²", ""), ("m²/s", "_s"), ("m²/s²", "_s2"))
 #: Column of every element of the covariance's upper triangle, row by row.

@@ -26,7 +26,7 @@ def said(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
     `at` is where each is cut off, empty where it is not; values are NaN where it did not happen, if
     that is worth saying.
     """
-    found = np.array([f"at {where}" if where else None for where in at.tolist()], dtype=object)
+    result = np.array([f"at {where}" if where else None for where in at.tolist()], dtype=object)
     if values is not None:
-        found[np.isnan(values)] = NEVER
-    return found
+        result[np.isnan(values)] = NEVER
+    return result

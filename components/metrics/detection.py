@@ -2,8 +2,7 @@
 (``first_detection``, ``declaration``, ``detection_share``)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -53,12 +52,12 @@ class FirstDetection(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return three results per sensor."""
-        found = []
+        results = []
         for name in self.names:
             label = "the fusion" if name == FUSED else name
             block = self.fusion if name == FUSED else name
             time, cut = f"first report by {label}, s", f"first_detection_cut_off.{name}"
-            found += [
+            results += [
                 Result(
                     f"detected.{name}", EVENT, f"whether {label} reports the target at all",
                     told=Told(label, "no longer sees any target", "now sees a target"), block=block,
@@ -73,19 +72,19 @@ class FirstDetection(TargetMetric):
                     least=0.0,
                 ),
             ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return the first report of every replica."""
-        found: dict[str, AnyArray] = {}
+        values: dict[str, AnyArray] = {}
         for name in self.names:
             time_s, range_m = first_report(group, name, self.p.target)
-            found[f"detected.{name}"] = (~np.isnan(time_s)).astype(float)
-            found[f"first_detection_time_s.{name}"] = time_s
-            found[f"first_detection_range_m.{name}"] = range_m
+            values[f"detected.{name}"] = (~np.isnan(time_s)).astype(float)
+            values[f"first_detection_time_s.{name}"] = time_s
+            values[f"first_detection_range_m.{name}"] = range_m
             cut = self._fused_at_start(group) if name == FUSED else at_start(group, name, time_s)
-            found[f"first_detection_cut_off.{name}"] = start_or_never(cut, time_s)
-        return found
+            values[f"first_detection_cut_off.{name}"] = start_or_never(cut, time_s)
+        return values
 
     def _fused_at_start(self, group: Group) -> BoolArray:
         """Return whether a replica's first fused report is of what a sensor's first scan saw."""
@@ -94,15 +93,15 @@ class FirstDetection(TargetMetric):
         first = first_rows(columns, rows, len(group))
         sensors = columns["sensors"]
         code = np.where(first >= 0, sensors.codes[first], -1) if len(rows) else first
-        found = np.zeros(len(group), dtype=bool)
+        result = np.zeros(len(group), dtype=bool)
         for number, names in enumerate(sensors.names):
             for name in names.split("+"):
                 # Lateness on the way may vary, but not by a whole scan.
                 seen_s = taken(columns, "time_s", first) - self.delay_s.get(name, 0.0)
                 begun = ~np.isnan(scan_time_s(group, name, 1))
                 again_s = scan_time_s(group, name, 2)
-                found |= (code == number) & begun & ~(seen_s >= again_s)
-        return found
+                result |= (code == number) & begun & ~(seen_s >= again_s)
+        return result
 
 
 def first_report(group: Group, name: str, target: str | None) -> list[FloatArray]:
@@ -138,7 +137,7 @@ class DetectionShare(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Count looks and detections of every replica."""
         scans, detections = group.tables["scans"], group.tables["detections"]
-        found: dict[str, FloatArray] = {}
+        values: dict[str, FloatArray] = {}
         for name in self.names:
             looks = is_named(scans["block"], name)
             hits = is_named(detections["block"], name) & of_target(detections, None)
@@ -148,8 +147,8 @@ class DetectionShare(TargetMetric):
             )
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
-            found |= with_trials(f"detection_share.{name}", successes, trials)
-        return found
+            values |= with_trials(f"detection_share.{name}", successes, trials)
+        return values
 
 
 class DeclarationParameters(SensorMetricParameters):
@@ -188,11 +187,11 @@ class Declaration(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return four results per sensor."""
-        found = []
+        results = []
         for name in self.names:
             cut = f"declaration_cut_off.{name}"
             label = "any of the sensors" if name == ANY else name
-            found += [
+            results += [
                 Result(
                     f"declared.{name}", EVENT, "whether the target is declared",
                     told=Told(label, "no longer declares any target", "now declares a target"),
@@ -210,34 +209,33 @@ class Declaration(TargetMetric):
                     least=0.0,
                 ),
             ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return the first declaration of every replica."""
-        found: dict[str, AnyArray] = {}
+        values: dict[str, AnyArray] = {}
         for name, first in declarations(group, self.p, self.sensors).items():
-            found[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
-            found[f"declaration_time_s.{name}"] = first.time_s
-            found[f"declaration_range_m.{name}"] = first.range_m
-            found[f"declaration_delay_s.{name}"] = first.time_s - first.seen_s
+            values[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
+            values[f"declaration_time_s.{name}"] = first.time_s
+            values[f"declaration_range_m.{name}"] = first.range_m
+            values[f"declaration_delay_s.{name}"] = first.time_s - first.seen_s
             cut = start_or_never(first.at_start, first.time_s)
-            found[f"declaration_cut_off.{name}"] = cut
-        return found
+            values[f"declaration_cut_off.{name}"] = cut
+        return values
 
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return scan period × (m - 1): the delay where every scan detects."""
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for name in self.sensors:
             parameters = scene.blocks[name].parameters
             clock = scene.blocks[name].cls.clock_of(parameters)
             m = needed(self.p.m, scene, name)
             if clock is not None:
-                found[f"declaration_delay_s.{name}"] = float(clock.period_s * (m - 1))
-        return found
+                values[f"declaration_delay_s.{name}"] = float(clock.period_s * (m - 1))
+        return values
 
 
-@dataclass(frozen=True, eq=False)
-class Declared:
+class Declared(NamedTuple):
     """The first declaration of a target by a sensor, and its first detection, (replicas,) each.
 
     NaN where there is none; ``at_start`` where it is as early as the start of the run lets it.
@@ -245,8 +243,8 @@ class Declared:
 
     time_s: FloatArray
     range_m: FloatArray
-    seen_s: FloatArray
     at_start: BoolArray
+    seen_s: FloatArray
     seen_at_start: BoolArray
 
 
@@ -264,7 +262,7 @@ def _declarations(
     columns: Any = group.tables["detections"]
     known = of_target(columns, parameters.target)
     count = len(group)
-    found: dict[str, Declared] = {}
+    result: dict[str, Declared] = {}
     for name in sensors:
         rows = np.flatnonzero(known & is_named(columns["block"], name))
         if parameters.m is None or parameters.n is None:
@@ -281,15 +279,15 @@ def _declarations(
         time_s = taken(columns, "time_s", first)
         seen_s = taken(columns, "time_s", first_rows(columns, rows, count))
         scans = needed(parameters.m, group.scene, name)
-        found[name] = Declared(
+        result[name] = Declared(
             time_s,
             taken(columns, "true_range_m", first),
-            seen_s,
             at_start(group, name, time_s, scans),
+            seen_s,
             at_start(group, name, seen_s),
         )
-    found[ANY] = _earliest(list(found.values()), count)
-    return found
+    result[ANY] = _earliest(list(result.values()), count)
+    return result
 
 
 def needed(m: int | None, scene: Scene, name: str) -> int:
@@ -299,20 +297,15 @@ def needed(m: int | None, scene: Scene, name: str) -> int:
 
 def _earliest(each: list[Declared], count: int) -> Declared:
     """Return the first declaration, and the first detection, of any sensor."""
-
-    def joined(name: str) -> AnyArray:
-        return np.array([getattr(one, name) for one in each]).reshape(len(each), count)
+    time_s, range_m, at_start, seen_s, seen_at_start = map(np.array, zip(*each, strict=True))
 
     def first(time_s: AnyArray) -> Any:
-        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0)[np.newaxis]
+        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0), np.arange(count)
 
-    declared, seen = first(joined("time_s")), first(joined("seen_s"))
-    values = [
-        np.take_along_axis(joined(name), which, axis=0)[0]
-        for name, which in (("time_s", declared), ("range_m", declared), ("seen_s", seen),
-                            ("at_start", declared), ("seen_at_start", seen))
-    ]  # fmt: skip
-    return Declared(*values)
+    declared, seen = first(time_s), first(seen_s)
+    return Declared(
+        time_s[declared], range_m[declared], at_start[declared], seen_s[seen], seen_at_start[seen]
+    )
 
 
 def _m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:

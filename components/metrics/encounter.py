@@ -13,11 +13,10 @@ from pydantic import Field
 
 from components.metrics.censored import END, START, in_scan, said
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
-from components.metrics.flown_flights import Read, RecordedManoeuvres, each_alone, read_flights
+from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
     SCANS,
-    TargetMetric,
     TargetParameters,
     is_named,
     of_target,
@@ -100,21 +99,13 @@ class WellClearParameters(EncounterParameters, SizeParameters):
     step_s: float | None = STEP  # type: ignore[assignment]
 
 
-class _Encounter(TargetMetric):
+class _Encounter(FlownMetric):
     Parameters = EncounterParameters
     tables = {**DECLARED, **SCANS}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        traffic_block(scene)
         self.sensors = sensors_of(scene, parameters.sensors)
-        self._steering = RecordedManoeuvres(scene)
-        self.tables = {**self.tables, **self._steering.tables}
-
-    def of_flights(self, group: Group, read: Read) -> FloatArray:
-        """Return what `read` makes of every replica's flights as flown, (values, replicas)."""
-        steering = self._steering.of(group)
-        return read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
 
 
 class ClosestApproach(_Encounter):
@@ -125,13 +116,13 @@ class ClosestApproach(_Encounter):
 
     def results(self) -> list[Result]:
         """Return distance, time, and times from detection and declaration."""
-        found = [
+        results = [
             Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF, least=0.0),
             Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF, least=0.0),
         ]
         for name in [*self.sensors, ANY]:
             seen, declared = (f"{what}_to_closest_cut_off.{name}" for what in _BEFORE)
-            found += [
+            results += [
                 Result(
                     f"detection_to_closest_s.{name}", NUMBER, "from first detection to it, s", seen
                 ),
@@ -140,14 +131,14 @@ class ClosestApproach(_Encounter):
                     declared,
                 ),
             ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        distance, time_s, code = self.of_flights(group, each_alone(_closest))
+        distance, time_s, code = self.of_flights(group, each_alone(_closest), to_the_end=True)
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
-        found: dict[str, AnyArray] = {
+        values: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,
             _CUT_OFF: said(at, distance),
@@ -156,9 +147,9 @@ class ClosestApproach(_Encounter):
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
                 value = time_s - when_s
-                found[f"{what}_to_closest_s.{name}"] = value
-                found[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
-        return found
+                values[f"{what}_to_closest_s.{name}"] = value
+                values[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
+        return values
 
 
 class WellClear(_Encounter):
@@ -169,7 +160,7 @@ class WellClear(_Encounter):
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
-        found = [
+        results = [
             Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
             Result("nmac", EVENT, _cylinder_text(self.p.sizes_m[1], _NMAC)),
             Result(
@@ -180,20 +171,20 @@ class WellClear(_Encounter):
                 least=0.0,
             ),
         ]
-        found += [
+        results += [
             Result(
                 f"warning_time_s.{name}", NUMBER, "from declaration to the loss, s",
                 f"warning_cut_off.{name}",
             )
             for name in [*self.sensors, ANY]
         ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s)
+        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, to_the_end=True)
         lost_at_start = in_scan(lost_s, begun_s)
-        found: dict[str, AnyArray] = {
+        values: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
             "nmac": (~np.isnan(collision_s)).astype(float),
             "well_clear_loss_time_s": lost_s,
@@ -201,10 +192,10 @@ class WellClear(_Encounter):
         }
         for name, first in declarations(group, self.p, self.sensors).items():
             warning_s = lost_s - first.time_s
-            found[f"warning_time_s.{name}"] = warning_s
+            values[f"warning_time_s.{name}"] = warning_s
             cut = (first.at_start | lost_at_start) & ~np.isnan(warning_s)
-            found[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
-        return found
+            values[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
+        return values
 
 
 def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
@@ -242,7 +233,7 @@ class AlertTimeParameters(TargetParameters, SizeParameters):
     )
 
 
-class AlertTimes(TargetMetric):
+class AlertTimes(FlownMetric):
     """When alerts come before well clear is lost, and which are late, missed or for nothing.
 
     Where the ownship is steered, losses are by default those of what it would have flown: an alert
@@ -258,20 +249,17 @@ class AlertTimes(TargetMetric):
     tables = {"alerts": ("block", "target", "time_s", "level")}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
-        super().__init__(parameters, scene)
+        super().__init__(parameters, scene, steered=parameters.steered)
         traffic = traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = recorded_by(scene, "alerts")
-        if parameters.steered:
-            self._steering = RecordedManoeuvres(scene)
-            self.tables = {**self.tables, **self._steering.tables}
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
-        found = []
+        results = []
         for name in self._blocks:
-            found += [
+            results += [
                 Result(
                     f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s", least=0.0
                 ),
@@ -282,18 +270,14 @@ class AlertTimes(TargetMetric):
                 Result(f"alert_nuisance.{name}", EVENT, "alert, and well clear is never lost"),
                 Result(f"alert_surprise.{name}", EVENT, "alert hardly after the level below it"),
             ]
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        steering = self._steering.of(group) if self.p.steered else None
-        lost_s, nmac_s, _ = read_flights(
-            group, self.p.step_s, self.p.target, self.p.losses_s, steering,
-            to_the_end=self._as_flown,
-        )  # fmt: skip
+        lost_s, nmac_s, _ = self.of_flights(group, self.p.losses_s, to_the_end=self._as_flown)
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
-        found: dict[str, AnyArray] = {}
+        values: dict[str, AnyArray] = {}
         for name in self._blocks:
             mine = counts & is_named(columns["block"], name)
             first_s = _first_s(columns, mine & (columns["level"] >= self.p.level), len(group))
@@ -302,9 +286,9 @@ class AlertTimes(TargetMetric):
             before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
-            found[f"first_alert_time_s.{name}"] = first_s
-            found[f"alert_to_loss_s.{name}"] = lead_s
-            found[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
+            values[f"first_alert_time_s.{name}"] = first_s
+            values[f"alert_to_loss_s.{name}"] = lead_s
+            values[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
             for what, event in {
                 "missed": missed,
@@ -312,8 +296,8 @@ class AlertTimes(TargetMetric):
                 "nuisance": alerted & ~lost,
                 "surprise": sudden,
             }.items():
-                found[f"alert_{what}.{name}"] = event.astype(float)
-        return found
+                values[f"alert_{what}.{name}"] = event.astype(float)
+        return values
 
 
 def _first_s(columns: Mapping[str, Any], rows: BoolArray, replicas: int) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
+from components.metrics.rows import TargetMetric
 from components.metrics.separation import RelativeFlight, separations, traffic_block
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
@@ -32,14 +33,18 @@ def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[S
     return list(flights)
 
 
-class RecordedManoeuvres:
-    """The manoeuvres that reach the traffic block of a scene, by wires of a fixed delay only."""
+class FlownMetric(TargetMetric):
+    """A metric of true flights: as planned, or as recorded manoeuvres steered the ownship.
 
-    def __init__(self, scene: Scene) -> None:
+    Refused where manoeuvres reach the traffic block by wires of any but a fixed delay.
+    """
+
+    def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
+        super().__init__(parameters, scene)
         traffic = traffic_block(scene).name
-        #: Block that steers → delay of its manoeuvres.
-        self._delays_s: dict[str, float] = {}
-        for wire in scene.wires:
+        #: Block that steers → delay of its manoeuvres; of none where flights are those planned.
+        self.delays_s: dict[str, float] = {}
+        for wire in scene.wires if steered else ():
             if (wire.target, wire.input) == (traffic, "manoeuvres"):
                 if wire.jitter_s or wire.drop_probability or wire.queued or wire.delay_scans:
                     raise ValueError(
@@ -47,22 +52,15 @@ class RecordedManoeuvres:
                         "seconds, without jitter, loss or a processor: when manoeuvres begin is "
                         "not recorded"
                     )
-                self._delays_s[wire.source] = float(wire.total_delay_s)
+                self.delays_s[wire.source] = float(wire.total_delay_s)
+        if self.delays_s:
+            self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
 
-    def __bool__(self) -> bool:
-        """Whether anything steers the ownship."""
-        return bool(self._delays_s)
-
-    @property
-    def tables(self) -> dict[str, tuple[str, ...]]:
-        """Tables and columns that a metric has to read for it."""
-        return {"manoeuvres": ("block", "time_s", *_COLUMNS)} if self else {}
-
-    def of(self, group: Group) -> Mapping[int, Steering]:
+    def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
         """Return the manoeuvres of every replica of a group that has any."""
-        found: dict[int, list[tuple[float, Manoeuvre]]] = {}
-        if not self:
-            return found
+        result: dict[int, list[tuple[float, Manoeuvre]]] = {}
+        if not self.delays_s:
+            return result
         table: Any = group.tables["manoeuvres"]
         names = table["block"].names
         rows = zip(
@@ -70,12 +68,20 @@ class RecordedManoeuvres:
             *(table[name].tolist() for name in _COLUMNS), strict=True,
         )  # fmt: skip
         for replica, block, time_s, *values in rows:
-            if names[block] not in self._delays_s:
+            if names[block] not in self.delays_s:
                 continue
-            came_s = time_s + self._delays_s[names[block]]
+            came_s = time_s + self.delays_s[names[block]]
             if came_s < group.duration_s[replica]:
-                found.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
-        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in found.items()}
+                result.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
+        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in result.items()}
+
+    def of_flights(
+        self, group: Group, read: "Read", *, steered: bool = True, to_the_end: bool = False
+    ) -> FloatArray:
+        """Return what `read` makes of every replica's flights, (values, replicas)."""
+        steering = self.manoeuvres(group) if steered else None
+        target = getattr(self.p, "target", None)
+        return read_flights(group, self.p.step_s, target, read, steering, to_the_end=to_the_end)
 
 
 #: What is read of runs, each a list of its flights: (values, runs).

@@ -76,7 +76,7 @@ class FusedShare(TargetMetric):
         fused: Any = group.tables[FUSED]
         rows = of_target(fused, self.p.target) & is_named(fused["block"], self.fusion)
         fused = chosen(fused, rows, "target", "sensors", "time_s")
-        found: dict[str, FloatArray] = {}
+        values: dict[str, FloatArray] = {}
         for a, b in self.pairs:
             seen = is_named(detections["block"], a) & of_target(detections, self.p.target)
             own = chosen(detections, seen, "target", "time_s")
@@ -85,8 +85,8 @@ class FusedShare(TargetMetric):
             used = _latest(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))
-            found |= with_trials(_name(a, b), successes, trials)
-        return found
+            values |= with_trials(_name(a, b), successes, trials)
+        return values
 
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return the share of two periodic clocks, if every scan detects.
@@ -107,12 +107,12 @@ class FusedShare(TargetMetric):
             if clock is None:
                 return {}
             clocks[name] = clock
-        found = {}
+        values = {}
         for a, b in self.pairs:
             share = _expected_share(scene, gate, (clocks[a], arrives[a]), (clocks[b], arrives[b]))
             if share is not None:
-                found[_name(a, b)] = share
-        return found
+                values[_name(a, b)] = share
+        return values
 
 
 def _expected_share(
@@ -171,11 +171,11 @@ def _latest(own: dict[str, Any], fused: dict[str, Any], delay_s: float) -> IntAr
     time_s = np.concatenate([own["time_s"] + delay_s, fused["time_s"] + 1e-9])
     replica = np.concatenate([own["replica"], fused["replica"]])
     order = np.lexsort((time_s, np.concatenate([own["target"].codes, target]), replica))
-    place = np.where(order < start, np.arange(len(order)), -1)
-    last = np.maximum.accumulate(place) if len(place) else place
+    index = np.where(order < start, np.arange(len(order)), -1)
+    last = np.maximum.accumulate(index) if len(index) else index
     asked = order >= start
-    found = order[last[asked][last[asked] >= 0]]
-    return np.unique(found)
+    result = order[last[asked][last[asked] >= 0]]
+    return np.unique(result)
 
 
 def coincidence_share(
@@ -241,9 +241,9 @@ def mean_coincidence_share(
     period_ticks = float(other.period_s * ticks_per_s)
     reach = 1 + math.ceil((gate_ticks + _SIGMAS * sigma) / period_ticks)
     for step in range(-reach, reach):
-        place = after + step
-        there = np.flatnonzero((place >= 0) & (place < len(theirs)))
-        share[there] += _within(theirs[place[there]] - mine[there], gate_ticks, sigma)
+        index = after + step
+        there = np.flatnonzero((index >= 0) & (index < len(theirs)))
+        share[there] += _within(theirs[index[there]] - mine[there], gate_ticks, sigma)
     return float(np.mean(np.minimum(share, 1.0)))
 
 

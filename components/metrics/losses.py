@@ -1,6 +1,6 @@
 """First losses of separation and closest approaches, flight by flight and of many together.
 
-What is given of many flights is what is found flight by flight, to the bit.
+Results of many flights are those flight by flight, to the bit.
 """
 
 from collections.abc import Sequence
@@ -39,9 +39,9 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
     best = (float("inf"), float("nan"))
     looked_s = np.full(2, np.nan)
     for piece in flight.pieces():
-        place = int(np.argmin(piece.range_m))
-        if piece.range_m[place] < best[0]:
-            best = float(piece.range_m[place]), float(piece.time_s[place])
+        index = int(np.argmin(piece.range_m))
+        if piece.range_m[index] < best[0]:
+            best = float(piece.range_m[index]), float(piece.time_s[index])
         there_s = piece.time_s[np.isfinite(piece.range_m)]
         if len(there_s):
             looked_s = np.array([np.fmin(looked_s[0], there_s[0]), there_s[-1]])
@@ -54,15 +54,15 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
 
     Asked at the flight's times only, and exclusive; `first_losses_s` looks between them.
     """
-    found = [float("nan")] * len(limits_m)
+    result = [float("nan")] * len(limits_m)
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
             inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
-            if np.isnan(found[number]) and inside.any():
-                found[number] = float(piece.time_s[np.argmax(inside)])
-        if not np.isnan(found).any():
+            if np.isnan(result[number]) and inside.any():
+                result[number] = float(piece.time_s[np.argmax(inside)])
+        if not np.isnan(result).any():
             break
-    return found
+    return result
 
 
 def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
@@ -133,12 +133,12 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     NaN where a target never is. Flights that look between samples are asked by
     `components.well_clear.separation`, with its error bound; others at their times only.
     """
-    found = np.full((len(flights), len(limits_m)), np.nan)
+    result = np.full((len(flights), len(limits_m)), np.nan)
     between = [number for number, flight in enumerate(flights) if flight.between_samples]
     for number in sorted(set(range(len(flights))) - set(between)):
-        found[number] = first_inside(flights[number], *limits_m)
+        result[number] = first_inside(flights[number], *limits_m)
     if not between:
-        return found
+        return result
     rows = np.array(between)
     together = FlightsTogether([flights[number] for number in between])
     first_s, last_s = together.present_s()
@@ -149,14 +149,14 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
         maybe = np.ones(len(rows), dtype=np.bool_)
         for before, wider in enumerate(limits_m[:k]):
             if wider[0] >= limits[0] and wider[1] >= limits[1]:
-                maybe &= ~np.isnan(found[rows, before])
+                maybe &= ~np.isnan(result[rows, before])
         some = np.flatnonzero(maybe)
         apart = partial(_of_some, together.level_distances_m, some)
-        found[rows[some], k] = first_inside_cylinder(
+        result[rows[some], k] = first_inside_cylinder(
             apart, (np.maximum(first_s, 0.0)[some], np.minimum(last_s, end_s)[some]),
             closing_mps[some], *limits,
         )  # fmt: skip
-    return found
+    return result
 
 
 def nearest_of(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
@@ -164,13 +164,13 @@ def nearest_of(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArra
 
     Infinite and NaN where both are never there.
     """
-    found = np.full((2, len(flights)), np.inf)
+    result = np.full((2, len(flights)), np.inf)
     short = [number for number, flight in enumerate(flights) if flight.is_short]
     for number in sorted(set(range(len(flights))) - set(short)):
-        found[:, number] = closest(flights[number])[:2]
+        result[:, number] = closest(flights[number])[:2]
     if short:
-        found[:, short] = _nearest([flights[number] for number in short])
-    return found[0], found[1]
+        result[:, short] = _nearest([flights[number] for number in short])
+    return result[0], result[1]
 
 
 def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
@@ -215,11 +215,11 @@ def losses_s(
     if tau_s > 0.0:
         volume = Volume(*sizes_m[0], horizontal_time_s=tau_s)
         first[:, 0] = [first_violation_s(flight, volume) for flight in flights]
-    found = np.full((3, len(runs)), np.nan)
+    result = np.full((3, len(runs)), np.nan)
     for value in (0, 1):
-        np.fmin.at(found[value], of_run, first[:, value])
-    found[2, of_run] = 0.0
-    return found
+        np.fmin.at(result[value], of_run, first[:, value])
+    result[2, of_run] = 0.0
+    return result
 
 
 def _of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArray) -> Any:
@@ -240,10 +240,10 @@ def ways_of(
     every = np.arange(len(flights))
     here = position_of(together.own_at(every, time_s))
     ends = [np.clip(time_s + sign * base_s, first_s, last_s) for sign in (-1.0, 1.0)]
-    found = []
+    result = []
     for at in (together.own_at, together.target_at):
         (north0, east0, _), (north1, east1, _) = (
             line_of_sight_ned(*here, *position_of(at(every, end)), validate=False) for end in ends
         )
-        found.append(np.array([north1 - north0, east1 - east0]))
-    return found[0], found[1]
+        result.append(np.array([north1 - north0, east1 - east0]))
+    return result[0], result[1]

@@ -5,21 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from components.metrics.flown_flights import RecordedManoeuvres
+from components.metrics.flown_flights import FlownMetric
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import NUMBER, Group, Result
 
 
-class ManoeuvreTimes(Metric):
+class ManoeuvreTimes(FlownMetric):
     """When the first manoeuvre reaches the ownship, and how many do."""
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self._steering = RecordedManoeuvres(scene)
-        if not self._steering:
+        if not self.delays_s:
             raise ValueError("needs a block that steers the ownship: no manoeuvres are wired")
-        self.tables = self._steering.tables
 
     def results(self) -> list[Result]:
         """Return a time and a number."""
@@ -31,6 +29,6 @@ class ManoeuvreTimes(Metric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return both for every replica; no time where there is no manoeuvre."""
         first, count = np.full(len(group), np.nan), np.zeros(len(group))
-        for replica, steering in self._steering.of(group).items():
+        for replica, steering in self.manoeuvres(group).items():
             first[replica], count[replica] = steering[0][0], len(steering)
         return {"first_manoeuvre_time_s": first, "manoeuvres": count}

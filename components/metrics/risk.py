@@ -12,15 +12,15 @@ import numpy as np
 from pydantic import Field
 
 from components.metrics.encounter import STEP, SizeParameters, size
-from components.metrics.flown_flights import RecordedManoeuvres, each_alone, read_flights
-from components.metrics.rows import TargetMetric, TargetParameters
+from components.metrics.flown_flights import FlownMetric, each_alone
+from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Result
 
 __all__ = [
     "METHODS", "Mitigated", "RiskParameters", "RiskRatio", "Severity", "risk_ratio",
@@ -41,18 +41,16 @@ class RiskParameters(SizeParameters):
     step_s: float | None = STEP
 
 
-class Mitigated(Metric):
+class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
     Parameters = RiskParameters
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self._steering = RecordedManoeuvres(scene)
-        if not self._steering:
+        if not self.delays_s:
             name = traffic_block(scene).name
             raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
-        self.tables = {**self.tables, **self._steering.tables}
 
     def results(self) -> list[Result]:
         """Return both events, nominal and mitigated."""
@@ -66,28 +64,20 @@ class Mitigated(Metric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         read = self.p.losses_s
-        nominal = read_flights(group, self.p.step_s, None, read)[:2]
-        steering = self._steering.of(group)
-        mitigated = read_flights(group, self.p.step_s, None, read, steering)[:2]
-        found: dict[str, AnyArray] = {}
-        for k, name in enumerate(("well_clear_lost", "nmac")):
-            found[f"{name}_nominal"] = (~np.isnan(nominal[k])).astype(float)
-            found[f"{name}_mitigated"] = (~np.isnan(mitigated[k])).astype(float)
-        return found
+        values: dict[str, AnyArray] = {}
+        for which, steered in (("nominal", False), ("mitigated", True)):
+            lost_s, collision_s, _ = self.of_flights(group, read, steered=steered)
+            values[f"well_clear_lost_{which}"] = (~np.isnan(lost_s)).astype(float)
+            values[f"nmac_{which}"] = (~np.isnan(collision_s)).astype(float)
+        return values
 
 
-class SeverityParameters(TargetParameters):
+class SeverityParameters(TargetParameters, SizeParameters):
     """Sizes of the boundary, and whose altimeters are which."""
 
     horizontal_m: float = size(4000 * FOOT_M, "Horizontal size of well clear, m.")
     vertical_m: float = size(450 * FOOT_M, "Vertical size of well clear, m.")
     tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
-    nmac_horizontal_m: float = size(
-        500 * FOOT_M, "Horizontal distance of a near mid-air collision, m."
-    )
-    nmac_vertical_m: float = size(
-        100 * FOOT_M, "Difference in height of a near mid-air collision, m."
-    )
     mode_c_own: bool = Field(
         default=False,
         description="The ownship's altimeter is that of Mode C, or of no transponder.",
@@ -100,20 +90,13 @@ class SeverityParameters(TargetParameters):
     )
 
 
-class Severity(TargetMetric):
+class Severity(FlownMetric):
     """Largest severity of a loss of well clear, and probability of a near mid-air collision.
 
     Of several targets the most severe counts, for each of the two by itself.
     """
 
     Parameters = SeverityParameters
-    tables: Any = {}
-
-    def __init__(self, parameters: Any, scene: Scene) -> None:
-        super().__init__(parameters, scene)
-        traffic_block(scene)
-        self._steering = RecordedManoeuvres(scene)
-        self.tables = self._steering.tables
 
     def results(self) -> list[Result]:
         """Return both."""
@@ -130,9 +113,8 @@ class Severity(TargetMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
-        read, steering = each_alone(self._severities), self._steering.of(group)
-        found = read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
-        return {"slowc_percent": found[0], "pnmac": found[1]}
+        values = self.of_flights(group, each_alone(self._severities), to_the_end=True)
+        return {"slowc_percent": values[0], "pnmac": values[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
         each = [(self._severity(flight), self._collision(flight)) for flight in flights]
@@ -153,10 +135,10 @@ class Severity(TargetMetric):
         for piece in flight.pieces():
             time_s = piece.time_s[np.isfinite(piece.range_m)]
             if len(time_s):
-                found = at(time_s)
-                place = int(np.argmax(found))
-                if not found[place] <= best:
-                    best, best_s = float(found[place]), float(time_s[place])
+                result = at(time_s)
+                index = int(np.argmax(result))
+                if not result[index] <= best:
+                    best, best_s = float(result[index]), float(time_s[index])
         if not best > 0.0:
             return best
         return max(best, float(at(self._about(flight, best_s)).max()))
@@ -165,25 +147,25 @@ class Severity(TargetMetric):
         """Return the probability at the horizontal closest approach."""
         best, best_s = float("inf"), float("nan")
         for piece in flight.pieces():
-            place = int(np.argmin(piece.horizontal_m))
-            if piece.horizontal_m[place] < best:
-                best, best_s = float(piece.horizontal_m[place]), float(piece.time_s[place])
+            index = int(np.argmin(piece.horizontal_m))
+            if piece.horizontal_m[index] < best:
+                best, best_s = float(piece.horizontal_m[index]), float(piece.time_s[index])
         if not np.isfinite(best):
             return float("nan")
         time_s = self._about(flight, best_s)
         across_m = flight.at(time_s).horizontal_m
-        place = int(np.argmin(across_m))
-        own, other = flight.states(time_s[place : place + 1])
+        index = int(np.argmin(across_m))
+        own, other = flight.states(time_s[index : index + 1])
         own_m, other_m = (np.asarray(state.alt_m, dtype=np.float64) for state in (own, other))
-        found = collision_probability(
-            across_m[place],
+        result = collision_probability(
+            across_m[index],
             own_m - other_m,
             (own_m, other_m),
             (self.p.mode_c_own, self.p.mode_c_target),
             self.p.nmac_horizontal_m,
             self.p.nmac_vertical_m,
         )
-        return float(found[0])
+        return float(result[0])
 
     def _about(self, flight: RelativeFlight, time_s: float) -> FloatArray:
         """Return finer times about one, within the time at which both are there."""

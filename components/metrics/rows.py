@@ -37,15 +37,15 @@ class SensorMetricParameters(TargetParameters):
 
 
 class TargetMetric(Metric):
-    """A metric of one target, or of any."""
+    """A metric of one target, where its parameters name one, or of any."""
 
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Refuse a target that the traffic does not have."""
         sources = [block for block in blocks.values() if isinstance(block, TrafficSource)]
         names = [target.name for source in sources for target in source.targets]
-        if sources and self.p.target is not None and self.p.target not in names:
-            hint = did_you_mean(self.p.target, names)
-            raise ValueError(f"target: there is no {self.p.target!r}{hint}")
+        target = getattr(self.p, "target", None)
+        if sources and target is not None and target not in names:
+            raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")
 
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
@@ -77,12 +77,12 @@ def of_target(columns: Columns, target: str | None) -> BoolArray:
 def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
     """Return the chosen rows of ``replica`` and the named columns."""
     kept = np.flatnonzero(rows)
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name in ("replica", *names):
         values: Any = columns[name]
         text = isinstance(values, Text)
-        found[name] = Text(values.codes[kept], values.names) if text else values[kept]
-    return found
+        result[name] = Text(values.codes[kept], values.names) if text else values[kept]
+    return result
 
 
 def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
@@ -106,17 +106,17 @@ def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
     ranges = table["true_range_m"][rows]
     order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
     numbers, first = np.unique(table["replica"][rows][order], return_index=True)
-    found = np.full(count, -1, dtype=np.int64)
-    found[numbers] = rows[order][first]
-    return found
+    result = np.full(count, -1, dtype=np.int64)
+    result[numbers] = rows[order][first]
+    return result
 
 
 def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
     """Return a column at some rows, NaN where the row is -1."""
     values: Any = columns[name]
-    found = np.full(len(rows), np.nan)
-    found[rows >= 0] = values[rows[rows >= 0]]
-    return found
+    result = np.full(len(rows), np.nan)
+    result[rows >= 0] = values[rows[rows >= 0]]
+    return result
 
 
 def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
@@ -141,9 +141,9 @@ def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
     """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
     time_s, start, end = group.once(("scans_of", name), lambda: _scans_of(group, name))
     at = start + number - 1
-    found = np.full(len(group), np.nan)
-    found[at < end] = time_s[at[at < end]]
-    return found
+    result = np.full(len(group), np.nan)
+    result[at < end] = time_s[at[at < end]]
+    return result
 
 
 def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:

@@ -55,12 +55,12 @@ class Separation:
 
 def traffic_block(scene: Scene) -> Block:
     """Return the block that moves the aircraft; ValueError where not one knows its flights."""
-    found = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
-    if len(found) != 1:
+    result = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
+    if len(result) != 1:
         raise ValueError(
-            f"needs one block of traffic that knows its flights; this scene has {len(found)}"
+            f"needs one block of traffic that knows its flights; this scene has {len(result)}"
         )
-    return found[0]
+    return result[0]
 
 
 def traffic_of(scene: Scene) -> tuple[Any, float]:
@@ -110,9 +110,9 @@ class RelativeFlight:
 
     def flown_by(self, own: Any) -> "RelativeFlight":
         """Return the same with another flight of the ownship."""
-        found = copy(self)
-        found.own, found._known = own, None
-        return found
+        result = copy(self)
+        result.own, result._known = own, None
+        return result
 
     @property
     def is_short(self) -> bool:
@@ -126,10 +126,10 @@ class RelativeFlight:
 
     def sample_times_s(self) -> FloatArray:
         """Return 0 and the times within the grid at which the source itself has samples, s."""
-        found = [np.zeros(1)]
+        result = [np.zeros(1)]
         for times in self._samples():
-            found.append(_between(times, self._number, 0.0, self.grid_end_s))
-        return np.unique(np.concatenate(found))
+            result.append(_between(times, self._number, 0.0, self.grid_end_s))
+        return np.unique(np.concatenate(result))
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""

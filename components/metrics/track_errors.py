@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import STATUSES
+from components.messages.state_tracks import held
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -33,7 +33,7 @@ _ERRORS = {
 
 
 class ErrorsByRangeParameters(Parameters):
-    """At which ranges, and which share of the errors lies within what is told."""
+    """At which ranges, and which share of the errors lies within the result."""
 
     ranges_nmi: tuple[float, ...] = Field(
         default=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), min_length=1, max_length=40,
@@ -73,60 +73,59 @@ class ErrorsByRange(Metric):
     def results(self) -> list[Result]:
         """Return a result for each kind of error and range, and where tracks begin."""
         share = f"{100 * self.p.quantile:g} % quantile over runs"
-        found = [Result("first_track_range_nmi", NUMBER, "range at the first confirmed track")]
+        results = [Result("first_track_range_nmi", NUMBER, "range at the first confirmed track")]
         for r in self.p.ranges_nmi:
-            found.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
-            found += [
+            results.append(Result(f"tracked.{r:g}", EVENT, f"there is a track at {r:g} nmi"))
+            results += [
                 Result(f"{name}.{r:g}", NUMBER, f"{what}, at {r:g} nmi: {share}",
                        quantile=self.p.quantile, least=0.0)
                 for name, what in _ERRORS.items()
             ]  # fmt: skip
-        return found
+        return results
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return the sample of every replica at every range."""
-        found = {result.name: np.full(len(group), np.nan) for result in self.results()}
+        values = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
-        held = np.isin(columns["track_status"].codes, _confirmed(columns["track_status"].names))
-        held &= np.asarray(columns["has_range"], dtype=bool)
-        replica = np.asarray(columns["replica"])[held]
-        rows = np.flatnonzero(held)
+        kept = held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
+        replica = np.asarray(columns["replica"])[kept]
+        rows = np.flatnonzero(kept)
         starts = np.searchsorted(replica, np.arange(len(group) + 1))
         for number, scene in enumerate(group.scenes):
             mine = rows[starts[number] : starts[number + 1]]
             end_s = float(group.duration_s[number])
             for name, value in self._of_run(columns, mine, scene, end_s).items():
-                found[name][number] = value
-        return found
+                values[name][number] = value
+        return values
 
     def _of_run(self, columns: Any, rows: IntArray, scene: Scene, end_s: float) -> dict[str, float]:
         coverage = Coverage(scene)
         own, targets = coverage.aircraft
         time_s = np.arange(self.p.from_s, end_s + 1e-9, self.p.step_s)
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         if len(targets) != 1 or not len(time_s):
-            return found  # whose sample it would be is not known
+            return values  # whose sample it would be is not known
         (target,) = targets
         state = own.at(time_s)
         origin = np.stack([np.broadcast_to(v, time_s.shape) for v in
                            (state.lat_deg, state.lon_deg, state.alt_m)])  # fmt: skip
-        place, there = position_in_frame(target, time_s, origin)
-        range_m = np.sqrt((place**2).sum(axis=0))
+        position, there = position_in_frame(target, time_s, origin)
+        range_m = np.sqrt((position**2).sum(axis=0))
         seen = coverage.holds(target, time_s) & there
         error, of_rows, first_m = self._errors(columns, rows, own, target)
         if math.isfinite(first_m):
-            found["first_track_range_nmi"] = first_m / MILE_M
+            values["first_track_range_nmi"] = first_m / MILE_M
         for r in self.p.ranges_nmi:
             k = _nearest(range_m, r * MILE_M, seen)
             if k < 0:
                 continue
             told_s = columns["time_s"][of_rows]
             inside = (told_s <= time_s[k] + 1e-9) & (told_s > time_s[k] - 2.0 * self.p.step_s)
-            found[f"tracked.{r:g}"] = float(inside.any())
+            values[f"tracked.{r:g}"] = float(inside.any())
             if inside.any():
                 last = int(np.flatnonzero(inside)[-1])
-                found |= {f"{n}.{r:g}": float(error[n][last]) for n in _ERRORS}
-        return found
+                values |= {f"{n}.{r:g}": float(error[n][last]) for n in _ERRORS}
+        return values
 
     def _errors(
         self, columns: Any, rows: IntArray, own: Any, target: Any
@@ -160,7 +159,3 @@ def _nearest(range_m: FloatArray, wanted_m: float, seen: BoolArray) -> int:
     apart = np.where(seen, np.abs(range_m - wanted_m), np.inf)
     k = int(np.argmin(apart))
     return k if apart[k] <= 0.5 * MILE_M else -1
-
-
-def _confirmed(names: tuple[str, ...]) -> list[int]:
-    return [code for code, name in enumerate(names) if name in STATUSES[1:3]]

@@ -66,10 +66,10 @@ def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) 
     many = np.bincount(replica, minlength=count)
     start = np.cumsum(many) - many
     at = start + np.maximum(np.ceil(share * many).astype(np.int64) - 1, 0)
-    found = np.full(count, np.nan)
+    result = np.full(count, np.nan)
     some = many > 0
-    found[some] = values[order][at[some]]
-    return found
+    result[some] = values[order][at[some]]
+    return result
 
 
 class AgeOfInformation(TargetMetric):
@@ -129,11 +129,11 @@ class AgeOfInformation(TargetMetric):
             return {}
         jitter_s = feed.clock.jitter_s
         mean = mean_age_s(feed.period_s, feed.through, jitter_s)
-        found = {"age_of_information_mean_s": feed.delay_s + mean}
+        values = {"age_of_information_mean_s": feed.delay_s + mean}
         if jitter_s == 0.0:
             p95 = age_quantile_s(feed.period_s, feed.through, 0.95)
-            found["age_of_information_p95_s"] = feed.delay_s + p95
-        return found
+            values["age_of_information_p95_s"] = feed.delay_s + p95
+        return values
 
 
 def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
@@ -153,22 +153,22 @@ def _ramp_quantiles(
     replica: IntArray, low: FloatArray, high: FloatArray, span: FloatArray, share: float
 ) -> FloatArray:
     """Return the age that is not exceeded for `share` of the time, ages being ramps low → high."""
-    found = np.full(len(span), np.nan)
+    result = np.full(len(span), np.nan)
     for number in np.flatnonzero(span > 0).tolist():
         start, end = np.searchsorted(replica, [number, number + 1])
         lows, highs = np.sort(low[start:end]), np.sort(high[start:end])
         # Time spent at or below age x is Σ min(x, high) - min(x, low): piecewise linear in x.
         ages, _ = sorted_union([lows, highs])
         below = _clipped_sums(highs, ages) - _clipped_sums(lows, ages)
-        found[number] = np.interp(share * span[number], below, ages)
-    return found
+        result[number] = np.interp(share * span[number], below, ages)
+    return result
 
 
 def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
     """Return Σ min(x, value) over ascending values, for every x."""
     total = np.concatenate(([0.0], np.cumsum(ascending)))
-    place = np.searchsorted(ascending, at, side="right")
-    return total[place] + (len(ascending) - place) * at
+    index = np.searchsorted(ascending, at, side="right")
+    return total[index] + (len(ascending) - index) * at
 
 
 def _updated(columns: Any, rows: BoolArray) -> BoolArray:
@@ -181,9 +181,9 @@ def _updated(columns: Any, rows: BoolArray) -> BoolArray:
     new = np.ones(len(made_s), dtype=bool)
     end = lines.end
     new[end] = (made_s[end] != made_s[end - 1]) | (sensors[end] != sensors[end - 1])
-    found = np.zeros(len(rows), dtype=bool)
-    found[np.flatnonzero(rows)[lines.order]] = new
-    return found
+    result = np.zeros(len(rows), dtype=bool)
+    result[np.flatnonzero(rows)[lines.order]] = new
+    return result
 
 
 class TrackParameters(TargetParameters):

@@ -119,8 +119,8 @@ class TrackTally:
         apart = np.empty((count, len(present)))
         for k, target in enumerate(present.tolist()):
             apart[:, k] = np.sqrt(((tracks.state[:3] - true[target, :3]) ** 2).sum(axis=0))
-        found = set_distance(apart, self.within_m, self.order)
-        self.sets.append(found)
+        result = set_distance(apart, self.within_m, self.order)
+        self.sets.append(result)
         self.present += len(present)
         self.tracks += count
         self.confirmed |= set(tracks.number.tolist())
@@ -165,29 +165,29 @@ class TrackTally:
         duration_s: float,
     ) -> dict[str, float]:
         """Return the scores, by when each target was first detected and entered the coverage."""
-        found = self._errors()
+        results = self._errors()
         sets = np.array(self.sets).reshape(-1, len(_SETS))
-        found |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
+        results |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
         associated = len(self.accuracy)
-        found["track_completeness"] = _ratio(self.tracked, self.present)
-        found["track_ambiguity"] = _ratio(associated, self.tracked)
-        found["track_spuriousness"] = _ratio(self.spurious, self.tracks)
+        results["track_completeness"] = _ratio(self.tracked, self.present)
+        results["track_ambiguity"] = _ratio(associated, self.tracked)
+        results["track_spuriousness"] = _ratio(self.spurious, self.tracks)
         accuracy = np.array(self.accuracy).reshape(-1, 2)
-        found["track_positional_accuracy_m"] = mean_of(accuracy[:, 0])
-        found["track_velocity_accuracy_m_s"] = mean_of(accuracy[:, 1])
+        results["track_positional_accuracy_m"] = mean_of(accuracy[:, 0])
+        results["track_velocity_accuracy_m_s"] = mean_of(accuracy[:, 1])
         longest = sum(max(own.count(n) for n in set(own)) for own in self.numbers.values())
-        found["track_longest_share"] = _ratio(longest, sum(self.steps_present.values()))
+        results["track_longest_share"] = _ratio(longest, sum(self.steps_present.values()))
         broken, swapped = changes(self.numbers)
-        found["track_broken"], found["track_swapped"] = broken, swapped
-        found["track_number_changes_per_s"] = _ratio(broken + swapped, self.tracked * self.step_s)
+        results["track_broken"], results["track_swapped"] = broken, swapped
+        results["track_number_changes_per_s"] = _ratio(broken + swapped, self.tracked * self.step_s)
         since = {names[t]: value for t, value in self.since.items()}
-        found["track_confirmation_s"] = _delay(since, detected_s)
-        found["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
+        results["track_confirmation_s"] = _delay(since, detected_s)
+        results["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
         there = [name for name in covered_s if names.index(name) in self.steps_present]
-        found["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
+        results["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
         false = len(self.confirmed - self.owned)
-        found["track_false_per_hour"] = _ratio(3600.0 * false, duration_s)
-        return found
+        results["track_false_per_hour"] = _ratio(3600.0 * false, duration_s)
+        return results
 
     def last_nees(self, after_s: float, up_to_s: float) -> float:
         """Return the mean normalised error squared at the last instant of a stretch with any."""
@@ -210,10 +210,10 @@ class TrackTally:
         for i, axis in enumerate(_AXES):
             parts[f"track_{axis}_error_m"] = square[:, i]
             parts[f"track_{axis}_error_m_s"] = square[:, 3 + i]
-        found = {name: mean_of(values) ** 0.5 for name, values in parts.items()}
-        found["track_nees_mean"] = mean_of(nees)
-        found["track_nees_inside"] = mean_of((nees >= low) & (nees <= high))
-        return found
+        result = {name: mean_of(values) ** 0.5 for name, values in parts.items()}
+        result["track_nees_mean"] = mean_of(nees)
+        result["track_nees_inside"] = mean_of((nees >= low) & (nees <= high))
+        return result
 
 
 def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:

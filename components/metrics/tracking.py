@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, STATUSES, full_covariance
+from components.messages.state_tracks import COVARIANCE, full_covariance, held
 from components.metrics.rows import is_named
 from components.metrics.separation import traffic_of
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
@@ -144,25 +144,27 @@ class Tracking(Metric):
         """Return all of every replica."""
         columns: Any = group.tables[_TABLE]
         of = "" if self.p.block is None else f".{self.p.block}"
-        found = {result.name: np.full(len(group), np.nan) for result in self.results()}
-        held = np.isin(columns["track_status"].codes, _codes(columns["track_status"].names))
+        outcome = {result.name: np.full(len(group), np.nan) for result in self.results()}
+        confirmed = held(columns["track_status"])
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
             asked = _is_asked_for(columns["block"], scene, self.p.block)
             mine = np.flatnonzero((replica == number) & asked)
-            tally, names = self._tally(columns, mine, held, scene, float(group.duration_s[number]))
+            tally, names = self._tally(
+                columns, mine, confirmed, scene, float(group.duration_s[number])
+            )
             first = _first_detections(group.tables["detections"], number)
             entered = Coverage(scene).entered_s(self.p.step_s, float(group.duration_s[number]))
             values = tally.results(names, first, entered, float(group.duration_s[number]))
-            values |= innovation_results(*self._innovations(columns, mine[held[mine]]))
+            values |= innovation_results(*self._innovations(columns, mine[confirmed[mine]]))
             for name, value in values.items():
-                found[name + of][number] = value
+                outcome[name + of][number] = value
             for end in self._ends_s:
-                found[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
-        return found
+                outcome[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
+        return outcome
 
     def _tally(
-        self, columns: Any, rows: IntArray, held: BoolArray, scene: Scene, duration_s: float
+        self, columns: Any, rows: IntArray, confirmed: BoolArray, scene: Scene, duration_s: float
     ) -> tuple[TrackTally, list[str]]:
         targets = traffic_of(scene)[0].targets
         tally = TrackTally(self.p.within_m, self.p.order, self.p.step_s)
@@ -172,8 +174,8 @@ class Tracking(Metric):
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
         last = np.searchsorted(instants, grid, side="right") - 1
         used = np.unique(last[(last >= 0) & (grid >= self.p.from_s)])
-        kept = held & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
-        confirmed = _first_of_each(columns, rows[kept[rows]])
+        kept = confirmed & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
+        confirmed_s = _first_of_each(columns, rows[kept[rows]])
         messages = [rows[start[i] : ends[i]] for i in used.tolist()]
         messages = [m[kept[m]] for m in messages]
         every = np.concatenate([rows[:0], *messages])
@@ -184,7 +186,7 @@ class Tracking(Metric):
         first_row = 0
         for k, message in enumerate(messages):
             last_row = first_row + len(message)
-            reported = _reported(columns, message, float(instants[used[k]]), confirmed)
+            reported = _reported(columns, message, float(instants[used[k]]), confirmed_s)
             tally.add(reported, state[:, :, first_row:last_row], np.flatnonzero(present[:, k]))
             first_row = last_row
         return tally, [target.name for target in targets]
@@ -241,14 +243,9 @@ def _first_of_each(columns: Any, rows: IntArray) -> dict[int, float]:
 
 def _first_detections(columns: Any, replica: int) -> dict[str, float]:
     mine = np.asarray(columns["replica"]) == replica
-    found = {}
+    result = {}
     for name in columns["target"].names:
         rows = mine & is_named(columns["target"], name)
         if rows.any():
-            found[name] = float(columns["time_s"][rows].min())
-    return found
-
-
-def _codes(names: tuple[str, ...]) -> list[int]:
-    wanted = set(STATUSES[1:3])
-    return [code for code, name in enumerate(names) if name in wanted]
+            result[name] = float(columns["time_s"][rows].min())
+    return result

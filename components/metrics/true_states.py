@@ -69,8 +69,8 @@ class TargetsInFrame:
 
     def at(self, time_s: FloatArray) -> FloatArray:
         """Return where the targets are, (targets, 3, n), m."""
-        found = [self.position(flight, time_s) for flight in self._flights]
-        return np.array(found).reshape(len(found), 3, len(time_s))
+        result = [self.position(flight, time_s) for flight in self._flights]
+        return np.array(result).reshape(len(result), 3, len(time_s))
 
     def states(self, time_s: FloatArray) -> FloatArray:
         """Return positions and velocities, (targets, 6, n), m and m/s."""
@@ -82,15 +82,15 @@ class TargetsInFrame:
 
 def reaches_of(scene: Scene) -> list[Reach]:
     """Return where the sensors of a scene look, in the ownship's body axes."""
-    found = []
+    result = []
     for block in scene.blocks.values():
         if "detections" not in block.cls.outputs:
             continue
         context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
         offer = block.cls(block.name, block.parameters, context).offer("detections")
         if isinstance(offer, SensorOffer) and offer.reach is not None:
-            found.append(offer.reach)
-    return found
+            result.append(offer.reach)
+    return result
 
 
 class Coverage:
@@ -123,10 +123,10 @@ class Coverage:
         angles = body_angles_unchecked(*(np.ascontiguousarray(axis) for axis in body))
         distance = np.sqrt(north**2 + east**2 + down**2)
         there = np.broadcast_to(own.present & other.present, time_s.shape)
-        found = np.zeros(time_s.shape, dtype=bool)
+        result = np.zeros(time_s.shape, dtype=bool)
         for reach in self._reaches:
-            found |= reach.decide(*angles, distance, there) == EVALUATE
-        return found
+            result |= reach.decide(*angles, distance, there) == EVALUATE
+        return result
 
     def entered_s(self, step_s: float, until_s: float = math.inf) -> dict[str, float]:
         """Return when each target that ever is covered is so for the first time, to a millisecond.
@@ -135,16 +135,16 @@ class Coverage:
         """
         end_s = min(self.duration_s, until_s)
         grid = np.append(np.arange(0.0, end_s, step_s), end_s)
-        found = {}
+        result = {}
         for target in self._source.targets:
             inside = self.holds(target, grid)
             if not inside.any():
                 continue
             first = int(np.argmax(inside))
-            found[target.name] = float(grid[first])
+            result[target.name] = float(grid[first])
             if first:
-                found[target.name] = self._entry(target, grid[first - 1], grid[first])
-        return found
+                result[target.name] = self._entry(target, grid[first - 1], grid[first])
+        return result
 
     def _entry(self, target: Any, out_s: float, in_s: float) -> float:
         """Return when a target enters that is outside at one time and inside at the other."""

@@ -234,8 +234,8 @@ class NavigationReport(_Navigation[Reporting]):
 
     def build(self, block: Any) -> Reporting:
         """Return what adds the columns to a report, and to its variances what navigation knows."""
-        nothing = (0.0, 0.0, 0.0)
-        noise = navigation_noise(block.context) if block.turned_by_belief else (nothing, nothing)
+        none = (0.0, 0.0, 0.0)
+        noise = navigation_noise(block.context) if block.turned_by_belief else (none, none)
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
             return with_navigation_noise(in_the_horizons_axes(detections, targets, rows), *noise)

@@ -109,11 +109,11 @@ def first_illumination(
         guess = point - step
         guess = np.where(flat | ~((guess > low) & (guess < high)), 0.5 * (low + high), guess)
         guess = np.where(met, offset, guess)
-        found = lead(guess)
-        before, at_before, point, at_offset = point, at_offset, guess, found
-        low, high = np.where(found > 0.0, guess, low), np.where(found > 0.0, high, guess)
+        ahead = lead(guess)
+        before, at_before, point, at_offset = point, at_offset, guess, ahead
+        low, high = np.where(ahead > 0.0, guess, low), np.where(ahead > 0.0, high, guess)
         offset = np.where(met, offset, guess)
-        met = met | (np.abs(found) <= _MET_RAD)
+        met = met | (np.abs(ahead) <= _MET_RAD)
     return offset, lit
 
 
@@ -227,13 +227,13 @@ class Sweep:
         revisit = at_start.revisit
         assert revisit is not None
         start_s = (at_start.picture_tick / self._ticks_per_s)[:, np.newaxis]
-        found: dict[str, Any] = {}
+        seen: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
-            found.update(revisit(columns, start_s + offset_s))
-            found.pop("own")
-            found.pop("target")
-            azimuth, _ = block.axes(found["body_azimuth_rad"], found["body_elevation_rad"])
+            seen.update(revisit(columns, start_s + offset_s))
+            seen.pop("own")
+            seen.pop("target")
+            azimuth, _ = block.axes(seen["body_azimuth_rad"], seen["body_elevation_rad"])
             return azimuth
 
         before, _ = block.axes(at_start.body_azimuth_rad, at_start.body_elevation_rad)
@@ -241,7 +241,7 @@ class Sweep:
         if cued is not None and block.p.cued_beam_first:
             offset_s, met = np.where(cued, 0.0, offset_s), met | cued
         azimuth_at(offset_s)
-        lit = replace(at_start, **found)
+        lit = replace(at_start, **seen)
         reason = block.axes.reach(block.reach).decide(
             lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present, lit.hidden
         )

@@ -34,8 +34,8 @@ _OF_CUED = 2**40
 class Alarms:
     """Threshold crossings without a target, in ascending order of the reports' rows.
 
-    `key` is that of its draws, `where` its place by quantity in the sensor's axes, `snr` how strong
-    it came out (linear, above 0) and `rate` a uniform number that says its range rate.
+    `key` is that of its draws, `where` its position by quantity in the sensor's axes, `snr` how
+    strong it came out (linear, above 0) and `rate` a uniform number that says its range rate.
     """
 
     row: IntArray
@@ -215,12 +215,12 @@ class GroundReports:
     ) -> Detections:
         """Return the report with the ground's false alarms of its scans."""
         numbers = zip(rows.tolist(), detections.run.tolist(), detections.scan.tolist(), strict=True)
-        found = [self._of_scan(targets, *number) for number in numbers]
-        counts = [len(cell) for cell, _ in found]
-        row = np.repeat(np.arange(len(found)), counts)
+        crossed = [self._of_scan(targets, *number) for number in numbers]
+        counts = [len(cell) for cell, _ in crossed]
+        row = np.repeat(np.arange(len(crossed)), counts)
         if len(row) == 0:
             return detections
-        cell, cnr = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        cell, cnr = (np.concatenate(parts) for parts in zip(*crossed, strict=True))
         scan, key = detections.scan[row], cell.astype(np.uint64)
         draws = self._draws.of_runs(detections.run[row])
         beam, depth = np.divmod(cell, self._cells.range)

@@ -236,7 +236,7 @@ class GroundClutter(Effect[Echo]):
 
     The beam points at the target and is as wide as a resolution cell, unless the scene gives its
     beamwidths; clutter more than two beamwidths off its axis is 0. A range boundary whose cells
-    have no size hears none. The air takes from the echo of the ground what it takes from the
+    have no size has none. The air takes from the echo of the ground what it takes from the
     target's. What the threshold does there is said by ``clutter_threshold``.
     """
 

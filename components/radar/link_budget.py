@@ -223,14 +223,14 @@ _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 def implausible(parameters: Any) -> list[str]:
     """Say which values of a link budget no radar has, by their own names."""
-    found = []
+    said = []
     for key, (low, high, unit) in _RANGES.items():
         value = getattr(parameters, key)
         if value is None or low <= value <= high:
             continue
         text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
-        found.append(text + _other_unit(value, low, high, unit))
-    return found
+        said.append(text + _other_unit(value, low, high, unit))
+    return said
 
 
 def _other_unit(value: float, low: float, high: float, unit: str) -> str:

@@ -1,12 +1,10 @@
 """Measured strength of a radar's detections, and the errors of measurement that follow from it."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from components.arguments.checks import not_negative, positive
 from components.messages.columns import OWN_VELOCITY
@@ -14,71 +12,10 @@ from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.detection.output import measured_snr
 from components.radar.link_budget import wavelength
-from components.radar.resolution import ResolutionParameters
 from components.sensor.look import STRENGTH, Cells, Look, Strengthening
-from components.sensor.parameters import CorrelationTime, GlintParameters
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.errors import Disagreements
-
-
-class RadarErrorParameters(ResolutionParameters):
-    """Errors of range rate, and whether it is measured."""
-
-    quantities: ClassVar[Mapping[str, str]] = {
-        **ResolutionParameters.quantities, "range_rate": "m_s"
-    }  # fmt: skip
-
-    measures_range_rate: bool = Field(
-        default=False,
-        description="Whether the rate of the slant range is measured, by its Doppler shift.",
-    )
-    range_rate_resolution_m_s: float = Field(
-        default=0.0, ge=0, description="Grid step of measured range rate, m/s; 0 measures exactly."
-    )
-    range_rate_error_m_s: float = Field(
-        default=0.0, ge=0, description="Standard deviation of measured range rate, m/s."
-    )
-    range_rate_bias_m_s: float = Field(
-        default=0.0, description="Bias of measured range rate, m/s; see biases."
-    )
-    range_rate_correlation_time_s: CorrelationTime | None = Field(
-        default=None, description="As azimuth_correlation_time_s, of range_rate_error_m_s, s."
-    )
-
-    @model_validator(mode="after")
-    def _rate_is_measured(self) -> Self:
-        Disagreements.refuse(
-            f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
-            f"or leave {key} out"
-            for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s")
-            if not self.measures_range_rate and getattr(self, key)
-        )
-        return self
-
-
-class SignalErrorParameters(GlintParameters, RadarErrorParameters):
-    """Errors that follow from the signal-to-noise ratio of each detection."""
-
-    errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
-        default="grid",
-        description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "
-        "the standard deviations and biases that the scene gives; 'signal', those that follow from "
-        "the SNR and the widths of beam and resolution cell, beside the stated ones.",
-    )
-    angle_measurement: Literal["monopulse", "scan"] = Field(
-        default="monopulse",
-        description="How errors = 'signal' has angles measured: by beams at the same time, or by "
-        "splitting one beam that scans over the target.",
-    )
-
-    def without_effect(self) -> list[str]:
-        """Say which keys belong to errors by signal, where there are none."""
-        said = super().without_effect()
-        if self.errors != "signal":
-            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
-        return said
-
 
 #: Slope of the difference pattern over the sum pattern, in beamwidths (Barton).
 MONOPULSE_SLOPE = 1.6
@@ -228,7 +165,7 @@ class Strength:
         else:
             tail = look.tail[detected]
         # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
-        # noise hears it as signal.
+        # noise takes it for signal.
         mean = look.signal["snr"][detected]
         with np.errstate(divide="ignore", invalid="ignore"):
             floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][detected]) / mean, 1.0)
@@ -285,7 +222,7 @@ def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
 
 
 def noise_at_targets(parameters: Any) -> list[str]:
-    """Say that looks which noise decides are reported at the target's own place, where they are."""
+    """Say that looks which noise decides are reported exactly at the target, where they are."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
     if parameters.errors != "grid" or not exact:
@@ -299,7 +236,7 @@ def noise_at_targets(parameters: Any) -> list[str]:
 class OwnVelocity(Effect[Reporting]):
     """The ownship's velocity over ground beside every detection; navigation has no error of it.
 
-    A range rate is of two aircraft: who estimates the other one's velocity from it must know ours.
+    A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
 
     lockstep = True

@@ -1,8 +1,9 @@
 """Parameters that radar blocks share: beam, threshold, filter, cues, and the link budget."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -10,30 +11,12 @@ from components.radar.detection.cfar import FEWEST_CELLS, MOST_CELLS
 from components.radar.detection.probability import detection_probability, required_snr
 from components.radar.doppler import FEWEST_PULSES, MOST_PULSES
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth, implausible
-from components.radar.measurement import (
-    RadarErrorParameters,
-    SignalErrorParameters,
-    check_signal_errors,
-)
+from components.radar.measurement import check_signal_errors
+from components.radar.resolution import ResolutionParameters
 from components.radar.timing import TimeBudgetParameters
-from components.sensor.parameters import SensorParameters
+from components.sensor.parameters import CorrelationTime, GlintParameters
 from dsa_des.block.component import Parameters
-
-
-class CuedRadarParameters(SensorParameters):
-    """Parameters of looks within a cue cone; the scan clock stays as it is."""
-
-    cued_dwell_factor: float | None = Field(
-        default=None,
-        ge=1,
-        le=1000,
-        description="Time on a beam within a cue cone, in times of the usual one, added up "
-        "coherently: a factor of the SNR. By default as usual.",
-    )
-    cued_beam_first: bool = Field(
-        default=False,
-        description="Whether a sweeping beam visits cue cones as a scan begins, and then sweeps.",
-    )
+from dsa_des.errors import Disagreements
 
 
 def dwell_factor(parameters: Any) -> Any:
@@ -47,8 +30,29 @@ def dwell_factor(parameters: Any) -> Any:
     return factor
 
 
-class ClutterParameters(SensorParameters):
-    """Parameters of threshold and moving-target filter where there is more than noise."""
+class RadarParameters(ResolutionParameters):
+    """Parameters of every radar: range rate, threshold and filter beyond noise, and beam."""
+
+    quantities: ClassVar[Mapping[str, str]] = {
+        **ResolutionParameters.quantities, "range_rate": "m_s"
+    }  # fmt: skip
+
+    measures_range_rate: bool = Field(
+        default=False,
+        description="Whether the rate of the slant range is measured, by its Doppler shift.",
+    )
+    range_rate_resolution_m_s: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range rate, m/s; 0 measures exactly."
+    )
+    range_rate_error_m_s: float = Field(
+        default=0.0, ge=0, description="Standard deviation of measured range rate, m/s."
+    )
+    range_rate_bias_m_s: float = Field(
+        default=0.0, description="Bias of measured range rate, m/s; see biases."
+    )
+    range_rate_correlation_time_s: CorrelationTime | None = Field(
+        default=None, description="As azimuth_correlation_time_s, of range_rate_error_m_s, s."
+    )
 
     clutter_threshold: Literal["adaptive", "noise"] = Field(
         default="adaptive",
@@ -102,15 +106,46 @@ class ClutterParameters(SensorParameters):
         "beyond the unambiguous velocity, wavelength * prf_hz / 4, folds back within.",
     )
 
+    beam_sweep: bool = Field(
+        default=False,
+        description="Whether a beam sweeps clockwise over the field of view once per scan: each "
+        "target is measured at the instant it is lit, which is recorded.",
+    )
+    polarisation: Literal["horizontal", "vertical", "slant", "circular"] = Field(
+        default="slant",
+        description="Polarisation of the wave, 'slant' being linear at 45 deg. Rain attenuates "
+        "slant and circular waves alike, and echoes circular ones less (rain_rejection_db).",
+    )
+    rain_rejection_db: float = Field(
+        default=15.0,
+        ge=0,
+        le=40,
+        description="How much less of the rain's echo a circular polarisation receives, dB: 10 in "
+        "heavy rain to 30 in drizzle (assumption).",
+    )
+
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a filter that there is not."""
+        """Say which keys belong to a filter, or to a circular polarisation, that there is not."""
         said, kind = super().without_effect(), self.moving_target_filter
         because = f"moving_target_filter is '{kind}'"
         if kind != "filter_bank":
             said += self.idle("filter_pulses", because=because)
         if kind == "none":
             said += self.idle("clutter_lock", "improvement_limit_db", because=because)
+        if self.polarisation != "circular":
+            because = f"polarisation is '{self.polarisation}'"
+            said += self.idle("rain_rejection_db", because=because)
         return said
+
+    @model_validator(mode="after")
+    def _rate_is_measured(self) -> Self:
+        Disagreements.refuse(
+            f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
+            f"or leave {key} out"
+            for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s")
+            if not self.measures_range_rate and getattr(self, key)
+        )
+        return self
 
     @model_validator(mode="after")
     def _one_threshold(self) -> Self:
@@ -153,36 +188,6 @@ class ClutterParameters(SensorParameters):
         return self
 
 
-class RadarParameters(RadarErrorParameters, ClutterParameters):
-    """Parameters of every radar."""
-
-    def without_effect(self) -> list[str]:
-        """Say that what a circular polarisation rejects belongs to no other."""
-        said = super().without_effect()
-        if self.polarisation != "circular":
-            because = f"polarisation is '{self.polarisation}'"
-            said += self.idle("rain_rejection_db", because=because)
-        return said
-
-    beam_sweep: bool = Field(
-        default=False,
-        description="Whether a beam sweeps clockwise over the field of view once per scan: each "
-        "target is measured at the instant it is lit, which is recorded.",
-    )
-    polarisation: Literal["horizontal", "vertical", "slant", "circular"] = Field(
-        default="slant",
-        description="Polarisation of the wave, 'slant' being linear at 45 deg. Rain attenuates "
-        "slant and circular waves alike, and echoes circular ones less (rain_rejection_db).",
-    )
-    rain_rejection_db: float = Field(
-        default=15.0,
-        ge=0,
-        le=40,
-        description="How much less of the rain's echo a circular polarisation receives, dB: 10 in "
-        "heavy rain to 30 in drizzle (assumption).",
-    )
-
-
 class Calibration(Parameters):
     """One known detection range, from which the bandwidth follows (errata 6)."""
 
@@ -202,9 +207,7 @@ class Calibration(Parameters):
     )
 
 
-class LinkBudgetParameters(
-    SignalErrorParameters, RadarParameters, TimeBudgetParameters, CuedRadarParameters
-):
+class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameters):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
 
     as_written_with = {("calibrate", "false_alarm_probability"): "false_alarm_probability"}
@@ -213,6 +216,17 @@ class LinkBudgetParameters(
         "use false_alarm_probability, of radar.threshold threshold_db"
     }
 
+    errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
+        default="grid",
+        description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "
+        "the standard deviations and biases that the scene gives; 'signal', those that follow from "
+        "the SNR and the widths of beam and resolution cell, beside the stated ones.",
+    )
+    angle_measurement: Literal["monopulse", "scan"] = Field(
+        default="monopulse",
+        description="How errors = 'signal' has angles measured: by beams at the same time, or by "
+        "splitting one beam that scans over the target.",
+    )
     power_w: float = Field(gt=0, description="Transmitted power, W.")
     antenna_gain_db: float = Field(description="Gain of the antenna, both ways the same, dB.")
     wavelength_m: float | None = Field(default=None, gt=0, description="Wavelength, m.")
@@ -243,6 +257,24 @@ class LinkBudgetParameters(
         default=True, description="Whether an aircraft's rcs_table is used; else its rcs_dbsm."
     )
     pulses: int = Field(default=1, ge=1, le=1000, description="Pulses integrated non-coherently.")
+    cued_dwell_factor: float | None = Field(
+        default=None,
+        ge=1,
+        le=1000,
+        description="Time on a beam within a cue cone, in times of the usual one, added up "
+        "coherently: a factor of the SNR. By default as usual.",
+    )
+    cued_beam_first: bool = Field(
+        default=False,
+        description="Whether a sweeping beam visits cue cones as a scan begins, and then sweeps.",
+    )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors by signal, where there are none."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
+        return said
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

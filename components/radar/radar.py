@@ -64,7 +64,7 @@ class Radar(SweepingSensor):
     measures_range = True
     #: Of the carrier, m; None where it is not known.
     wavelength_m: float | None = None
-    #: Whether a range stands for the link budget; ground is then heard in cells with a size only.
+    #: Whether a range stands for the link budget; ground then echoes in cells with a size only.
     boundary: ClassVar[bool] = False
     hooks: ClassVar[tuple[Hook[Any], ...]] = (
         SNR, DOPPLER, RANGE_RATE, ONE_REPORT, CLUTTER, REFERENCE_CELLS,
@@ -75,7 +75,7 @@ class Radar(SweepingSensor):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         # Their key is one of every radar. The velocity is of what the reports before it say:
-        # false alarms, and when a sweeping beam met whom.
+        # false alarms, and when a sweeping beam met each target.
         both = (_RANGE_RATE, _OWN_VELOCITY)
         others = tuple(effect for effect in cls.effects if effect not in both)
         cls.effects = (_RANGE_RATE, *others, _OWN_VELOCITY)
@@ -168,7 +168,7 @@ class Radar(SweepingSensor):
         if self.p.range_rate_folds:
             assert self.wavelength_m is not None
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
-        each, place = np.unique(row, return_inverse=True)
+        each, index = np.unique(row, return_inverse=True)
         time_s = targets.picture_tick[each] / self.context.ticks_per_s
         velocity = own_velocity(targets, each, time_s)
         body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
@@ -177,7 +177,7 @@ class Radar(SweepingSensor):
             return off * FASTEST_M_S
         turned = (attitude[f"{name}_rad"][row] for name in ("yaw", "pitch", "roll"))
         towards = np.stack(body_to_ned(*body, *turned))
-        nearer_m_s: FloatArray = (towards * velocity[:, place]).sum(axis=0)
+        nearer_m_s: FloatArray = (towards * velocity[:, index]).sum(axis=0)
         return off * FASTEST_M_S - nearer_m_s
 
 
@@ -195,7 +195,7 @@ class LaterAcquisition(Effect[CellValues]):
         return Verdict(True, f"acquisition has {len(block.p.acquisition)} ranges")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR: 0 of whom has not been acquired, else 1."""
+        """Return the factor on every cell's SNR: 0 of a target not acquired, else 1."""
         return Acquired(block.p.acquisition)
 
 
@@ -302,14 +302,14 @@ class RangeBoundary(Radar):
         refuse_cues(self)
 
     def request(self, port: str) -> Any:
-        """Ask how targets go on too, where their speed decides who is acquired."""
+        """Ask how targets go on too, where their speed decides which are acquired."""
         reach = super().request(port)
         if not (self.p.enabled and len(self.p.acquisition) > 1):
             return reach
         return replace(reach, lasts_s=max(reach.lasts_s, 2.0 * STEP_S))
 
     def warnings(self) -> list[str]:
-        """Say that clutter counts as signal, where it does, and what it hears of the weather."""
+        """Say that clutter counts as signal, where it does, and which weather has an effect."""
         return [
             *super().warnings(),
             *clutter_as_signal(self.p, terrain_of(self)),

@@ -91,11 +91,11 @@ def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
 def mean_rcs_m2(cells: Cells) -> FloatArray:
     """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
-    tables, place = cells.roster.tables("rcs_table")
+    tables, table_of = cells.roster.tables("rcs_table")
     if not tables:
         return rcs
     azimuth, elevation = _aspect_angles(cells)
-    which = place[cells.craft]
+    which = table_of[cells.craft]
     for index, table in enumerate(tables):
         chosen = np.flatnonzero(which == index)
         rcs[chosen] = table.rcs_m2(azimuth[chosen], elevation[chosen])
@@ -118,16 +118,16 @@ def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise:
     rosters = known_targets(context)
     if not rosters:
         return Verdict(True, "the targets are not known before the run")
-    found = [
+    calling = [
         f"target {name!r} has {said}"
         for roster in rosters
         for name, craft in zip(roster.names, roster.aircraft, strict=True)
         if (said := says(craft))
     ]
-    if not found:
+    if not calling:
         return Verdict(False, otherwise)
-    more = "" if len(found) == 1 else f" (and {len(found) - 1} more like it)"
-    return Verdict(True, found[0] + more)
+    more = "" if len(calling) == 1 else f" (and {len(calling) - 1} more like it)"
+    return Verdict(True, calling[0] + more)
 
 
 class RcsFluctuation(Effect[ModelsOfCells]):
@@ -187,8 +187,8 @@ def models_of(swerling: int | None) -> ModelsOfCells:
         if len(known) == 1:
             return [(known[0], slice(None))]
         of_cell = cells.of_target(cells.roster.swerling)
-        found = [(model, np.flatnonzero(of_cell == model)) for model in known]
-        return [(model, chosen) for model, chosen in found if len(chosen)]
+        pairs = [(model, np.flatnonzero(of_cell == model)) for model in known]
+        return [(model, chosen) for model, chosen in pairs if len(chosen)]
 
     return models
 
@@ -242,18 +242,18 @@ class Scatterers:
         target's independent echo, and `strengths` gives standard normal numbers by a scatterer's
         number; by default they are fixed to the target. `run` says of which run each is.
         """
-        whose = np.zeros(len(keys), dtype=np.uint64) if run is None else run
-        pairs = np.stack([keys, whose.astype(np.uint64)])
+        of_run = np.zeros(len(keys), dtype=np.uint64) if run is None else run
+        pairs = np.stack([keys, of_run.astype(np.uint64)])
         (targets, runs), of_target = np.unique(pairs, axis=1, return_inverse=True)
         of_target = of_target.reshape(-1)
         stream = self._stream.of_runs(runs.astype(np.int64))
         real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
         for number in range(which * self._count, (which + 1) * self._count):
             numbers = np.full(len(targets), number, dtype=np.int64)
-            place = self._places(stream, targets, numbers)
+            position = self._places(stream, targets, numbers)
             # One after the other, so that an element's sum has one order in any array.
             phase = np.zeros(len(keys))
-            for along, component in zip(place, aspect, strict=True):
+            for along, component in zip(position, aspect, strict=True):
                 phase += along[of_target] * component
             if strengths is None:
                 normal = (stream.normal(targets, numbers, draw) for draw in (2, 3))

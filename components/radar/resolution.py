@@ -177,18 +177,18 @@ class Merging:
             return power
         block = self._block
         seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
-        place = [
+        cell = [
             np.rint(values / width)
             for values, width in zip((*seen, cells.range_m), self._widths, strict=True)
         ]
         # Astern the last cell is the first one.
         astern = np.rint(np.pi / self._widths[0])
-        place[0] = np.where(place[0] == -astern, astern, place[0])
+        cell[0] = np.where(cell[0] == -astern, astern, cell[0])
         # By cell, the strongest first; of equals the first of the roster.
-        order = np.lexsort((cells.target, -power, *place, cells.row))
+        order = np.lexsort((cells.target, -power, *cell, cells.row))
         new = np.ones(len(order), dtype=bool)
         new[1:] = False
-        for values in (cells.row, *place):
+        for values in (cells.row, *cell):
             ordered = values[order]
             new[1:] |= ordered[1:] != ordered[:-1]
         total = np.zeros(len(order))

@@ -280,11 +280,11 @@ class SwerlingRadar(LinkBudgetRadar):
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
             beside = None if clutter is None else clutter.take(chosen)
-            found = self._pd(snr[chosen], model, beside, *usual)
+            of_model = self._pd(snr[chosen], model, beside, *usual)
             if cued is not None:
                 inside = cells.is_cued()[chosen]
-                found = np.where(inside, self._pd(snr[chosen], model, beside, *cued), found)
-            pd[chosen] = found
+                of_model = np.where(inside, self._pd(snr[chosen], model, beside, *cued), of_model)
+            pd[chosen] = of_model
         return pd
 
     def _pd(

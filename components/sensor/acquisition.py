@@ -59,7 +59,7 @@ def check_speeds(ranges: tuple[AcquisitionRange, ...]) -> None:
 
 
 class Acquired:
-    """Remembers who has been acquired, and in which scan last."""
+    """Remembers which targets are acquired, and in which scan last."""
 
     def __init__(self, ranges: tuple[AcquisitionRange, ...]) -> None:
         self._ranges = ranges
@@ -72,25 +72,25 @@ class Acquired:
             return np.ones(len(cells))
         within, near = self._of(cells)
         width = len(cells.roster.names)
-        who = cells.run * width + cells.target
+        targets = cells.run * width + cells.target
         missing = (int(cells.run.max()) + 1) * width - len(self._last_scan)
         if missing > 0:
             self._last_scan = np.append(self._last_scan, np.full(missing, -2))
-        order = np.argsort(who, kind="stable")
-        who, scan, within, near = who[order], cells.scan[order], within[order], near[order]
-        first = np.append(True, who[1:] != who[:-1])
-        known = first & (scan == self._last_scan[who] + 1)
+        order = np.argsort(targets, kind="stable")
+        targets, scan, within, near = targets[order], cells.scan[order], within[order], near[order]
+        first = np.append(True, targets[1:] != targets[:-1])
+        known = first & (scan == self._last_scan[targets] + 1)
         follows = ~first & (scan == np.append(-2, scan[:-1]) + 1) & np.append(False, within[:-1])
         # Seen where one was acquired since it was last missed, or gone beyond its range.
-        place = np.arange(len(who))
-        since = np.maximum.accumulate(np.where(follows, 0, place))
-        acquired = np.maximum.accumulate(np.where((near | known) & within, place, -1))
+        index = np.arange(len(targets))
+        since = np.maximum.accumulate(np.where(follows, 0, index))
+        acquired = np.maximum.accumulate(np.where((near | known) & within, index, -1))
         seen = within & (acquired >= since)
         last = np.append(first[1:], True)
-        self._last_scan[who[last]] = np.where(seen[last], scan[last], -2)
-        found = np.zeros(len(cells))
-        found[order] = seen
-        return found
+        self._last_scan[targets[last]] = np.where(seen[last], scan[last], -2)
+        factor = np.zeros(len(cells))
+        factor[order] = seen
+        return factor
 
     def _of(self, cells: Cells) -> tuple[BoolArray, BoolArray]:
         """Return which cells lie within the range of their target's speed, and which to acquire."""

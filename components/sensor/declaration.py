@@ -1,4 +1,4 @@
-"""Declaration of targets by m detections in n looks: at one target, or at one measured place.
+"""Declaration of targets by m detections in n looks: at one target, or at one measured position.
 
 Looks before the first one count as misses.
 """
@@ -39,15 +39,15 @@ def declare_looks(
     looks = np.bincount(target, minlength=targets)
     length = looks + (n - 1)
     first = np.cumsum(length) - length
-    place = np.empty(len(target), dtype=np.int64)
+    position = np.empty(len(target), dtype=np.int64)
     rank = np.arange(len(target)) - np.repeat(np.cumsum(looks) - looks, looks)
-    place[order] = np.repeat(first + (n - 1), looks) + rank
+    position[order] = np.repeat(first + (n - 1), looks) + rank
     line = np.zeros(int(length.sum()), dtype=np.int64)
     kept = first[:, np.newaxis] + np.arange(n - 1)
     line[kept] = memory
-    line[place] = detected
+    line[position] = detected
     count = np.concatenate(([0], np.cumsum(line)))
-    declared = count[place + 1] - count[place + 1 - n] >= m
+    declared = count[position + 1] - count[position + 1 - n] >= m
     after = line[kept + looks[:, np.newaxis]].astype(bool)
     return declared, after
 
@@ -93,12 +93,12 @@ class Declarations:
     def __call__(self, cells: Cells, look: Look) -> Look:
         """Return the look with a column ``declared``."""
         self._names = cells.roster.names
-        who = cells.run * len(self._names) + cells.target
+        targets = cells.run * len(self._names) + cells.target
         runs = int(cells.run.max(initial=0)) + 1
         if len(self._memory) < runs * len(self._names):
             self._remember(runs * len(self._names))
-        declared, self._memory = declare_looks(who, look.detected, self.m, self.n, self._memory)
-        self._note_first(cells, who, np.flatnonzero(declared))
+        declared, self._memory = declare_looks(targets, look.detected, self.m, self.n, self._memory)
+        self._note_first(cells, targets, np.flatnonzero(declared))
         if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
             return look
         return replace(look, extras={**look.extras, "declared": declared})
@@ -110,10 +110,10 @@ class Declarations:
         self._first_tick = np.append(self._first_tick, np.full(more, -1))
         self._first_range_m = np.append(self._first_range_m, np.full(more, np.nan))
 
-    def _note_first(self, cells: Cells, who: IntArray, declared: IntArray) -> None:
-        target, place = np.unique(who[declared], return_index=True)
+    def _note_first(self, cells: Cells, targets: IntArray, declared: IntArray) -> None:
+        target, index = np.unique(targets[declared], return_index=True)
         new = self._first_tick[target] < 0
-        first = declared[place[new]]
+        first = declared[index[new]]
         self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]
         self._first_range_m[target[new]] = cells.range_m[first]
 
@@ -127,7 +127,7 @@ class Declarations:
         }
 
 
-#: How far apart two measurements of one place are taken to lie, in standard deviations.
+#: How far apart two measurements of one position are taken to lie, in standard deviations.
 GATE_DEVIATIONS = 3.0
 # Pairs that are compared at a time: some 100 MB of intermediate arrays.
 _MOST_PAIRS = 2_000_000
@@ -135,7 +135,7 @@ _MOST_PAIRS = 2_000_000
 
 @dataclass(frozen=True)
 class SeenPlaces:
-    """Detections as a rule of declaration by place sees them, ascending in run and then in scan.
+    """Detections as a rule of declaration by position sees them, ascending in run and then in scan.
 
     `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
     NaN where none is measured, and a variance of NaN counts as 0.
@@ -165,9 +165,9 @@ class SeenPlaces:
 def scans_with_company(
     places: SeenPlaces, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
 ) -> IntArray:
-    """Return in how many of the last n scans, its own included, there was a detection at its place.
+    """Return in how many of the last n scans, its own included, a detection was at its position.
 
-    Of the entries that are `asked` about, 1 to n each. Two detections have one place where
+    Of the entries that are `asked` about, 1 to n each. Two detections have one position where
     direction and, if both have one, range differ by no more than a target may have moved between
     them (`speed_m_s` along the line of sight, `rate_rad_s` across it), and three standard
     deviations of their difference.
@@ -184,8 +184,8 @@ def scans_with_company(
             part = slice(start, start + most)
             start += most
             here = np.repeat(np.arange(len(asked))[part], number[part])
-            place = np.cumsum(number[part]) - number[part]
-            there = np.arange(len(here)) + np.repeat(first[part] - place, number[part])
+            start_of = np.cumsum(number[part]) - number[part]
+            there = np.arange(len(here)) + np.repeat(first[part] - start_of, number[part])
             near = _near(places, asked[here], there, speed_m_s, rate_rad_s)
             count += np.bincount(here[near], minlength=len(asked)) > 0
     return count
@@ -194,7 +194,7 @@ def scans_with_company(
 def _near(
     places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
 ) -> BoolArray:
-    """Say which pairs of entries have one place."""
+    """Say which pairs of entries have one position."""
     apart_s = np.abs(places.time_s[one] - places.time_s[other])
     variance = np.nan_to_num(places.range_variance_m2)
     gate_m = speed_m_s * apart_s + GATE_DEVIATIONS * np.sqrt(variance[one] + variance[other])
@@ -246,8 +246,8 @@ class DeclaredPlaces:
         """Return the last scan of each one's run, its own where this report has none of it."""
         ends = detections.instants.last_of_each
         runs, last = detections.run[ends], detections.scan[ends]
-        place = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)
-        return np.where(runs[place] == known.run, last[place], known.scan)
+        index = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)
+        return np.where(runs[index] == known.run, last[index], known.scan)
 
     def _places(self, detections: Detections) -> SeenPlaces:
         counts = np.diff(detections.offsets)
@@ -287,7 +287,7 @@ class DeclaredPlaces:
 
 
 class DeclarationByPlace(Effect[Reporting]):
-    """Marks detections whose place had others in m of the last n scans, targets or false alarms.
+    """Marks detections whose position had others in m of the last n scans, targets or false alarms.
 
     Nothing but measured values decides; places are compared in north-east-down by what the
     ownship believes of its attitude, so that its own turns move nothing.

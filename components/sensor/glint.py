@@ -123,8 +123,8 @@ class Glint(Effect[Wander]):
     Along each of a target's own axes the centre is off by a Gauss-Markov process whose standard
     deviation is ``glint_share`` of the target's extent; so the error across the line of sight is
     that share of the extent that the sensor sees, over the range, and along it a range's. A sensor
-    does not know whom it sees: what it states is that of the scene's aircraft on average, level
-    and from any side, at the range, or of the size, that it measures.
+    does not know its target: what it states is that of the scene's aircraft on average, level and
+    from any side, at the range, or of the size, that it measures.
     """
 
     lockstep = True

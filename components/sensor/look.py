@@ -43,13 +43,7 @@ class Look:
     tail: FloatArray | None = None
 
     def check(self, cells: int) -> None:
-        """Refuse arrays without one value for each cell, and those of another kind than theirs.
-
-        Raises
-        ------
-        TypeError, ValueError
-            With the field, its length and that which it must have.
-        """
+        """Raise ValueError or TypeError unless arrays have a value of their kind by cell."""
         truths = {"detected": self.detected, "noise": self.noise}
         numbers = {**self.signal, "tail": self.tail}
         for table in (truths, {"confidence": self.confidence}, self.extras, numbers):
@@ -170,25 +164,11 @@ class Cells:
         return nanosecond_of(self.of_row("state_tick"), self._ticks_per_s)
 
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
-        """Return what is seen of some cells a little before or after they are looked at.
+        """Return fields of `RelativeTargets` of some cells, each by itself so many seconds later.
 
-        Parameters
-        ----------
-        cells : (n,) of int
-        ahead_s : (n,)
-            How much later, s; each cell by itself.
-
-        Returns
-        -------
-        dict of (n,) arrays
-            Fields of `RelativeTargets` by name, the ownship's pose as ``own_lat_deg`` and so on,
-            and the target's place as ``target_lat_deg`` and so on. ``present`` says whether both
-            aircraft are there then.
-
-        Raises
-        ------
-        ValueError
-            If the targets can be known only at the instants of the rows.
+        The ownship's pose is ``own_lat_deg`` and so on, the target's position ``target_lat_deg``
+        and so on; ``present`` says whether both aircraft are there then. ValueError if the targets
+        can be known only at the instants of the rows.
         """
         targets = self._targets
         if targets.revisit is None:
@@ -219,8 +199,8 @@ class Cells:
         """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not known."""
         attitude = self._targets.own_attitude
         if attitude is None:
-            nothing = np.zeros(len(self))
-            return nothing, nothing, nothing
+            zero = np.zeros(len(self))
+            return zero, zero, zero
         row = self._flat // self._width
         yaw, pitch, roll = (attitude[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
         return yaw, pitch, roll

@@ -17,7 +17,6 @@ from components.sensor.grid import (
     Measured,
     Values,
     constant_column,
-    variance_of_step,
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
@@ -27,13 +26,8 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Stream
 
-_NOBODY = np.uint64(0)
+_NO_TARGET = np.uint64(0)
 _OWN, _OF_SIGNAL = 0, 1
-
-
-def mean_square(stated: StatedError, drawn_bias: bool) -> float:
-    """Return the mean square of what is stated, over all runs where the bias is drawn."""
-    return stated.deviation**2 + stated.bias**2 / (3.0 if drawn_bias else 1.0)
 
 
 class QuantityError:
@@ -42,10 +36,9 @@ class QuantityError:
     A drawn bias is uniform between minus and plus the stated one, once for each run.
     """
 
-    def __init__(
-        self, stated: StatedError, *, drawn_bias: bool, stream: Callable[[str], Stream], name: str
-    ) -> None:
-        self._deviation, self._bias, self._drawn = stated.deviation, stated.bias, drawn_bias
+    def __init__(self, stated: StatedError, stream: Callable[[str], Stream], name: str) -> None:
+        self._deviation, self._bias = stated.deviation, stated.bias
+        self._drawn = stated.drawn_bias
         self._biases, self._looks = stream(f"bias of {name}"), stream(f"error of {name}")
         self._lasting: GaussMarkov | None = None
         if stated.correlation_time_s is not None:
@@ -74,10 +67,10 @@ class QuantityError:
     def _bias_of(self, run: IntArray) -> FloatArray:
         if not self._drawn:
             return np.full(len(run), self._bias)
-        runs, place = np.unique(run, return_inverse=True)
-        who, scan = np.full(len(runs), _NOBODY), np.zeros(len(runs), dtype=np.int64)
-        drawn = self._biases.of_runs(runs).uniform(who, scan)
-        return (self._bias * (2.0 * drawn - 1.0))[place]
+        runs, index = np.unique(run, return_inverse=True)
+        keys, scan = np.full(len(runs), _NO_TARGET), np.zeros(len(runs), dtype=np.int64)
+        drawn = self._biases.of_runs(runs).uniform(keys, scan)
+        return (self._bias * (2.0 * drawn - 1.0))[index]
 
 
 # A range that comes out below this, a millimetre, is no range.
@@ -86,23 +79,20 @@ _QUARTER = 0.5 * math.pi
 
 
 class ErrorModel:
-    """Measures with errors; called in place of the sensor's grid."""
+    """Measures with errors; called instead of the sensor's grid."""
 
     def __init__(self, block: Any) -> None:
         p = block.p
         self._block, self._signal = block, p.errors == "signal"
-        self._steps = _steps(p, block.steps)
         self._places = block.stream("noise places")
+        stated: dict[str, StatedError] = p.stated_errors(block.steps)
         self._errors = {
-            name: QuantityError(
-                _stated(p, name), drawn_bias=p.biases == "drawn", stream=block.stream, name=name
-            )
-            for name in self._steps
+            name: QuantityError(one, block.stream, name) for name, one in stated.items()
         }
-        self._variances = _mean_squares(p, self._steps)
+        self._variances = {name: one.variance for name, one in stated.items()}
         #: Mean square of errors that are stated as a share of the value, by quantity.
-        self._shares = {name: mean_square(_stated(p, name), p.biases == "drawn")
-                        for name in self._steps if of_share(p, name)}  # fmt: skip
+        self._shares = {name: one.mean_square for name, one in stated.items() if one.share}
+        self._steps = {name: one.step for name, one in stated.items()}
         self._grids = {
             "azimuth": Grid(self._steps["azimuth"]),
             "elevation": Grid(self._steps["elevation"], limit_low=-_QUARTER, limit_high=_QUARTER),
@@ -227,14 +217,14 @@ class ErrorModel:
         elevation = np.where(over, np.copysign(math.pi, elevation) - elevation, elevation)
         azimuth = np.where(over, azimuth + math.pi, azimuth)
         values = {**values, "azimuth": azimuth, "elevation": elevation}
-        found = {name: grid.round(values[name]) for name, grid in self._grids.items()}
-        found["azimuth"] = wrap_pi_unchecked(found["azimuth"])
-        if "range" not in found:
-            found["range"] = nothing_in(len(azimuth))
+        on_grid = {name: grid.round(values[name]) for name, grid in self._grids.items()}
+        on_grid["azimuth"] = wrap_pi_unchecked(on_grid["azimuth"])
+        if "range" not in on_grid:
+            on_grid["range"] = nothing_in(len(azimuth))
         else:
             nearest = self._steps["range"] or _NEAREST_M
-            found["range"] = np.maximum(np.abs(found["range"]), nearest)
-        return found
+            on_grid["range"] = np.maximum(np.abs(on_grid["range"]), nearest)
+        return on_grid
 
 
 MEASUREMENT = Hook("measurement", ErrorModel, "what is measured, and its variances")
@@ -260,81 +250,33 @@ def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
     """Return the variances that all detections of a sensor share, by column; none by signal."""
     if p.errors == "signal":
         return {}
-    known = _mean_squares(p, _steps(p, steps))
-    return {VARIANCE_OF[name]: v for name, v in known.items() if not of_share(p, name)}
-
-
-def of_share(p: Any, name: str) -> bool:
-    """Return whether a quantity's error is stated as a share of its value, and so differs."""
-    return bool(p.errors != "grid" and p.quantities.get(name) == "share")
+    stated = p.stated_errors(steps).items()
+    return {VARIANCE_OF[name]: one.variance for name, one in stated if not one.share}
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
     """Return what of a sensor's errors lasts from look to look, by quantity."""
-    found = {}
-    for name, step in _steps(p, steps).items():
-        stated = _stated(p, name)
-        bias = mean_square(replace(stated, deviation=0.0), p.biases == "drawn")
+    lasting = {}
+    for name, stated in p.stated_errors(steps).items():
+        bias = stated.mean_bias_square
         parts = [LastingPart(bias)] if bias else []
         if stated.correlation_time_s is not None and stated.deviation:
             parts.append(LastingPart(stated.deviation**2, stated.correlation_time_s))
-        if of_share(p, name):
-            parts = _shares_of(parts, mean_square(stated, p.biases == "drawn"), step)
-        if step or parts:
-            found[name] = LastingError(step, tuple(parts))
-    return found
-
-
-def _shares_of(parts: Iterable[LastingPart], whole: float, step: float) -> list[LastingPart]:
-    """Return parts of an error that grows with its value: as shares of the variance but rounding's.
-
-    `whole` is the mean square of the share.
-    """
-    rounding = variance_of_step(step)
-    return [
-        LastingPart(-part.variance / whole * rounding, part.lasts_s, share=part.variance / whole)
-        for part in parts
-    ]
+        if stated.share:  # grows with the value: a share of all the variance but rounding's
+            rounding = stated.variance
+            shares = [(one.variance / stated.mean_square, one.lasts_s) for one in parts]
+            parts = [LastingPart(-one * rounding, lasts_s, share=one) for one, lasts_s in shares]
+        if stated.step or parts:
+            lasting[name] = LastingError(stated.step, tuple(parts))
+    return lasting
 
 
 def with_parts(
     errors: Mapping[str, LastingError], parts: Mapping[str, Iterable[LastingPart]]
 ) -> dict[str, LastingError]:
     """Return lasting errors with more parts, of some quantities."""
-    found = dict(errors)
+    joined = dict(errors)
     for name, more in parts.items():
-        known = found.get(name, LastingError())
-        found[name] = replace(known, parts=(*known.parts, *more))
-    return found
-
-
-def _steps(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    rounded = p.errors == "grid" or p.quantised
-    return {name: step if rounded else 0.0 for name, step in steps.items()}
-
-
-def _mean_squares(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return the mean square of what is stated and of rounding, by quantity.
-
-    What is stated as a share of the value is none of it.
-    """
-    drawn = p.biases == "drawn"
-    return {
-        name: variance_of_step(step)
-        + (0.0 if of_share(p, name) else mean_square(_stated(p, name), drawn))
-        for name, step in steps.items()
-    }
-
-
-def _stated(p: Any, name: str) -> StatedError:
-    """Return what the scene states of a quantity, in radians, metres and m/s.
-
-    Nothing of a quantity for which a user's sensor has no such parameters.
-    """
-    if name not in p.quantities:
-        return StatedError(0.0, 0.0, None)
-    stated: StatedError = p.stated_error(name)
-    if p.quantities[name] != "deg":
-        return stated
-    deviation, bias = math.radians(stated.deviation), math.radians(stated.bias)
-    return StatedError(deviation, bias, stated.correlation_time_s)
+        known = joined.get(name, LastingError())
+        joined[name] = replace(known, parts=(*known.parts, *more))
+    return joined

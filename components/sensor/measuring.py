@@ -98,10 +98,10 @@ class Measuring(Component):
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return how something that is not there is reported, in body axes, as if it were.
 
-        `where` is its place by quantity in the sensor's axes, `signal` as in `Look.signal`. `drawn`
-        holds keys, scan, instant and run by which errors are drawn, as a target's are: without
-        them a place by the edge of the field of view would never be reported beyond it. The last
-        value holds the other measured columns of `Detections`.
+        `where` is its position by quantity in the sensor's axes, `signal` as in `Look.signal`.
+        `drawn` holds keys, scan, instant and run by which errors are drawn, as a target's are:
+        without them a position by the edge of the field of view would never be reported beyond it.
+        The last value holds the other measured columns of `Detections`.
         """
         return self._in_body(*self._measurement.of_noise(where, signal, drawn))
 

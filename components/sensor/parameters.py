@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from components.geometry import TWO_PI, rising_sector
 from components.messages.reach import Reach
-from components.sensor.grid import Grid
+from components.sensor.grid import Grid, variance_of_step
 from dsa_des.block.component import ClockedParameters
 from dsa_des.errors import Disagreements
 from dsa_des.time.gauss_markov import LONGEST_S
@@ -19,15 +19,34 @@ CorrelationTime = Annotated[float, Field(gt=0, le=LONGEST_S)]
 
 @dataclass(frozen=True)
 class StatedError:
-    """Stated error of one measured quantity, in the scene's unit.
+    """Stated error of one measured quantity, in radians, metres and m/s, beside its grid's step.
 
     The deviation is of what changes from look to look, for a correlation time (None where it is new
-    at every look); the bias stays throughout a run, or is the largest that may.
+    at every look); the bias stays throughout a run, or is the largest that may where it is drawn.
+    Of a `share`, deviation and bias are shares of the value.
     """
 
+    step: float
     deviation: float
     bias: float
     correlation_time_s: float | None
+    drawn_bias: bool
+    share: bool
+
+    @property
+    def mean_bias_square(self) -> float:
+        """Mean square of the bias, over all runs where it is drawn."""
+        return self.bias**2 / (3.0 if self.drawn_bias else 1.0)
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of what is stated."""
+        return self.deviation**2 + self.mean_bias_square
+
+    @property
+    def variance(self) -> float:
+        """Mean square of rounding and of what is stated, but for a share."""
+        return variance_of_step(self.step) + (0.0 if self.share else self.mean_square)
 
 
 class ErrorParameters(ClockedParameters):
@@ -104,10 +123,23 @@ class ErrorParameters(ClockedParameters):
     def _keys(name: str, unit: str) -> tuple[str, str, str]:
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
-    def stated_error(self, name: str) -> StatedError:
-        """Return what the scene states of one of the `quantities`."""
-        values = (getattr(self, key) for key in self._keys(name, self.quantities[name]))
-        return StatedError(*values)
+    def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
+        """Return what the scene states of quantities with these steps of the grid.
+
+        Nothing of a quantity for which a user's sensor has no such parameters.
+        """
+        rounded, drawn = self.errors == "grid" or self.quantised, self.biases == "drawn"
+        stated = {}
+        for name, step in steps.items():
+            deviation, bias, lasts_s = 0.0, 0.0, None
+            if unit := self.quantities.get(name, ""):
+                deviation, bias, lasts_s = (getattr(self, key) for key in self._keys(name, unit))
+            if unit == "deg":
+                deviation, bias = math.radians(deviation), math.radians(bias)
+            share = unit == "share" and self.errors != "grid"
+            step = step if rounded else 0.0
+            stated[name] = StatedError(step, deviation, bias, lasts_s, drawn, share)
+        return stated
 
 
 class RangeErrorParameters(ErrorParameters):

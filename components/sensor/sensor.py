@@ -128,8 +128,8 @@ class Sensor(Measuring):
         CUE, AXES, APPARENT_PLACE, STRENGTH, MEASUREMENT, DECLARATION, REPORT,
     )  # fmt: skip
     effects = SENSOR_EFFECTS
-    #: Whether lines of sight are measured in body axes, so that who turns them into the world's by
-    #: what the ownship believes of its pose has its errors in them too.
+    #: Whether lines of sight are measured in body axes, so that turned into the
+    #: world's by what the ownship believes of its pose they have its errors too.
     turned_by_belief: ClassVar[bool] = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -228,12 +228,7 @@ class Sensor(Measuring):
     ) -> tuple[RelativeTargets, IntArray]:
         """Return the targets as this sensor sees them, and the row of each scan.
 
-        Parameters
-        ----------
-        targets : RelativeTargets
-        rows : (scans,)
-        cued : (scans, targets) of bool, optional
-            Which lie in a cue cone.
+        `cued` (scans, targets) says which lie in a cue cone.
         """
         return targets, rows
 
@@ -322,15 +317,7 @@ class Sensor(Measuring):
     def cells(
         self, targets: RelativeTargets, rows: IntArray, wake: Wake
     ) -> tuple[Cells, ReasonArray]:
-        """Return the cells that need our physics, and the reason for every (scan, target).
-
-        Parameters
-        ----------
-        targets : RelativeTargets
-        rows : (scans,)
-            Message row of each scan.
-        wake : Wake
-        """
+        """Return the cells that need our physics, and the reason for every (scan, target)."""
         reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)

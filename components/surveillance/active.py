@@ -118,7 +118,7 @@ class ActiveParameters(CooperativeParameters):
         return self
 
     def reach(self) -> Reach:
-        """Return the reach: as far as anybody answers, where none is given."""
+        """Return the reach: the farthest answer's, where none is given."""
         reach = super().reach()
         return reach if self.range_km is not None else replace(reach, range_max_m=_FARTHEST_M)
 
@@ -130,10 +130,10 @@ def _answers(active: Any, cells: Cells) -> dict[str, FloatArray]:
 
 def _measurements(active: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return each cell's measured range and reported altitude, m."""
-    everybody = np.arange(len(cells))
+    every = np.arange(len(cells))
     return {
-        "range": active.measured_range_m(cells, everybody),
-        "altitude": active.reported_altitude_m(cells, everybody, cells.alt_m),
+        "range": active.measured_range_m(cells, every),
+        "altitude": active.reported_altitude_m(cells, every, cells.alt_m),
     }
 
 
@@ -162,11 +162,11 @@ MEASUREMENT = Ladder(
 class Active(CooperativeSensor):
     """Asks transponders at its scans: range, coarse bearing, reported altitude, identity.
 
-    Who is new, or may be met soon by the ranges measured of it, is asked at every scan, others at
-    one in five, each in turn. Mode S
-    answers with its address, Mode C without; how far, by sector. An answer counts if any of the
-    last ten rounds of 0.1 s got one. The elevation is that of the reported altitude above the
-    ownship's own. The confidence is the probability of an answer.
+    An aircraft that is new, or may be met soon by the ranges measured of it, is asked at every
+    scan, others at one in five, each in turn. Mode S answers with its address, Mode C without; how
+    far, by sector. An answer counts if any of the last ten rounds of 0.1 s got one. The elevation
+    is that of the reported altitude above the ownship's own. The confidence is the probability of
+    an answer.
 
     Notes
     -----
@@ -222,21 +222,21 @@ class Active(CooperativeSensor):
         asked = np.flatnonzero(detected)
         if self.p.replies == "rounds":
             detected[asked] = self._answer(cells, asked, probability[asked])
-        found = np.flatnonzero(detected)
+        answered = np.flatnonzero(detected)
         extras = unreported(len(cells))
-        equipage, craft = cells.roster.equipage, cells.craft[found]
-        extras["address"][found] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
-        now = self.reported_altitude_m(cells, found, cells.alt_m[found])
-        extras["reported_alt_m"][found] = now
-        extras["reported_s"][found] = cells.state_ns[found] / NANOSECONDS
-        if len(found):
-            extras["reported_climb_m_s"][found] = self._climb(cells, found, now)
+        equipage, craft = cells.roster.equipage, cells.craft[answered]
+        extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
+        now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
+        extras["reported_alt_m"][answered] = now
+        extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
+        if len(answered):
+            extras["reported_climb_m_s"][answered] = self._climb(cells, answered, now)
         return Look(detected, probability, extras)
 
     def _is_asked(self, cells: Cells, which: AnyArray) -> BoolArray:
-        """Return who is asked at this scan: who is near or new, and others each in turn.
+        """Return which cells are asked at this scan: near or new ones, and others each in turn.
 
-        Who is near is known by the ranges measured at an aircraft's own last two turns.
+        Near ones are known by the ranges measured at an aircraft's own last two turns.
         """
         if self.p.far_every == 1 or not len(which):
             return np.ones(len(which), dtype=bool)
@@ -258,7 +258,7 @@ class Active(CooperativeSensor):
         return np.asarray(due)
 
     def _answer(self, cells: Cells, which: AnyArray, in_1_s: FloatArray) -> BoolArray:
-        """Return who answered in any of the last ten rounds; a run begins with one that is full."""
+        """Return which answered in the last ten rounds; a run begins with ten that are over."""
         last = cells.state_ns[which] // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
         run = np.repeat(cells.run[which], ROUNDS)
@@ -356,7 +356,7 @@ class Active(CooperativeSensor):
         altitude_m: FloatArray,
         deviation: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return variances of the place across, along and vertical, m²."""
+        """Return variances of the position across, along and vertical, m²."""
         if not self._errs:
             least = np.full(len(detected), _LEAST_M2)
             return least, least, least

@@ -44,19 +44,10 @@ def longitude_zones(lat_deg: npt.ArrayLike) -> IntArray:
 def encode(
     lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike, odd: npt.ArrayLike
 ) -> tuple[IntArray, IntArray]:
-    """Return the encoded latitude and longitude, 0 to 131071.
+    """Return the encoded latitude and longitude, 0 to 131071, of degrees on WGS 84.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg : arrays of one shape
-        Latitude in [-90, 90], longitude of any turn, degrees on WGS 84.
-    odd : array of bool
-        Which format each report has.
-
-    Raises
-    ------
-    ValueError
-        If a latitude lies beyond a pole or a number is not finite.
+    `odd` says which format each report has. ValueError if a latitude lies beyond a pole or a number
+    is not finite.
     """
     lat, lon, odd = np.broadcast_arrays(
         np.asarray(lat_deg, np.float64), np.asarray(lon_deg, np.float64), np.asarray(odd, bool)
@@ -80,7 +71,7 @@ def decode_near(
 ) -> tuple[FloatArray, FloatArray]:
     """Return latitude and longitude in degrees of single reports, those nearest to places known.
 
-    Unambiguous within half a zone, 180 nmi, of the place; longitude in [-180, 180).
+    Unambiguous within half a zone, 180 nmi, of the position; longitude in [-180, 180).
     """
     height = _latitude_zone_deg(odd)
     lat = _nearest(y / PARTS, np.asarray(near_lat_deg, np.float64), height)

@@ -80,13 +80,13 @@ def velocity_of(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:
     """Return velocities north, east and down (3, n), from positions 1/64 s before and after."""
-    places = [here[f"{whose}_{name}"] for name in PLACE]
+    positions = [here[f"{whose}_{name}"] for name in PLACE]
     moved, span_s = [], np.zeros(len(which))
     for step_s in (-STEP_S, STEP_S):
         then = cells.seen_at(which, ahead_s + step_s)
         there = then["present"]
         way = line_of_sight_ned(
-            *places, *(then[f"{whose}_{name}"] for name in PLACE), validate=False
+            *positions, *(then[f"{whose}_{name}"] for name in PLACE), validate=False
         )
         moved.append(np.where(there, np.stack(way), 0.0))
         span_s = span_s + np.where(there, STEP_S, 0.0)

@@ -141,7 +141,7 @@ def velocity_messages(
 
 @dataclass(frozen=True)
 class PositionFields:
-    """What position messages hold, (n,) each: encoded place, altitude, and categories."""
+    """What position messages hold, (n,) each: encoded position, altitude, and categories."""
 
     address: IntArray
     nic: IntArray
@@ -195,8 +195,8 @@ def _squitters(address: FloatArray, fields: list[tuple[npt.ArrayLike, int]]) -> 
         first += count
     messages = np.packbits(bits, axis=1)
     rest = parity(messages)
-    for place, shift in ((11, 16), (12, 8), (13, 0)):
-        messages[:, place] = rest >> shift & 0xFF
+    for index, shift in ((11, 16), (12, 8), (13, 0)):
+        messages[:, index] = rest >> shift & 0xFF
     return messages
 
 

@@ -1,4 +1,4 @@
-"""Interrogations of transponders: who answers how often, how far, and how coarse bearings are.
+"""Interrogations of transponders: how often they answer, how far, and how coarse bearings are.
 
 Numbers of RTCA DO-365, appendix Q: active surveillance of Mode S and Mode C.
 """

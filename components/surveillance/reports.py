@@ -29,15 +29,10 @@ _WHOLE = ("address", "nacp", "nacv", "nic")
 
 @dataclass(eq=False)
 class CooperativeReports(Detections):
-    """Reports of cooperative sensors: identity, position, velocity and their quality.
+    """Reports of cooperative sensors: identity, position, velocity and their quality (`REPORTED`).
 
     The line of sight is the one that follows from the report and the ownship's own belief of where
     it is and how it is turned, at the row's instant; so all that takes `Detections` takes these.
-
-    Parameters
-    ----------
-    extras : dict of (entries,)
-        `REPORTED`.
     """
 
     extras: dict[str, AnyArray] = columns({**EXTRAS, **REPORTED}, value=lambda m: m.extra_columns())

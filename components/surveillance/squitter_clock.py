@@ -43,13 +43,7 @@ def first_message_ns(uniform: FloatArray, share: FloatArray) -> IntArray:
 
 
 class SquitterClocks:
-    """The clocks of one kind of message of all aircraft.
-
-    Parameters
-    ----------
-    stream : Stream
-        Used by nothing else.
-    """
+    """The clocks of one kind of message of all aircraft, by a stream that nothing else uses."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -59,21 +53,10 @@ class SquitterClocks:
     def latest(
         self, keys: npt.NDArray[np.uint64], run: IntArray, until_ns: IntArray, count: int
     ) -> tuple[IntArray, IntArray, BoolArray]:
-        """Return the last messages that each aircraft sent up to an instant.
+        """Return the last `count` messages, at most 16, that each aircraft sent up to an instant.
 
-        Parameters
-        ----------
-        keys, run, until_ns : (n,)
-            Draw keys of the aircraft, their runs, and instants of the run in ns, which count.
-        count : int
-            How many, at most 16.
-
-        Returns
-        -------
-        number, instant_ns : (n, count) of int
-            Newest first.
-        sent : (n, count) of bool
-            False where there was none since the start of the run.
+        Aircraft are given by draw key and run, (n,). Numbers and instants in ns of the run,
+        (n, count), are newest first, with whether there was one since the start of the run.
         """
         n = len(keys)
         first, start_ns = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -86,12 +69,12 @@ class SquitterClocks:
         numbers = first[:, np.newaxis] + np.arange(2 * _CHUNK)
         instants = self._instants(keys, run, start_ns, numbers)
         newest = (instants <= until_ns[:, np.newaxis]).sum(axis=1) - 1
-        place = newest[:, np.newaxis] - np.arange(count)
-        sent: BoolArray = place >= 0
-        place = np.maximum(place, 0)
+        index = newest[:, np.newaxis] - np.arange(count)
+        sent: BoolArray = index >= 0
+        index = np.maximum(index, 0)
         return (
-            np.take_along_axis(numbers, place, 1),
-            np.take_along_axis(instants, place, 1),
+            np.take_along_axis(numbers, index, 1),
+            np.take_along_axis(instants, index, 1),
             sent,
         )
 
@@ -112,17 +95,17 @@ class SquitterClocks:
 
     def _known(self, key: int, run: int, until_ns: int) -> array[int]:
         """Return the starts of an aircraft's chunks, the last one after an instant."""
-        who, runs = np.array([key], dtype=np.uint64), np.array([run])
+        keys, runs = np.array([key], dtype=np.uint64), np.array([run])
         starts = self._starts.get((key, run))
         if starts is None:
             stream, first = self._stream.of_runs(runs), np.zeros(1, dtype=np.int64)
-            length, share = (stream.uniform(who, first, draw) for draw in (1, 2))
+            length, share = (stream.uniform(keys, first, draw) for draw in (1, 2))
             starts = array("q", first_message_ns(length, share).tolist())
             self._starts[key, run] = starts
         while starts[-1] <= until_ns:
             chunks = int((until_ns - starts[-1]) / (_LONGEST_NS * _CHUNK)) + 1
             count = min(chunks, _MOST_CHUNKS) * _CHUNK
             numbers = (len(starts) - 1) * _CHUNK + np.arange(count + 1)[np.newaxis]
-            found = self._instants(who, runs, np.array(starts[-1:]), numbers)
-            starts.extend(found[0, _CHUNK::_CHUNK].tolist())
+            later = self._instants(keys, runs, np.array(starts[-1:]), numbers)
+            starts.extend(later[0, _CHUNK::_CHUNK].tolist())
         return starts

@@ -30,7 +30,7 @@ _ALTITUDE_STEP_M2 = (25.0 * FOOT_M) ** 2 / 12.0
 #: What an aircraft without a velocity may have, a deviation; and how much another one changes its
 #: own on the way from a message to a scan, where no filter says so by its own motion.
 _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
-#: Who sends the truth itself still has an error to a filter: a centimetre, or one per second.
+#: An aircraft that sends the truth still has an error to a filter: a centimetre, or one per second.
 _LEAST_M2 = 1e-4
 
 
@@ -60,8 +60,8 @@ def told_errors(position_errors: str) -> tuple[ToldError, ...]:
     """Return the errors that broadcasts tell of; what is rounded stays in its step as long."""
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
-    found = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
-    return (*found, ALTIMETER, ROUNDING, VERTICAL_RATE)
+    level = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
+    return (*level, ALTIMETER, ROUNDING, VERTICAL_RATE)
 
 
 def unstated_errors(count: int) -> dict[str, FloatArray]:
@@ -111,7 +111,7 @@ class StatedByAircraft:
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
         tells, none = self.errs or self.rounds, np.zeros(len(age_s))
-        # Whose errors are told is filtered by one who knows how targets move on the way.
+        # Where errors are stated, filters know how targets move on the way.
         turned = none if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
         # Whole knots last while a flight is steady and are new while it is not: counted as both.
         new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)

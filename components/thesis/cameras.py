@@ -135,7 +135,7 @@ def eo_ranges(printed: Cells) -> Made:
 
     def draw(path: Path) -> None:
         names = [f"{case.geometry.replace(' ', chr(10))}\n{case.intruder}" for case in CASES]
-        place = np.arange(float(len(CASES)))
+        index = np.arange(float(len(CASES)))
         bars: list[tuple[str, str, Any]] = [
             ("literature (flight tests)", GREY, [cell.value for cell in literature]),
             ("thesis", SKY, [math.nan if cell is None else cell.value for cell in simulated]),
@@ -144,11 +144,11 @@ def eo_ranges(printed: Cells) -> Made:
         ]
         with panels(path, width_in=7.2, height_in=4.2) as (axes,):
             for number, (label, colour, values) in enumerate(bars):
-                drawn = axes.bar(place + 0.2 * (number - 1.5), values, 0.19, color=colour,
+                drawn = axes.bar(index + 0.2 * (number - 1.5), values, 0.19, color=colour,
                                  label=label)  # fmt: skip
                 labels = ["" if math.isnan(value) else f"{value:.1f}" for value in values]
                 axes.bar_label(drawn, labels, fontsize=7)
-            axes.set_xticks(place, names)
+            axes.set_xticks(index, names)
             axes.set_xlabel("geometry and intruder (the thesis's cell for the first is lost)")
             axes.set_ylabel("detection range (km)")
             axes.set_ylim(0, 13)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.display.map_view import outline_of
-from components.display.symbols import styles_of
+from components.display.symbols import gridded, styles_of
 from components.sensor import marks
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -49,13 +49,12 @@ def panels(
         figure.set_layout_engine("constrained")
         axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
         for one in axes:
-            one.grid(color="#DDDDDD", linewidth=0.5)
-            one.set_axisbelow(True)
+            gridded(one)
         yield axes
 
 
 def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) -> None:
-    """Draw the flights, the ownship's place and sensors' fields of view."""
+    """Draw the flights, the ownship's position and sensors' fields of view."""
     from matplotlib.patches import Polygon
 
     flights = run.flights
@@ -85,13 +84,13 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
 
 def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> None:
     """Mark where targets were when they were detected: the rows of a recorded table."""
-    east, north = true_places(run, rows)
+    east, north = true_positions(run, rows)
     defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
                 "color": RADAR, "zorder": 2}  # fmt: skip
     axes.plot(east, north, **{**defaults, **style})
 
 
-def true_places(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+def true_positions(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
     """Return east and north in km of each row's target at its time."""
     east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
     for name in np.unique(rows["target"].astype(str)):
@@ -100,13 +99,13 @@ def true_places(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, F
     return east, north
 
 
-def reported_places(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+def reported_positions(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
     """Return east and north in km of what a sensor reports, from a level ownship heading north."""
     ground_km = rows["range_m"] / 1000.0 * np.cos(rows["elevation_rad"])
     return ground_km * np.sin(rows["azimuth_rad"]), ground_km * np.cos(rows["azimuth_rad"])
 
 
 def ray(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
-    """Return the ends of a line from the ownship's place, east and north."""
+    """Return the ends of a line from the ownship's position, east and north."""
     angle = math.radians(azimuth_deg)
     return [0.0, length_km * math.sin(angle)], [0.0, length_km * math.cos(angle)]

@@ -102,7 +102,7 @@ def pd_at_averages(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        place = np.arange(3.0)
+        index = np.arange(3.0)
         drawn = (
             ("thesis", GREY, pds),
             (f"ours, {budget.bandwidth_hz:.0f} Hz (small class)", BLUE, by_small),
@@ -110,10 +110,10 @@ def pd_at_averages(printed: Cells) -> Made:
         )
         with panels(path) as (axes,):
             for step, (label, colour, values) in zip((-0.27, 0.0, 0.27), drawn, strict=True):
-                bars = axes.bar(place + step, values, 0.25, color=colour, label=label)
+                bars = axes.bar(index + step, values, 0.25, color=colour, label=label)
                 axes.bar_label(bars, fmt="%.4f", fontsize=8)
             names = [f"{name}, {dbsm} dBsm\nat {km:.2f} km" for name, (dbsm, km) in CLASSES.items()]
-            axes.set_xticks(place, names)
+            axes.set_xticks(index, names)
             axes.set_xlabel("RCS class and its average detection range in the flight tests")
             axes.set_ylabel("probability of detection Pd [1]")
             axes.set_ylim(0.84, 0.95)
@@ -257,13 +257,13 @@ def _declared(printed: Cells, runs: list[Recording], flown: Mapping[str, FloatAr
 
 def declared_ranges(runs: list[Recording], name: str, least: int) -> FloatArray:
     """Return where each run has detected a target in so many scans in a row, km."""
-    found = []
+    result = []
     for replica in runs:
         seen = replica.rows("detections", block="radar", target=name)
         scans, ranges = seen["scan"], seen["true_range_m"] / 1000.0
         enough = np.flatnonzero(scans[least - 1 :] - scans[: len(scans) - least + 1] < least)
-        found.append(ranges[enough[0] + least - 1])
-    return np.array(found)
+        result.append(ranges[enough[0] + least - 1])
+    return np.array(result)
 
 
 def measured_ranges() -> Mapping[str, FloatArray]:
@@ -277,7 +277,7 @@ def measured_ranges() -> Mapping[str, FloatArray]:
 
 def simulated_ranges(runs: list[Recording]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return, by class and for each run, the first range detected and that after the last miss."""
-    found: dict[str, tuple[FloatArray, FloatArray]] = {}
+    result: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name in CLASSES:
         first, held = [], []
         for replica in runs:
@@ -287,5 +287,5 @@ def simulated_ranges(runs: list[Recording]) -> dict[str, tuple[FloatArray, Float
             gaps = np.flatnonzero(np.diff(scans[approaching]) > 1)
             first.append(ranges[0])
             held.append(ranges[gaps[-1] + 1] if len(gaps) else ranges[0])
-        found[name] = (np.array(first), np.array(held))
-    return found
+        result[name] = (np.array(first), np.array(held))
+    return result

@@ -20,8 +20,8 @@ from components.thesis.drawing import (
     mark,
     panels,
     ray,
-    reported_places,
-    true_places,
+    reported_positions,
+    true_positions,
 )
 from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Cells, Columns, Made, Row, configured, predicted
@@ -105,9 +105,9 @@ def detections_over_range(_: Cells) -> Made:
     ])  # fmt: skip
     pd_of_scan = np.asarray(pd_at(sensor, budget, small_dbsm, range_km))
     looked = np.histogram(range_km, EDGES_KM)[0]
-    found = np.histogram(seen["true_range_m"] / 1000.0, EDGES_KM)[0]
+    result = np.histogram(seen["true_range_m"] / 1000.0, EDGES_KM)[0]
     middle_km = 0.5 * (EDGES_KM[1:] + EDGES_KM[:-1])
-    share = found / looked
+    share = result / looked
     # Pd falls within a bin: what is expected is its mean over the scans that fell there.
     pd = np.histogram(range_km, EDGES_KM, weights=pd_of_scan)[0] / looked
     variance = np.histogram(range_km, EDGES_KM, weights=pd_of_scan * (1.0 - pd_of_scan))[0]
@@ -126,12 +126,12 @@ def detections_over_range(_: Cells) -> Made:
     )
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=4.0) as (places, shares):
-            draw_map(places, done, fields_of_view=("radar",))
+        with panels(path, 1, 2, width_in=9.0, height_in=4.0) as (plan, shares):
+            draw_map(plan, done, fields_of_view=("radar",))
             few = {name: column[seen["scan"] % 5 == 0] for name, column in seen.items()}
-            mark(places, done, few, markersize=3.5, label="detected (one scan in five)")
-            places.set(xlim=(-16, 16), ylim=(-6, 16))
-            legend_below(places)
+            mark(plan, done, few, markersize=3.5, label="detected (one scan in five)")
+            plan.set(xlim=(-16, 16), ylim=(-6, 16))
+            legend_below(plan)
             curve_km = np.linspace(1.0, 15.0, 141)
             curve = pd_at(sensor, budget, small_dbsm, curve_km)
             shares.plot(curve_km, curve, color=BLUE, label="Pd, Swerling I, 1.76 dBsm")
@@ -177,7 +177,7 @@ def angular_resolution(printed: Cells) -> Made:
                 draw_map(one, runs[step])
                 for azimuth in np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 6)):
                     one.plot(*ray(azimuth, 6.0), color="#BBBBBB", linewidth=0.5, zorder=0.5)
-                east, north = reported_places(seen[step])
+                east, north = reported_positions(seen[step])
                 one.plot(east, north, "o", color=RADAR, fillstyle="none", markersize=4.5,
                          label="reported by radar")  # fmt: skip
                 one.set_title(f"Radar detection: azimuth resolution {step:g}°", loc="left")
@@ -228,7 +228,7 @@ def two_fields_of_view(_: Cells) -> Made:
             axes.set(xlim=(-5.4, 5.4), ylim=(-0.4, 6.2))
             legend_below(axes, 3)
 
-    east, north = zip(*(true_places(done, rows) for rows in fused.values()), strict=True)
+    east, north = zip(*(true_positions(done, rows) for rows in fused.values()), strict=True)
     data = {
         **_joined(fused, ("time_s",), "sensors"),
         "east_km": np.concatenate(east),
@@ -318,24 +318,24 @@ def unsynchronised(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (places, times):
-            draw_map(places, done)
+        with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (plan, times):
+            draw_map(plan, done)
             for height, (name, (marker, colour, size)) in enumerate(_MARKS.items()):
                 label = f"{name.replace('+', ' and ')}{' fused' if '+' in name else ' alone'}"
                 style = {"marker": marker, "color": colour, "markersize": size}
                 first = {key: column[fused[name]["time_s"] < 10.0]
                          for key, column in fused[name].items()}  # fmt: skip
-                mark(places, done, first, **style, label=label)
+                mark(plan, done, first, **style, label=label)
                 times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
                            fillstyle="none", linestyle="none")  # fmt: skip
-            places.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
-            places.set_title("Radar/IR detection, first 10 s", loc="left")
+            plan.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
+            plan.set_title("Radar/IR detection, first 10 s", loc="left")
             times.set_yticks(range(len(_MARKS)), ["radar alone", "IR alone", "fused"])
             times.set_xticks(range(11))
             times.set(xlim=(-0.3, 10.3), ylim=(-0.5, len(_MARKS) - 0.5))
             times.set_title("radar scan rate 5 Hz, IR scan rate 2 Hz", loc="left")
             times.set_xlabel("time (s)")
-            legend_below(places, 5, without="ownship")
+            legend_below(plan, 5, without="ownship")
 
     data: Columns = _joined(fused, ("time_s",), "sensors")
     caption = "Scenario with two sensors with different scan rates, which are not synchronised."

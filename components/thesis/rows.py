@@ -38,19 +38,13 @@ class Basis:
         return _SENTENCES[self.kind].format(self.words)
 
 
-def predicted(words: str, *inputs: str) -> Basis:
-    """Return the basis of a number to which nothing was fitted."""
-    return Basis(PREDICTED, words, inputs)
+def _basis(kind: str) -> Callable[..., Basis]:
+    return lambda words, *inputs: Basis(kind, words, inputs)
 
 
-def calibrated(words: str, *inputs: str) -> Basis:
-    """Return the basis of a number from which a parameter was set."""
-    return Basis(CALIBRATED, words, inputs)
-
-
-def configured(words: str, *inputs: str) -> Basis:
-    """Return the basis of a number that is an input of ours."""
-    return Basis(CONFIGURED, words, inputs)
+#: The basis of a number to which nothing was fitted, from which a parameter was set, that is an
+#: input of ours: of words and inputs.
+predicted, calibrated, configured = map(_basis, (PREDICTED, CALIBRATED, CONFIGURED))
 
 
 @dataclass(frozen=True)

@@ -65,10 +65,10 @@ def aircraft(name: str) -> Aircraft:
 
 def areas(name: str, band: str = "eo") -> dict[str, Any]:
     """Return an aircraft's areas in a band, eo or ir, as silhouettes take them."""
-    found: dict[str, Any] = getattr(aircraft(name), band).model_dump(
+    result: dict[str, Any] = getattr(aircraft(name), band).model_dump(
         exclude={"silhouette_table", "made_for"}
     )
-    return found
+    return result
 
 
 def read_csv(name: str) -> list[dict[str, str]]:
@@ -126,10 +126,10 @@ def _values(column: AnyArray | Text) -> AnyArray:
 
 def flights_of(simulation: Simulation) -> Flights:
     """Return where all aircraft are."""
-    found = Flights.of(simulation, {})
-    if found is None:
+    result = Flights.of(simulation, {})
+    if result is None:
         raise UsageError(f"{simulation.scene.path}: has no traffic")
-    return found
+    return result
 
 
 def scene(name: str, *sets: str) -> Scene:

@@ -11,6 +11,7 @@ import csv
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle
 from os import PathLike
 from pathlib import Path
@@ -46,10 +47,10 @@ _STARTS = {
 
 # Hollow marks of falling size, so that curves that coincide are all seen.
 _STYLES: list[dict[str, Any]] = [
-    {"marker": "s", "linestyle": "--", "markersize": 7.0},
-    {"marker": "^", "linestyle": ":", "markersize": 4.5},
-    {"marker": "d", "linestyle": "-.", "markersize": 3.0},
+    {"marker": marker, "linestyle": line, "markersize": size, "fillstyle": "none"}
+    for marker, line, size in (("s", "--", 7.0), ("^", ":", 4.5), ("d", "-.", 3.0))
 ]
+_REFERENCE: dict[str, Any] = {"marker": "o", "linestyle": "-", "markersize": 3.5}
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,17 +133,13 @@ def compare_silhouettes(
         model_areas, model_largest = signatures(model, function)
         for reference, (reference_areas, reference_largest) in measured.items():
             divisor = model_largest if scale == "own_maximum" else reference_largest
-            comparisons.extend(
+            comparisons += [
                 RotationComparison(
-                    axis,
-                    model,
-                    reference,
-                    cameras[axis][0],
-                    model_areas[axis] / divisor,
+                    axis, model, reference, cameras[axis][0], model_areas[axis] / divisor,
                     reference_areas[axis] / reference_largest,
                 )
                 for axis in AXES
-            )
+            ]  # fmt: skip
     return comparisons
 
 
@@ -166,31 +163,23 @@ def draw_comparison(
     with drawing(7.0, 9.0, Path(path), dpi=150) as figure:
         figure.set_layout_engine("constrained")
         panels = figure.subplots(3, 1, sharex=True, sharey=True)
-        _draw_panels(panels, comparisons)
+        for panel, axis in zip(panels, AXES, strict=True):
+            shown = [one for one in comparisons if one.axis == axis]
+            drawn = {one.reference: (one, one.reference_share, _REFERENCE) for one in shown}
+            models = {f"{one.model} model": (one, one.model_share) for one in shown}
+            styles = zip(models.items(), cycle(_STYLES))
+            drawn |= {name: (*curve, style) for (name, curve), style in styles}
+            for name, (one, share, style) in drawn.items():
+                panel.plot(one.angle_deg, share, label=figure_text(name), linewidth=1.2, **style)
+            panel.set_title(f"Rotation about {axis}: {_STARTS[axis]}", fontsize=9)
+            panel.set_ylabel("Signature\n[share of maximum]")
+            panel.grid(True, alpha=0.3)
+        panels[0].set_ylim(bottom=0.0)
+        panels[0].legend(fontsize=8)
+        panels[-1].set_xlabel("Camera angle about the axis (deg)")
+        panels[-1].set_xticks(np.arange(0.0, 181.0, 30.0))
         if title:
             figure.suptitle(figure_text(title, 80))
-
-
-def _draw_panels(panels: Any, comparisons: Sequence[RotationComparison]) -> None:
-    for panel, axis in zip(panels, AXES, strict=True):
-        shown = [one for one in comparisons if one.axis == axis]
-        curves = {one.reference: (one.angle_deg, one.reference_share) for one in shown}
-        for name, (angle_deg, share) in curves.items():
-            panel.plot(
-                angle_deg, share, "o-", label=figure_text(name), markersize=3.5, linewidth=1.2
-            )
-        curves = {f"{one.model} model": (one.angle_deg, one.model_share) for one in shown}
-        for (name, (angle_deg, share)), style in zip(curves.items(), cycle(_STYLES)):
-            panel.plot(
-                angle_deg, share, label=figure_text(name), fillstyle="none", linewidth=1.2, **style
-            )
-        panel.set_title(f"Rotation about {axis}: {_STARTS[axis]}", fontsize=9)
-        panel.set_ylabel("Signature\n[share of maximum]")
-        panel.grid(True, alpha=0.3)
-    panels[0].set_ylim(bottom=0.0)
-    panels[0].legend(fontsize=8)
-    panels[-1].set_xlabel("Camera angle about the axis (deg)")
-    panels[-1].set_xticks(np.arange(0.0, 181.0, 30.0))
 
 
 # Light aircraft show up to a fifth more from the nose than abeam, or less: only what is clearly the
@@ -232,8 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             except OSError as error:  # of what is read, not of what is written
                 raise ValueError(str(error)) from error
             say_lines(comparison_table(comparisons))
-            _write_errors(comparisons, folder / "errors.csv")
-            _write_curves(comparisons, folder / "curves.csv")
+            _write_tables(comparisons, folder)
             draw_comparison(comparisons, folder / "silhouettes.png", title=options.title or "")
             write_run_json(folder, {"title": options.title or "", "models": options.models})
     except (ImportError, UsageError, ValueError) as error:
@@ -288,11 +276,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def _compare(options: argparse.Namespace) -> list[RotationComparison]:
     areas = _areas(options)
-    models = {}
+    models: dict[str, Silhouette] = {}
     for name in options.models.split(","):
         if name not in _MODELS:
             raise ValueError(f"--models has {name!r}: it must be of {', '.join(_MODELS)}")
-        models[name] = _silhouette(model=name, **areas)
+        models[name] = partial(visible_area, model=name, **areas)
     references: dict[str, Silhouette] = {}
     if options.reference is not None:
         from components.aircraft.aspect_tables import read_aspect_table
@@ -301,20 +289,20 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
             table = read_aspect_table(options.reference)
         except InputFileError as error:
             raise ValueError(f"--reference {options.reference}: {error}") from None
-        references["table"] = _silhouette(model="aspect_table", table=table)
+        references["table"] = partial(visible_area, model="aspect_table", table=table)
         if warning := turned_table_warning(areas, table):
             say(f"warning: --reference {options.reference}: {warning}", err=True)
     if options.mesh is not None:
         from components.optical.mesh import load_mesh
 
         mesh = load_mesh(options.mesh, unit_m=options.mesh_unit_m, axes=options.mesh_axes)
-        references["mesh"] = _silhouette(model="convex_hull", mesh=mesh)
+        references["mesh"] = partial(visible_area, model="convex_hull", mesh=mesh)
     if not references:
         raise ValueError("--reference and --mesh are missing: at least one of them must be given")
     return compare_silhouettes(models, references, step_deg=options.step_deg, scale=options.scale)
 
 
-def _areas(options: argparse.Namespace) -> dict[str, float]:
+def _areas(options: argparse.Namespace) -> dict[str, Any]:
     if options.areas is not None:
         try:
             values = [float(text) for text in options.areas.split(",")]
@@ -336,39 +324,23 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
         value = table.get(name)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(f"{options.aircraft} has no number eo.{name}: --aircraft needs it")
-    assert isinstance(table, dict)
     return {name: float(table[name]) for name in _AREAS}
 
 
-def _silhouette(**known: Any) -> Silhouette:
-    return lambda heading, pitch, roll, elevation: visible_area(
-        heading, pitch, roll, elevation, **known
-    )
-
-
-def _write_errors(comparisons: Sequence[RotationComparison], path: Path) -> None:
-    rows = [("model", "reference", "axis", "mean_error", "max_error")]
-    rows += [
-        (one.model, one.reference, one.axis, f"{one.mean_error:.6f}", f"{one.max_error:.6f}")
-        for one in comparisons
-    ]
-    _write(rows, path)
-
-
-def _write_curves(comparisons: Sequence[RotationComparison], path: Path) -> None:
-    rows = [("model", "reference", "axis", "angle_deg", "model_share", "reference_share")]
+def _write_tables(comparisons: Sequence[RotationComparison], folder: Path) -> None:
+    names = ("model", "reference", "axis")
+    tables: dict[str, list[Sequence[str]]] = {
+        "errors": [(*names, "mean_error", "max_error")],
+        "curves": [(*names, "angle_deg", "model_share", "reference_share")],
+    }
     for one in comparisons:
-        for angle, model, reference in zip(
-            one.angle_deg, one.model_share, one.reference_share, strict=True
-        ):
-            rows.append((one.model, one.reference, one.axis, f"{angle:g}", f"{model:.6f}",
-                         f"{reference:.6f}"))  # fmt: skip
-    _write(rows, path)
-
-
-def _write(rows: Sequence[Sequence[str]], path: Path) -> None:
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
+        of = one.model, one.reference, one.axis
+        tables["errors"].append((*of, f"{one.mean_error:.6f}", f"{one.max_error:.6f}"))
+        shares = zip(one.angle_deg, one.model_share, one.reference_share, strict=True)
+        tables["curves"] += [(*of, f"{a:g}", f"{m:.6f}", f"{r:.6f}") for a, m, r in shares]
+    for name, rows in tables.items():
+        with open(folder / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 if __name__ == "__main__":

@@ -106,21 +106,21 @@ def front_and_back(printed: Cells) -> Made:
 
 def rotations(file: str, figure: str, _: Cells) -> Made:
     """Figs 4.8 to 4.10: the signature of one aircraft over half turns about the three axes."""
-    found = _comparisons(file)
+    result = _comparisons(file)
     rows = [
         Row(f"shown share at {int(one.angle_deg[index])}°, rotation about {axis}, exact",
             float(one.model_share[index]), "", "Share of the model's own maximum.")
         for axis, index in (("x", 0), ("y", 0), ("z", 9))
         for one in [_of(file, "exact", axis)]
     ]  # fmt: skip
-    data: dict[str, Any] = {"angle_deg": found[0].angle_deg}
+    data: dict[str, Any] = {"angle_deg": result[0].angle_deg}
     for axis in AXES:
         for model in ("thesis", "exact"):
             data[f"{model}_{axis}"] = _of(file, model, axis).model_share
         data[f"union_{axis}"] = _of(file, "exact", axis).reference_share
 
     def draw(path: Path) -> None:
-        draw_comparison(found, path, title=NAMES[file])
+        draw_comparison(result, path, title=NAMES[file])
 
     return Made.with_figure(rows, figure, _CAPTION.format(NAMES[file]), draw, data)
 

@@ -56,10 +56,10 @@ class Errors:
 
     def by_range(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return middle of each bin of 1 km, mean and standard deviation there."""
-        place = np.digitize(self.range_km, _EDGES_KM) - 1
-        bins = [number for number in range(len(_EDGES_KM) - 1) if np.sum(place == number) > 1]
-        mean = np.array([values[place == number].mean() for number in bins])
-        spread = np.array([values[place == number].std(ddof=1) for number in bins])
+        index = np.digitize(self.range_km, _EDGES_KM) - 1
+        bins = [number for number in range(len(_EDGES_KM) - 1) if np.sum(index == number) > 1]
+        mean = np.array([values[index == number].mean() for number in bins])
+        spread = np.array([values[index == number].std(ddof=1) for number in bins])
         return _EDGES_KM[bins] + 0.5, mean, spread
 
 
@@ -96,7 +96,7 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
                     ))  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, places):
+        with panels(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, plan):
             for (name, colour), label in zip(
                 (("radar", RADAR), ("eo", EO)), ("radar", "EO"), strict=True
             ):
@@ -106,13 +106,13 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
                     angles.plot(middle, np.hypot(mean, spread), style, color=colour, markersize=4,
                                 label=f"{label}, {quantity}")  # fmt: skip
             middle, mean, spread = radar.by_range(radar.east_m)
-            places.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
+            plan.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
             angles.set_ylabel("root mean square angle error (deg)")
-            places.set_ylabel("east error of the intruder's position (m)")
+            plan.set_ylabel("east error of the intruder's position (m)")
             angles.set_ylim(bottom=0.0)
-            places.legend(loc="lower left")
-            for axes in (angles, places):
+            plan.legend(loc="lower left")
+            for axes in (angles, plan):
                 axes.set_xlabel("range (km)")
             angles.set_title("angles in north-east-down, as believed", loc="left")
             legend_below(angles)
@@ -120,9 +120,9 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     data: dict[str, list[float | str]] = {"sensor": [], "range_km": []}
     kinds = ("azimuth", "elevation")
     data |= {f"{kind}_{part}_deg": [] for kind in kinds for part in ("mean", "std")}
-    for name, found in errors.items():
+    for name, result in errors.items():
         for kind in kinds:
-            middle, mean, spread = found.by_range(getattr(found, f"{kind}_deg"))
+            middle, mean, spread = result.by_range(getattr(result, f"{kind}_deg"))
             data[f"{kind}_mean_deg"] += mean.tolist()
             data[f"{kind}_std_deg"] += spread.tolist()
         data["sensor"] += [name] * len(middle)
@@ -137,7 +137,7 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
 
 def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     """Return the errors of what a sensor reports, the ownship flying level to the north."""
-    parts = [_with_place(run, name) for run in runs]
+    parts = [_with_own_position(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
             for key in ("time_s", "ned_azimuth_rad", "ned_elevation_rad", "true_azimuth_rad",
                         "true_elevation_rad", "true_range_m", "range_m", *_PLACE)}  # fmt: skip
@@ -150,11 +150,11 @@ def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     )
 
 
-def _with_place(run: Recording, name: str) -> dict[str, Any]:
+def _with_own_position(run: Recording, name: str) -> dict[str, Any]:
     """Return what a sensor detected, and where the ownship believed to be then."""
-    found, scans = run.rows("detections", block=name), run.rows("scans", block=name)
-    row = np.searchsorted(scans["tick"], found["tick"])
-    return {**found, **{key: scans[key][row] for key in _PLACE}}
+    result, scans = run.rows("detections", block=name), run.rows("scans", block=name)
+    row = np.searchsorted(scans["tick"], result["tick"])
+    return {**result, **{key: scans[key][row] for key in _PLACE}}
 
 
 def _east_error_m(flights: Flights, seen: dict[str, FloatArray]) -> FloatArray:
@@ -216,8 +216,8 @@ def systems(printed: Cells) -> Made:
     rows = [
         Row(f"{name}.toml, first detection of {target}", km, "km",
             f"{runs[name].simulation.scene.description}")
-        for name, found in first.items()
-        for target, km in found.items()
+        for name, result in first.items()
+        for target, km in result.items()
         if name not in ("afrl", "afrl_low_threshold")
     ]  # fmt: skip
     rows += [
@@ -236,9 +236,9 @@ def systems(printed: Cells) -> Made:
     def draw(path: Path) -> None:
         with panels(path, width_in=7.4, height_in=5.4) as (axes,):
             height, ticks, names = 0.0, [], []
-            for name, found in reversed(first.items()):
+            for name, result in reversed(first.items()):
                 start = height
-                for (target, km), colour in zip(found.items(), _COLOURS, strict=False):
+                for (target, km), colour in zip(result.items(), _COLOURS, strict=False):
                     axes.barh(height, km, 0.8, color=colour)
                     axes.annotate(
                         f" {_shown(target)}, {km:.2f} km", (km, height), va="center", fontsize=7
@@ -253,9 +253,9 @@ def systems(printed: Cells) -> Made:
             axes.set_xlim(0, 20)
 
     data = {
-        "system": [name for name, found in first.items() for _ in found],
-        "target": [target for found in first.values() for target in found],
-        "first_detection_km": [km for found in first.values() for km in found.values()],
+        "system": [name for name, result in first.items() for _ in result],
+        "target": [target for result in first.values() for target in result],
+        "first_detection_km": [km for result in first.values() for km in result.values()],
     }
     caption = "First detection of each target by the systems of Table 2.4, in one run of each."
     lines = [f"- `configs/systems/{name}.toml`: {done.simulation.scene.description}"
@@ -274,13 +274,13 @@ def first_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
     By any sensor, or by one.
     """
     seen = done.rows("detections", **({"block": block} if block else {}))
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for track in done.flights.targets:
         here = np.flatnonzero(seen["target"] == track.name)
         if len(here):
             at = here[np.argmin(seen["time_s"][here])]
-            found[track.name] = float(seen["true_range_m"][at]) / 1000.0
-    return found
+            result[track.name] = float(seen["true_range_m"][at]) / 1000.0
+    return result
 
 
 def _afrl(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float]) -> list[Row]:
@@ -326,9 +326,9 @@ BONANZA_M2 = 10.0
 def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
     """Return where the cameras' Pd is 0.9, and that of the earlier study's Bonanza at 3 NM."""
     camera: Any = done.simulation.components["centre"]
-    found = camera.detector
+    result = camera.detector
     weight_m2 = camera.p.static_weight / (camera.pixel_azimuth_rad * camera.pixel_elevation_rad)
-    nine_of_ten = found.threshold + 1.2815515655446004 * found.noise
+    nine_of_ten = result.threshold + 1.2815515655446004 * result.noise
     rows = []
     for size, area_m2 in (("small", KING_AIR_M2["Level head-on"]), ("large", 90.0)):
         reached_km = (weight_m2 * area_m2 / nine_of_ten) ** 0.5 / 1000.0
@@ -340,7 +340,7 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
                       "systems/afrl.toml:blocks.centre.false_alarms_per_frame")))  # fmt: skip
     for cell, distance_nm in (("pd_near", 2.0), ("pd_far", 3.5)):
         signature = weight_m2 * BONANZA_M2 / (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2
-        pd = detection_probability(signature, found.threshold, found.noise)
+        pd = detection_probability(signature, result.threshold, result.noise)
         rows.append(printed[cell].beside(
             f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd), "%",
             "Printed of an earlier study: 100 % below 3 NM, 90 % beyond.",

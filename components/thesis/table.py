@@ -199,11 +199,11 @@ def chosen(names: Iterable[str]) -> list[Item]:
     wanted: set[str] = set()
     problems = []
     for name in names:
-        found = _find(name)
-        if len(found) == 1:
-            wanted.add(found[0])
-        elif found:
-            problems.append(f"ITEM {name!r}: there are several; say {' or '.join(found)}")
+        result = _find(name)
+        if len(result) == 1:
+            wanted.add(result[0])
+        elif result:
+            problems.append(f"ITEM {name!r}: there are several; say {' or '.join(result)}")
         else:
             hint = did_you_mean(name.lower(), [item.name for item in ITEMS])
             problems.append(f"ITEM {name!r}: there is no such item{hint}")

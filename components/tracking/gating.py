@@ -257,18 +257,19 @@ def common_errors(
     """
     if rules.lasting is None:
         return None
-    source = scans.source[rows][:, cells]
+    source = scans.source[rows].take(cells, axis=1)
     there = np.maximum(source, 0)
     when = part.seen_tick[there, track]
-    apart_s = np.abs(part.tick[track] - when) / rules.ticks_per_s
+    apart_s = np.abs(part.tick.take(track) - when) / rules.ticks_per_s
     since_s = np.where((when < 0) | (source < 0), np.inf, apart_s)
+    seen = np.isfinite(since_s)
     moved = np.zeros(source.shape)
-    for i, row in enumerate(rows):
-        if row < 3:
-            moved[i] = selected(foreseen[i], track) - part.seen[row, there[i], track]
-    moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
-    moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
-    range_m = np.where(np.isfinite(since_s), part.seen[2, there, track], np.inf)
+    known = [row for row in rows if row < 3]  # they come first
+    last = part.seen[np.array(known)[:, np.newaxis], there[: len(known)], track]
+    np.subtract(foreseen[: len(known)].take(track, axis=1), last, out=moved[: len(known)])
+    moved[0] = wrap_pi_unchecked(moved[0])
+    moved = np.where(seen, np.abs(moved), 0.0)
+    range_m = np.where(seen, part.seen[2, there, track], np.inf)
     return rules.lasting.common(rows, there, variance, moved, since_s, range_m)
 
 

@@ -9,6 +9,7 @@ in a measurement is worked out by `components.estimation.kalman.variance_of_what
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -59,6 +60,14 @@ class LastingErrors:
                 lasts_s[k][cell], share[k][cell] = part.lasts_s, part.share
         return cls(step, variance, lasts_s, across_m2, share)
 
+    @cached_property
+    def _across(self) -> bool:
+        return bool(self.across_m2.any())
+
+    @cached_property
+    def _shared(self) -> bool:
+        return bool(self.share.any())
+
     def common(
         self,
         rows: list[int],
@@ -69,24 +78,33 @@ class LastingErrors:
         range_m: FloatArray,
     ) -> FloatArray:
         """Return the covariance of measurements' errors with those of their sensors' last ones."""
-        quantity = _OF_ROW[rows][:, np.newaxis]
-        step, lasts_s = self.step[quantity, source], self.lasts_s[:, quantity, source]
-        lasting = self.variance[:, quantity, source]
-        if self.across_m2.any():
-            lasting = lasting + self.across_m2[:, quantity, source] / np.maximum(range_m, 1.0) ** 2
-        if self.share.any():
-            share = self.share[:, quantity, source]
-            lasting = np.where(share > 0.0, np.maximum(lasting + share * variance, 0.0), lasting)
+        at = _OF_ROW[rows][:, np.newaxis] * self.step.shape[1] + source
+        step, seen = self.step.take(at), np.isfinite(since_s)
         rounding = step * step / 12.0
-        white = np.maximum(variance - rounding - lasting.sum(axis=0), 0.0)
+        white, remembered = variance - rounding, 0.0
+        if len(self.variance):
+            lasting = _of_cells(self.variance, at)
+            if self._across:
+                lasting = lasting + _of_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
+            if self._shared:
+                share = _of_cells(self.share, at)
+                stated = np.maximum(lasting + share * variance, 0.0)
+                lasting = np.where(share > 0.0, stated, lasting)
+            white = white - lasting.sum(axis=0)
+            # Time over an infinite time constant is 0: nothing is forgotten.
+            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _of_cells(self.lasts_s, at))
+            remembered = (lasting * forgotten).sum(axis=0)
         safe = np.where(step > 0.0, step, 1.0)
+        white = np.maximum(white, 0.0)
         # A variance that comes out as 1e-20 of a step has none of its own.
         white = np.where(white > 1e-9 * rounding, white, 0.0)
         rounding = rounding * np.exp(-6.0 * moved / safe - 4.0 * np.pi**2 * white / (safe * safe))
-        seen = np.isfinite(since_s)
-        # Time over an infinite time constant is 0: nothing is forgotten.
-        forgotten = np.exp(-np.where(seen, since_s, 0.0) / lasts_s)
-        return np.where(seen, rounding + (lasting * forgotten).sum(axis=0), 0.0)
+        return np.where(seen, rounding + remembered, 0.0)
+
+
+def _of_cells(values: FloatArray, at: IntArray) -> FloatArray:
+    """Return values (parts, quantities, sensors) at flat positions in the last two axes."""
+    return values.reshape(len(values), values[0].size).take(at, axis=1)
 
 
 #: Looks that a track's history can hold.

@@ -35,11 +35,11 @@ _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 def suspicions(content: TrafficFile, duration_s: float) -> list[str]:
     """Return what is suspicious about the flights of a file, one sentence for each kind."""
-    found: dict[str, list[str]] = {}
+    by_hint: dict[str, list[str]] = {}
     for craft in content.aircraft:
         for what, hint in _of_one(craft):
-            found.setdefault(hint, []).append(f"{craft.name}: {what}")
-    lines = [f"{_few(cases)}; {hint}" for hint, cases in found.items()]
+            by_hint.setdefault(hint, []).append(f"{craft.name}: {what}")
+    lines = [f"{_few(cases)}; {hint}" for hint, cases in by_hint.items()]
     return lines + _coverage(content, duration_s)
 
 
@@ -50,12 +50,12 @@ def _few(cases: Sequence[str]) -> str:
 
 def _of_one(craft: SampledTrajectory) -> list[tuple[str, str]]:
     """Return (what an aircraft does, what it looks like)."""
-    found: list[tuple[str, str]] = []
+    oddities: list[tuple[str, str]] = []
     highest = float(np.max(craft.alt_m))
     if highest > HIGHEST_M:
-        found.append((f"it flies at {highest:,.0f} m", "are altitudes in feet read as metres?"))
+        oddities.append((f"it flies at {highest:,.0f} m", "are altitudes in feet read as metres?"))
     if craft.velocity_was_ignored:
-        found.append(
+        oddities.append(
             (
                 "its velocities are not those of its path and are not used",
                 "are knots read as m/s, or feet as metres?",
@@ -63,30 +63,30 @@ def _of_one(craft: SampledTrajectory) -> list[tuple[str, str]]:
         )
     time_s = craft.sample_times_s
     if len(time_s) < 2:
-        return found
+        return oddities
     velocity = _velocities(craft)
     speed = np.linalg.norm(velocity, axis=0)
     fastest, climb = float(speed.max()), float(np.abs(velocity[2]).max())
     if climb > CLIMB_MPS and fastest <= FASTEST_MPS:
         hint = "are altitudes in feet read as metres, or times in minutes as seconds?"
-        found.append((f"it climbs or sinks at {climb:,.0f} m/s", hint))
+        oddities.append((f"it climbs or sinks at {climb:,.0f} m/s", hint))
     if fastest > FASTEST_MPS:
         what = f"its positions imply {fastest:,.0f} m/s"
-        found.append((what, _fast_hint(float(np.median(speed)))))
+        oddities.append((what, _fast_hint(float(np.median(speed)))))
     elif len(time_s) > 2:
         change = np.linalg.norm(np.diff(velocity, axis=1), axis=0)
         per_s2 = change / (0.5 * (time_s[2:] - time_s[:-2]))
         sharpest = float(per_s2.max())
         if sharpest > ACCELERATION_MPS2:
             hint = "are times rounded, positions of two aircraft mixed, or feet read as metres?"
-            found.append((f"its positions imply {sharpest:,.0f} m/s²", hint))
+            oddities.append((f"its positions imply {sharpest:,.0f} m/s²", hint))
     _, most_lat, _, most_lon = _RADIANS
     near_zero = np.abs(craft.lat_deg).max() < most_lat and np.abs(craft.lon_deg).max() < most_lon
     slow = 0.0 < float(np.median(speed)) < _SLOWEST_MPS
     if slow and near_zero:
         what = f"its positions imply {float(np.median(speed)):.2g} m/s near 0° N 0° E"
-        found.append((what, "are latitude and longitude in radians read as degrees?"))
-    return found
+        oddities.append((what, "are latitude and longitude in radians read as degrees?"))
+    return oddities
 
 
 def _fast_hint(typical_mps: float) -> str:

@@ -1,20 +1,20 @@
-"""The flights of all runs of a traffic source as they are known: ownships fly what they are told.
+"""The flights of all runs of a traffic source as they are known, with manoeuvres commanded so far.
 
 What each row holds is what a run alone would give, to the bit; a single run is run 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.aircraft.aircraft import Aircraft, Roster, joint_roster
+from components.aircraft.aircraft import Roster
 from components.flights.culling import NearIntervals
 from components.flights.fleet import Fleet
-from components.flights.many_flights import SteeredFleet, fleet_of
+from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.keyed_table import turns
@@ -171,29 +171,6 @@ def _instants(coming: list[Coming]) -> RunTicks:
 def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
     """Return 1 for the rows of some ownships at or after what came for each of them."""
     order = np.argsort(ownship)
-    place = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
-    mine = order[place]
+    index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
+    mine = order[index]
     return ((ownship[mine] == run) & (ticks >= came[mine])).astype(np.int64)
-
-
-def flights_of_runs(
-    face: Any, parameters: Sequence[Any], make: Callable[[int], Any]
-) -> FlightsOfRuns | None:
-    """Return the flights of all runs, or None where they cannot be put together."""
-    type(face).prepare(parameters)
-    of_parameters = getattr(face, "flown_of", None)
-    flights: FlightsOfRuns | None = None if of_parameters is None else of_parameters(parameters)
-    if flights is not None:
-        return flights
-    return _made_one_by_one(face, map(make, range(len(parameters))))
-
-
-def _made_one_by_one(face: Any, sources: Iterable[Any]) -> FlightsOfRuns | None:
-    own, targets = [], []
-    aircraft: list[tuple[str, Aircraft]] = []
-    for source in sources:
-        own.append(source.own)
-        targets += list(source.targets)
-        aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
-    roster = joint_roster(face.roster, aircraft)
-    return None if roster is None else FlightsOfRuns(fleet_of(own), fleet_of(targets), roster)

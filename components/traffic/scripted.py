@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -124,20 +124,25 @@ class ScriptedTraffic(TrafficSource):
         self.targets = _intruders(crafts, reference, self.wind)
         self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 
-    def flown_of(self, parameters: Sequence[Any]) -> FlightsOfRuns | None:
-        """Return the flights of replicas with these parameters, where all only fly straight on."""
+    def flights_of_runs(
+        self, parameters: Sequence[Any], make: Callable[[int], Any]
+    ) -> FlightsOfRuns | None:
+        """Return the flights of runs; those that are all straight are prepared together."""
         own = [p.ownship for p in parameters]
         crafts = [craft for p in parameters for craft in p.targets]
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
-            return None
+            return super().flights_of_runs(parameters, make)
         roster = joint_roster(self.roster, [(craft.name, craft) for craft in crafts])
         if roster is None:
             return None
-        places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
-        references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
+        positions = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
+        references = np.repeat(np.array(positions, dtype=np.float64), width, axis=0)
         starts = _start_positions(crafts, references)
-        ownships, targets = _straight(own, places, self.wind), _straight(crafts, starts, self.wind)
+        ownships, targets = (
+            _straight(own, positions, self.wind),
+            _straight(crafts, starts, self.wind),
+        )
         return FlightsOfRuns(ownships, targets, roster)
 
     def sample_times(self) -> list[SampleTimes]:

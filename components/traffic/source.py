@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.aircraft.known_targets import KnownTraffic
 from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
@@ -42,7 +42,6 @@ from components.traffic.flown_flights import (
     FlownFlights,
     arrived_manoeuvres,
     due_manoeuvres,
-    flights_of_runs,
     steered,
 )
 from components.traffic.wind_effect import ATTITUDE
@@ -137,7 +136,7 @@ class TrafficSource(Component):
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be.
 
-        It is the same word for all who ask: whether a block went by where the targets can be
+        All blocks get the same offer: whether a block went by where the targets can be
         must show when replicas compare what their traffic says.
         """
         if self._offered is None:
@@ -186,8 +185,8 @@ class TrafficSource(Component):
             return
         if not self.context.producers:
             end_s = float(self.context.duration_s) + lasts_s
-            found = near_intervals(flights.own, flights.targets, reach_m, end_s)
-            self._flown = replace(self._flown, intervals=found)
+            intervals = near_intervals(flights.own, flights.targets, reach_m, end_s)
+            self._flown = replace(self._flown, intervals=intervals)
         elif lasts_s == 0.0:
             self._epochs = SteeredCulling(flights.own, flights.targets, reach_m)
 
@@ -211,7 +210,8 @@ class TrafficSource(Component):
         asked = self._offered is not None and self._offered.asked
         if asked:
             return None
-        flights = flights_of_runs(self, parameters, make)
+        self.prepare(parameters)
+        flights = self.flights_of_runs(parameters, make)
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
@@ -220,9 +220,22 @@ class TrafficSource(Component):
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
             self._check_terrain(partial(_one_of, flights.own, number))
-        found = copy(self)
-        found._fly(flights, [p.update_rate_hz for p in parameters])
-        return found
+        of_all = copy(self)
+        of_all._fly(flights, [p.update_rate_hz for p in parameters])
+        return of_all
+
+    def flights_of_runs(
+        self, parameters: Sequence[Any], make: Callable[[int], Any]
+    ) -> FlightsOfRuns | None:
+        """Return the flights of runs with these parameters; None where their rosters do not fit."""
+        own, targets = [], []
+        aircraft: list[tuple[str, Aircraft]] = []
+        for source in map(make, range(len(parameters))):
+            own.append(source.own)
+            targets += list(source.targets)
+            aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
+        roster = joint_roster(self.roster, aircraft)
+        return None if roster is None else FlightsOfRuns(fleet_of(own), fleet_of(targets), roster)
 
     @property
     def width(self) -> int:
@@ -295,8 +308,8 @@ class TrafficSource(Component):
             return columns, flown.intervals.near(columns, time_s, lasts_s)
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
         times = np.repeat(time_s, len(columns))
-        found = flown.intervals.holds(each, times, times + lasts_s)
-        return columns, found.reshape(len(time_s), len(columns))
+        near = flown.intervals.holds(each, times, times + lasts_s)
+        return columns, near.reshape(len(time_s), len(columns))
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""
@@ -337,7 +350,7 @@ class TrafficSource(Component):
         names = self.roster.names
         best = self._closest_approaches(end_s)
         where = censored_approaches(self, best.time_s, end_s)
-        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
+        closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         return {
             "targets": {
                 name: {
@@ -349,7 +362,7 @@ class TrafficSource(Component):
                     if math.isfinite(range_m)
                     else None
                 }
-                for name, time_s, range_m, at in found
+                for name, time_s, range_m, at in closest
             }
         }
 

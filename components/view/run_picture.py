@@ -1,7 +1,6 @@
 """Runs and recorded encounters as the page shows them: all in one plane and one time."""
 
 import json
-import tomllib
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -32,133 +31,108 @@ _OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
 
-class _RunColumns(dict[str, Any]):
-    """A table's columns, as they are asked for."""
-
-    def __init__(self, run: RecordedTables, table: str) -> None:
-        super().__init__()
-        self._run, self._table = run, table
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._run.table(self._table).column_names
-
-    def __missing__(self, name: str) -> Any:
-        self[name] = self._run.values(self._table, name)
-        return self[name]
-
-
 def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run; `UsageError` where the folder holds none."""
     info = _json(folder / "run.json")
-    scene = _toml(folder / "scene.toml")
     paths = {name: folder / f"{name}.parquet" for name in _TABLES}
     if not all(paths[name].is_file() for name in _TABLES[:2]):
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
-    tables = {name: read_table(path) for name, path in paths.items() if path.is_file()}
-    run = RecordedTables(folder, tables)
-    found = {name: _RunColumns(run, name) for name in tables}
-    detections = found["detections"]
-    names = _names(found)
-    own = _own(found)
-    plane = _plane(own)
+    run = RecordedTables(
+        folder, {n: read_table(path) for n, path in paths.items() if path.is_file()}
+    )
+    known = ("truth", "detections", "alerts")
+    names = sorted({text for table in known for text in _texts(run, table, "target")})
+    targets = {name: number for number, name in enumerate(names)}
+    own = _own(run)
+    plane = TangentPlane(0.0, 0.0)
+    if len(own["time_s"]):
+        plane = TangentPlane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
+    sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
+    marks = block_marks(run.block_types(sensors))
+    blocks = run.scene.get("blocks", {})
     picture = RunPicture(
-        title=str(scene.get("title") or folder.name),
-        facts=_facts(info, scene),
+        title=str(run.scene.get("title") or folder.name),
+        facts=_facts(info, run.scene),
         duration_s=float(info.get("duration_s", 0.0)),
+        sensors=[_sensor(name, blocks.get(name, {}), marks[name]) for name in sensors],
         targets=names,
     )
-    sensors = sorted(set(_text(found["scans"]["block"])) | set(_text(detections["block"])))
-    blocks = {name: scene.get("blocks", {}).get(name, {}) for name in sensors}
-    marks = block_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
-    picture.sensors = [_sensor(name, blocks[name], marks[name]) for name in sensors]
-    targets = {name: number for number, name in enumerate(names)}
-    picture.tables["own"] = _own_columns(own, plane)
-    if "truth" in found:
-        picture.tables["truth"] = _truth(found["truth"], plane, targets)
-    picture.tables["scans"] = {
-        "time_s": found["scans"]["time_s"],
-        "sensor": _codes(found["scans"]["block"], sensors),
-        "detected": found["scans"]["detected"],
+
+    def plain(table: str, *columns: str) -> dict[str, AnyArray]:
+        return {name: run.values(table, name) for name in columns if run.has(table, name)}
+
+    def lines(table: str) -> dict[str, Any]:
+        measured = ("time_s", "azimuth_rad", "elevation_rad", "range_m")
+        return {name: run.values(table, name) for name in measured}
+
+    def about(table: str) -> dict[str, AnyArray]:
+        result = {"target": _codes(run.values(table, "target"), targets)}
+        return result | _sources(run, table)
+
+    tables = picture.tables
+    tables["own"] = _own_columns(own, plane)
+    if "truth" in run.tables:
+        tables["truth"] = _truth(run, plane, targets)
+    tables["scans"] = {
+        "time_s": run.values("scans", "time_s"),
+        "sensor": _codes(run.values("scans", "block"), sensors),
+        "detected": run.values("scans", "detected"),
     }
-    seen = _seen(detections, detections, plane)
-    picture.tables["detections"] = {
-        "time_s": detections["time_s"],
-        "sensor": _codes(detections["block"], sensors),
-        "target": _codes(detections["target"], targets),
-        "scan": detections["scan"],
-        **seen,
+    tables["detections"] = {
+        "time_s": run.values("detections", "time_s"),
+        "sensor": _codes(run.values("detections", "block"), sensors),
+        "target": _codes(run.values("detections", "target"), targets),
+        "scan": run.values("detections", "scan"),
+        **_seen(lines("detections"), {n: run.values("detections", n) for n in _OWN}, plane),
     }
     for name in ("fused", "tracks"):
-        if name in found and "azimuth_rad" in found[name]:
-            table = found[name]
-            if name == "tracks":
-                picture.trackers = _trackers(table)
-            picture.tables[name] = {
-                "time_s": table["time_s"],
-                "target": _codes(table["target"], targets),
-                **_seen(table, _pose_at(own, table["time_s"]), plane),
-                **({"age_s": table["age_s"]} if "age_s" in table else {}),
-                **_sources(table),
+        if run.has(name, "azimuth_rad"):
+            seen = lines(name)
+            tables[name] = {
+                **about(name),
+                **plain(name, "age_s"),
+                "time_s": seen["time_s"],
+                **_seen(seen, _pose_at(own, seen["time_s"]), plane),
             }
-    if "state_tracks" in found:
-        table = found["state_tracks"]
-        picture.trackers = _trackers(table)
-        picture.tables["tracks"] = _estimates(table, picture.trackers, own, plane)
-    if "alerts" in found:
-        table = found["alerts"]
-        picture.tables["alerts"] = {
-            "time_s": table["time_s"],
-            "target": _codes(table["target"], targets),
-            "level": table["level"],
-            **_sources(table),
-            **({"track": _whole(table["track"])} if "track" in table else {}),
-            **{name: table[name] for name in _LEVELS if name in table},
-        }
-    if "manoeuvres" in found:
-        table = found["manoeuvres"]
-        columns = ("time_s", "turn_rad", "climb_m")
-        picture.tables["manoeuvres"] = {name: table[name] for name in columns if name in table}
-    if "bands" in found:
-        table = found["bands"]
-        ends = ("low_rad", "high_rad", "low_m", "high_m")
-        picture.tables["bands"] = {
-            "time_s": table["time_s"],
-            "region": _codes(table["region"], BAND_REGIONS),
-            **{name: table[name] for name in ends},
-        }
+    if "tracks" in tables:
+        picture.trackers = _blocks(run, "tracks")
+    if "state_tracks" in run.tables:
+        picture.trackers = _blocks(run, "state_tracks")
+        tables["tracks"] = _estimates(run, picture.trackers, own, plane)
+    if "alerts" in run.tables:
+        tables["alerts"] = {
+            **about("alerts"), "time_s": run.values("alerts", "time_s"),
+            "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
+        }  # fmt: skip
+        if run.has("alerts", "track"):
+            tables["alerts"]["track"] = _whole(run.values("alerts", "track"))
+    if "manoeuvres" in run.tables:
+        tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
+    if "bands" in run.tables:
+        columns = ("time_s", "low_rad", "high_rad", "low_m", "high_m")
+        tables["bands"] = {name: run.values("bands", name) for name in columns}
+        tables["bands"]["region"] = _codes(run.values("bands", "region"), BAND_REGIONS)
     return picture
 
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"{path.parent}: holds no run: run.json: {error.strerror}") from error
     except ValueError as error:
         raise UsageError(f"{path}: is not JSON ({error})") from error
-    return found
+    return result
 
 
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        return {}
-    except ValueError as error:
-        raise UsageError(f"{path}: is not TOML ({error})") from error
+def _texts(run: RecordedTables, table: str, name: str) -> set[str]:
+    """Return the texts of a column, none where there is no such column."""
+    return {*run.values(table, name)} - {None} if run.has(table, name) else set()
 
 
-def _text(column: list[str | None]) -> list[str]:
-    return [text for text in column if text is not None]
-
-
-def _names(tables: Mapping[str, _RunColumns]) -> list[str]:
-    """Return the targets of all tables, sorted."""
-    found: set[str] = set()
-    for name in ("truth", "detections", "alerts"):
-        if name in tables and "target" in tables[name]:
-            found.update(_text(tables[name]["target"]))
-    return sorted(found)
+def _blocks(run: RecordedTables, table: str) -> list[str]:
+    """Return the names of the blocks of a table, in the order of their numbers on the page."""
+    return sorted(_texts(run, table, "block"))
 
 
 def _codes(column: list[str | None], names: Any) -> AnyArray:
@@ -168,15 +142,10 @@ def _codes(column: list[str | None], names: Any) -> AnyArray:
     return np.fromiter(codes, dtype=np.int64, count=len(column))
 
 
-def _sources(table: _RunColumns) -> dict[str, AnyArray]:
+def _sources(run: RecordedTables, table: str) -> dict[str, AnyArray]:
     """Return by number which block each row is of."""
-    names = _trackers(table)
-    return {"source": _codes(table["block"], names)} if names else {}
-
-
-def _trackers(table: _RunColumns) -> list[str]:
-    """Return the names of the blocks of a table, in the order of their numbers on the page."""
-    return sorted(set(_text(table["block"]))) if "block" in table else []
+    names = _blocks(run, table)
+    return {"source": _codes(run.values(table, "block"), names)} if names else {}
 
 
 def _whole(column: Any) -> AnyArray:
@@ -197,46 +166,36 @@ def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
 
 def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     """Return how a sensor is shown, and its field of view as far as the scene says it."""
-    found: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
+    result: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
     limits = block.get("azimuth_deg")
     if isinstance(limits, list) and len(limits) == 2:
         turned = float(block.get("mount_azimuth_deg", 0.0))
-        found["azimuth_deg"] = [float(edge) + turned for edge in limits]
-    if block.get("beam_sweep") is True and "azimuth_deg" in found:
+        result["azimuth_deg"] = [float(edge) + turned for edge in limits]
+    if block.get("beam_sweep") is True and "azimuth_deg" in result:
         rate = Fraction(str(block["scan_rate_hz"])) * (
             1 + Fraction(str(block.get("rate_error_ppm", 0))) / 10**6
         )
-        found["sweep_s"] = float(1 / rate)
+        result["sweep_s"] = float(1 / rate)
     if isinstance(block.get("range_km"), int | float):
-        found["range_m"] = 1000.0 * block["range_km"]
-    return found
+        result["range_m"] = 1000.0 * block["range_km"]
+    return result
 
 
-def _own(tables: Mapping[str, _RunColumns]) -> dict[str, FloatArray]:
+def _own(run: RecordedTables) -> dict[str, FloatArray]:
     """Return where the ownship was and how it lay, in order of time: the truth, or its belief."""
-    found: dict[str, FloatArray]
-    truth = tables.get("truth")
-    if truth is not None:
-        mine = np.array([name is None for name in truth["target"]], dtype=bool)
+    names = [name.removeprefix("own_") for name in _OWN]
+    if run.has("truth", *names):
+        mine = np.array([name is None for name in run.values("truth", "target")], dtype=bool)
         if mine.any():
-            names = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
-            if all(name in truth for name in names):
-                found = {f"own_{name}": truth[name][mine] for name in names}
-                return _in_order({"time_s": truth["time_s"][mine], **found})
-    detections = tables["detections"]
-    found = {name: np.asarray(detections[name], dtype=float) for name in ("time_s", *_OWN)}
-    return _in_order(found)
+            result = {f"own_{name}": run.values("truth", name)[mine] for name in names}
+            return _in_order(run.values("truth", "time_s")[mine], result)
+    result = {name: np.asarray(run.values("detections", name), dtype=float) for name in _OWN}
+    return _in_order(run.values("detections", "time_s"), result)
 
 
-def _in_order(own: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    time_s, first = np.unique(own["time_s"], return_index=True)
+def _in_order(time_s: FloatArray, own: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    time_s, first = np.unique(np.asarray(time_s, dtype=float), return_index=True)
     return {**{name: values[first] for name, values in own.items()}, "time_s": time_s}
-
-
-def _plane(own: Mapping[str, FloatArray]) -> TangentPlane:
-    if len(own["time_s"]) == 0:
-        return TangentPlane(0.0, 0.0)
-    return TangentPlane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
 
 
 def _own_columns(own: Mapping[str, FloatArray], plane: TangentPlane) -> dict[str, AnyArray]:
@@ -251,16 +210,16 @@ def _own_columns(own: Mapping[str, FloatArray], plane: TangentPlane) -> dict[str
 
 
 def _truth(
-    truth: _RunColumns, plane: TangentPlane, targets: Mapping[str, int]
+    run: RecordedTables, plane: TangentPlane, targets: Mapping[str, int]
 ) -> dict[str, AnyArray]:
     """Return the targets' true positions, by target and then by time."""
-    code = _codes(truth["target"], targets)
-    keep = np.flatnonzero((code >= 0) & np.isfinite(truth["lat_deg"]))
-    keep = keep[np.lexsort((truth["time_s"][keep], code[keep]))]
-    position = [truth[name][keep] for name in ("lat_deg", "lon_deg", "alt_m")]
+    code, time_s = _codes(run.values("truth", "target"), targets), run.values("truth", "time_s")
+    keep = np.flatnonzero((code >= 0) & np.isfinite(run.values("truth", "lat_deg")))
+    keep = keep[np.lexsort((time_s[keep], code[keep]))]
+    position = [run.values("truth", name)[keep] for name in ("lat_deg", "lon_deg", "alt_m")]
     east, north = plane.east_north_m(*position)
     return {
-        "time_s": truth["time_s"][keep],
+        "time_s": time_s[keep],
         "target": code[keep],
         "east_m": east,
         "north_m": north,
@@ -269,13 +228,14 @@ def _truth(
 
 
 def _estimates(
-    table: _RunColumns, trackers: list[str], own: Mapping[str, FloatArray], plane: TangentPlane
+    run: RecordedTables, trackers: list[str], own: Mapping[str, FloatArray], plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
-    keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
+    status = np.array(run.values("state_tracks", "track_status"), dtype=object)
+    keep = np.flatnonzero(status != "deleted")
 
     def column(name: str) -> FloatArray:
-        return np.asarray(table[name], dtype=float)[keep]
+        return np.asarray(run.values("state_tracks", name), dtype=float)[keep]
 
     time_s = column("time_s")
     ned_m = np.stack([column(name) for name in ("north_m", "east_m", "down_m")])
@@ -283,12 +243,15 @@ def _estimates(
     east, north = plane.east_north_m(*ends)
     pose = _pose_at(own, time_s)
     from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))
-    statuses = [table["track_status"][row] for row in keep.tolist()]
     return {
         "time_s": time_s,
-        "number": np.asarray(table["track"])[keep],
-        **({"source": _codes(table["block"], trackers)[keep]} if trackers else {}),
-        "tentative": np.array([status == "tentative" for status in statuses], dtype=bool),
+        "number": np.asarray(run.values("state_tracks", "track"))[keep],
+        **(
+            {"source": _codes(run.values("state_tracks", "block"), trackers)[keep]}
+            if trackers
+            else {}
+        ),
+        "tentative": status[keep] == "tentative",
         "from_east_m": from_east,
         "from_north_m": from_north,
         "bearing_rad": column("azimuth_rad"),
@@ -306,14 +269,16 @@ def _estimates(
 def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, FloatArray]:
     """Return the ownship's latest pose at some times, NaN before the first."""
     row = np.searchsorted(own["time_s"], time_s, side="right") - 1
-    found = {}
+    result = {}
     for name in _OWN:
         values = np.append(own[name], np.nan)
-        found[name] = values[row]
-    return found
+        result[name] = values[row]
+    return result
 
 
-def _seen(table: _RunColumns, pose: Mapping[str, Any], plane: TangentPlane) -> dict[str, AnyArray]:
+def _seen(
+    table: Mapping[str, Any], pose: Mapping[str, Any], plane: TangentPlane
+) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
     Bearings are from north; what is not known is NaN.

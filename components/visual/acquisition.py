@@ -40,26 +40,10 @@ def acquisition_rate(
     beta_per_sr_s: ArrayLike = UNALERTED_PER_SR_S,
     extinction_per_m: ArrayLike = 0.0,
 ) -> Any:
-    """Return Andrews's rate of acquisition, β A / r² · exp(-extinction · r).
+    """Return Andrews's rate of acquisition, β A / r² · exp(-extinction · r), 1/s.
 
-    Parameters
-    ----------
-    area_m2, range_m : array_like
-        Projected area of what is looked for, 0 or more, and its distance, above 0.
-    beta_per_sr_s : array_like
-        How well is searched, 1/(sr s).
-    extinction_per_m : array_like
-        Of the air; 2.996 over the visual range (5 % of contrast), or 3.912 over the visibility
-        (2 %).
-
-    Returns
-    -------
-    array of the broadcast shape, 1/s
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
+    The extinction of the air is 2.996 over the visual range (5 % of contrast), or 3.912 over the
+    visibility (2 %). ValueError where an argument is out of range or not finite.
     """
     shape, (area, distance, beta, extinction) = broadcast_flat(
         area_m2=not_negative("area_m2", area_m2),
@@ -135,18 +119,8 @@ def integral_where_shown(before_s: FloatArray, shown: AtInstants, rate: AtInstan
 
     Whether something shows is asked at the ends of four parts of each interval; where it begins or
     ends to show within one, that instant is found by halving. Over each stretch the rate is
-    integrated by Gauss and Legendre's rule of eight nodes.
-
-    Parameters
-    ----------
-    before_s : (n,)
-        Length of the interval that ends with each cell, s.
-    shown, rate : callable
-        Given cells (m,) and seconds after them (m,), 0 or less: which show, and the rate, 1/s.
-
-    Returns
-    -------
-    (n,) array
+    integrated by Gauss and Legendre's rule of eight nodes. `shown` and `rate` (1/s) are given cells
+    and seconds after them, 0 or less.
     """
     cell, begin, end = _stretches(before_s, shown)
     integral = np.zeros(len(before_s))
@@ -178,7 +152,7 @@ def _stretches(before_s: FloatArray, shown: AtInstants) -> tuple[IntArray, Float
             continue
         left, right = ends[k][some], ends[k + 1][some]
         first, last = shows[k][some], shows[k + 1][some]
-        edge = _edge(some, left, right, first, shown, first != last)
+        edge = _edge(some, left, right, first, last, shown)
         cells.append(some)
         begins.append(np.where(first, left, edge))
         stops.append(np.where(last, right, edge))
@@ -190,14 +164,12 @@ def _edge(
     left: FloatArray,
     right: FloatArray,
     first: BoolArray,
+    last: BoolArray,
     shown: AtInstants,
-    changes: BoolArray,
 ) -> FloatArray:
     """Return when what shows changes between two instants of some cells; the right one if not."""
     edge = right.copy()
-    (which,) = np.nonzero(changes)
-    if not len(which):
-        return edge
+    which = np.flatnonzero(first != last)
     low, high = left[which], right[which]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

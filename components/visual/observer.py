@@ -156,8 +156,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     def values(cells: Cells) -> dict[str, FloatArray]:
         return {_PROBABILITY.name: observer.acquisition_probability(cells)}
 
-    found: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
-    return found
+    result: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
+    return result
 
 
 BETWEEN_SCANS = Ladder(
@@ -274,9 +274,9 @@ class Lookout(Sensor):
         if self._says_looks:
             extras["detection_probability"] = self.acquisition_probability(cells)
         searched = np.flatnonzero(self._first_seen[who] > cells.scan)
-        found = searched[self._found(cells, searched)]
+        result = searched[self._found(cells, searched)]
         first = self._first_seen.copy()
-        np.minimum.at(first, who[found], cells.scan[found])
+        np.minimum.at(first, who[result], cells.scan[result])
         self._first_seen = first
         seen = (first[who] <= cells.scan) & (size >= self._smallest_rad)
         return Look(seen, confidence, extras)
@@ -287,28 +287,27 @@ class Lookout(Sensor):
         For who was not found before. A search that comes round finds it with the share of a round
         for which it showed, over all phases.
         """
-        which = np.arange(len(cells))
-        total = np.zeros(len(cells))
+        expected = self._expected(cells, np.arange(len(cells)))
+        return np.minimum(expected, 1.0) if self.p.search == "round" else -np.expm1(-expected)
+
+    def _expected(self, cells: Cells, which: IntArray) -> FloatArray:
+        """Return the expected number of acquisitions of some cells since the last scan."""
+        total = np.zeros(len(which))
         for seat in self._seats:
-            share = self._share(seat, cells, which)
-            total += share * self._searched(seat, cells, which)
-        if self.p.search == "round":
-            return np.minimum(total, 1.0)
-        return -np.expm1(-total)
+            total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+        return total
 
     def _found(self, cells: Cells, which: IntArray) -> BoolArray:
         """Return which of some cells' aircraft are found since the last scan."""
         if self.p.search == "random":
-            total = np.zeros(len(which))
-            for seat in self._seats:
-                total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+            expected = self._expected(cells, which)
             keys = cells.roster.keys_of(cells.target[which])
             drawn = self._finds.of_runs(cells.run[which]).uniform(keys, cells.scan[which])
-            return np.asarray(drawn < -np.expm1(-total))
-        found = np.zeros(len(which), dtype=bool)
+            return np.asarray(drawn < -np.expm1(-expected))
+        result = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
-            found |= self._meets(seat, cells, which)
-        return found
+            result |= self._meets(seat, cells, which)
+        return result
 
     def _searched(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
         """Return the integral of the rate since the last scan, or how many rounds it showed."""
@@ -344,13 +343,11 @@ class Lookout(Sensor):
         ahead_s = -np.remainder(now_s - phase_s, round_s)
         in_time = np.flatnonzero(-ahead_s < self._before_s(cells, mine))
         met = np.zeros(len(which), dtype=bool)
-        if len(in_time):
-            there: Any = cells
-            if self.p.between_scans == "integral":
-                there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
-                met[looks[in_time]] = self._shows(seat, there)
-            else:
-                met[looks[in_time]] = self._shows(seat, there)[mine[in_time]]
+        if len(in_time) and self.p.between_scans == "integral":
+            there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
+            met[looks[in_time]] = self._shows(seat, there)
+        elif len(in_time):
+            met[looks[in_time]] = self._shows(seat, cells)[mine[in_time]]
         return met
 
     def _before_s(self, cells: Cells, which: IntArray) -> FloatArray:

@@ -19,11 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from components.benchmark.pairs import PAIRS, VARIANTS
+from components.benchmark.pairs import PAIRS
 from components.benchmark.rates import RATES
 from components.benchmark.run_benchmark import fresh
 from components.benchmark.scenes import CASES
-from docs.make import performance_growth
+from docs.make import performance_growth, performance_queues
+from docs.make.performance_queues import VARIANTS
 from dsa_des.files.input_files import read_input_text
 from dsa_des.files.output_file import write_file
 from dsa_des.record.run_folder import write_json
@@ -63,15 +64,16 @@ def measured(repeats: int, quick: bool) -> dict[str, Any]:
         "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "repeats": repeats,
     }
-    kinds: dict[str, tuple[Any, ...]] = {
-        "scenes": CASES, "pairs": PAIRS, "rates": RATES, "queues": VARIANTS,
-    }  # fmt: skip
+    kinds: dict[str, tuple[Any, ...]] = {"scenes": CASES, "pairs": PAIRS, "rates": RATES}
     for kind, items in kinds.items():
         # The scenes' rows have been kept under another name from the first on.
         rows = found["cases" if kind == "scenes" else kind] = {}
         for item in items:
             say(f"{time.monotonic() - started:4.0f} s: {item.name}", err=True)
             rows[item.name] = fresh(kind, item.name, quick, repeats)
+    found["queues"] = {
+        one.name: performance_queues.fresh(one.name, quick, repeats) for one in VARIANTS
+    }
     found["calls"] = fresh("calls", "embed", quick, repeats)
     found["took_s"] = round(time.monotonic() - started)
     return found

@@ -18,6 +18,7 @@ from dsa_des.block.component import Input
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.running.effects import WireFaults
+from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.runs import Runs
 
 #: Rows and when they arrive.
@@ -134,6 +135,10 @@ class Channel:
         if self._faults is None and 1 in (len(arriving), len(self._runs.going)):
             return RunTicks.joined(arriving)
         return union(arriving)  # late rows overtake and may coincide
+
+    def none_before(self) -> int:
+        """Return a tick before which nothing arrives of what waits."""
+        return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
     def _due(self, arrivals: RunTicks, end: int) -> slice | BoolArray:
         """Return which rows arrive before `end`."""

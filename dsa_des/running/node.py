@@ -31,6 +31,7 @@ from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windows import Window
+from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
 
 
@@ -182,6 +183,21 @@ class Node:
         elif self.on_demand:
             for tick in self._demanded(start, end).tick.tolist():
                 self.wake_at(tick)
+
+    def none_before(self, start: int, ahead: int) -> int:
+        """Return a tick, at `start` or later, before which a block in windows does not run.
+
+        It has come up to `ahead` if it runs ahead.
+        """
+        start = max(start, ahead) if self.ahead else start
+        clocks = [] if self.clock is None else [(self.clock, 0)]
+        if self.on_demand:
+            clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
+        ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
+        ticks += [
+            wire.none_before() for p in self._trigger_ports for wire in self.channels.get(p, ())
+        ]
+        return max(start, min(ticks, default=MAX_TICK))
 
     def _end_in(self, window: Window) -> int:
         """Return up to when it runs in a window."""

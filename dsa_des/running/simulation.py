@@ -196,6 +196,8 @@ class Simulation:
         if pacer is not None:
             self.windows.limit(int(pacer.longest_window_s * self.ticks_per_s))
             pacer.start()
+        else:
+            self.windows.next_instant = self._next_instant
         while (window := self.windows.next()) is not None:
             if pacer is not None and pacer.stopped:
                 break
@@ -238,6 +240,9 @@ class Simulation:
             self.env = simpy.Environment(initial_time=0)
         for node in self.nodes.values():
             node.start()
+
+    def _next_instant(self, tick: int, ahead: int) -> int:
+        return min(node.none_before(tick, ahead) for node in self.nodes.values())
 
     def _check_ends(self) -> None:
         """Refuse what ends its run where messages wait for a processor: they would be lost."""

@@ -13,7 +13,7 @@ comes back, as within it nothing can.
 """
 
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -84,7 +84,15 @@ class Windows:
         Of the runs that go together.
     horizon_ticks : int, optional
         The least delay around the loops of the scene; none where it has no loop.
+
+    Attributes
+    ----------
+    next_instant : callable, optional
+        Given a tick and that up to which blocks ahead of the loops have run, returns one before
+        which no block runs: windows in which nothing happens are left out.
     """
+
+    next_instant: Callable[[int, int], int] | None = None
 
     def __init__(
         self,
@@ -120,6 +128,8 @@ class Windows:
         """Return the window to run now, or None when the run has come to its end."""
         if self.start >= self.end_tick:
             return None
+        if self.next_instant is not None and self._all_go:
+            self.start = min(self.next_instant(self.start, self._ahead), self.end_tick - 1)
         length, ahead = min(self.longest_ticks, self._horizon), self.start
         if self._ahead <= self.start:  # whole windows lie in what is run ahead
             ahead = self._ahead = self.end_after(self.longest_ticks // length * length)

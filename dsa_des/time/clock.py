@@ -195,6 +195,15 @@ class ScanClock:
         r, d = self._rest, self._denominator
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
+    @property
+    def _margin(self) -> int:
+        """How far jitter moves a scan off its grid at most, ticks."""
+        return 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
+
+    def none_before(self, tick: int) -> int:
+        """Return a tick such that no scan that is not before `tick` is before it."""
+        return self._grid_tick(self.first_scan_at_or_after(tick - self._margin)) - self._margin
+
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
         if end > MAX_TICK:
@@ -202,7 +211,7 @@ class ScanClock:
         if end <= start:
             empty = np.empty(0, dtype=np.int64)
             return empty, empty
-        margin = 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
+        margin = self._margin
         first = self.first_scan_at_or_after(start - margin)
         last = self.first_scan_at_or_after(end + margin)
         scans = np.arange(first, last, dtype=np.int64)

@@ -71,6 +71,11 @@ class RunClock:
             self._last = start, end, self._between(start, min(end, self._runs.run_ticks))
         return self._last[2]
 
+    def none_before(self, tick: int) -> int:
+        """Return a tick, not before this one, before which no run has a scan from this one on."""
+        clock = self._clocks[0]
+        return max(tick, clock.none_before(tick)) if self._runs.count == 1 else tick
+
     def before(self, scans: IntArray, run: IntArray) -> IntArray:
         """Return when the scan before each was, in ticks of its run; -1 before the first."""
         if self._alike:

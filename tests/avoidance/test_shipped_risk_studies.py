@@ -29,7 +29,7 @@ def test_a_camera_leads_out_of_what_it_sees_early_enough():
 
 def test_two_pilots_leave_no_more_than_one_who_looks_out_seldom():
     result = dsa_des.study(
-        "configs/studies/see_and_avoid_risk.toml", sets=["replicas=12", "figures=[]"], workers=1
+        "configs/studies/see_and_avoid_risk.toml", sets=["replicas=6", "figures=[]"], workers=1
     )
     lost = ratios(result, "well_clear_lost_mitigated", "pilots")
     before = set(ratios(result, "well_clear_lost_nominal", "pilots").values())

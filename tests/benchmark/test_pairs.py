@@ -1,5 +1,7 @@
 """The pairs of the benchmark: the two forms differ in what they are said to differ in."""
 
+from dataclasses import replace
+
 import pytest
 
 from components.benchmark.pairs import PAIRS, measured
@@ -57,7 +59,11 @@ def test_the_alerting_of_a_pair_sees_the_tracks_of_the_same_chain():
 
 
 @pytest.mark.parametrize("rate", RATES, ids=lambda rate: rate.name)
-def test_a_rate_is_measured(rate):
+def test_a_rate_is_measured(rate, monkeypatch):
+    fewer = tuple(
+        replace(one, count=one.count // 5) if one.name in ("loop", "risk") else one for one in RATES
+    )
+    monkeypatch.setattr("components.benchmark.rates.RATES", fewer)
     assert measured_rate(rate.name, quick=True, repeats=1)["per_s"] > 0.0
 
 

@@ -9,7 +9,7 @@ from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 SHORT = {
-    "thesis": "300", "clocks": "60", "hundred": "60", "ten_thousand": "2", "sparse": "2",
+    "thesis": "300", "clocks": "60", "hundred": "60", "ten_thousand": "1", "sparse": "1",
     "monte_carlo": "60", "manoeuvres": "90",
 }  # fmt: skip
 

@@ -133,7 +133,9 @@ class DeclaredCloudyRadar(CloudyRadar):
 
 def run_swapped(lab, monkeypatch, cls):
     monkeypatch.setattr(blocks, "Swapped", cls, raising=False)
-    scene = load_scene(lab.configs / "first_light.toml", swaps=("radar=engine_blocks:Swapped",))
+    swaps = ("radar=engine_blocks:Swapped",)
+    near = ("blocks.traffic.intruders[0].north_m=3000",)  # detected at once
+    scene = load_scene(lab.configs / "first_light.toml", swaps=swaps, sets=near, duration_s=5)
     sink = ColumnSink()
     Simulation(scene, recorder=Recorder([sink])).run()
     return sink.tables()

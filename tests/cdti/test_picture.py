@@ -88,7 +88,7 @@ def test_a_range_is_held_for_a_while_along_the_new_direction():
 
     held = after(3)
     assert held.ranged.tolist() == [True, False]
-    assert held.place_m[0] == pytest.approx([2000.0, 0.0, 1000.0], abs=1e-9)
+    assert held.position_m[0] == pytest.approx([2000.0, 0.0, 1000.0], abs=1e-9)
     assert after(5).ranged.tolist() == [False, False]
 
 

@@ -146,11 +146,11 @@ def test_bands_are_shown_in_degrees_and_m_until_they_are_old(shown):
 
 def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
     scope, _, _ = shown
-    heard, before = scope.heard(), scope.picture(DURATION_S)
+    received, before = scope.received(), scope.picture(DURATION_S)
     late = copy(scope)
     late._contacts, late._alerts, late._bands = None, None, None
     assert late.picture(DURATION_S)["contacts"] == [] != before["contacts"]
-    assert late.picture(DURATION_S, heard) == before
+    assert late.picture(DURATION_S, received) == before
 
 
 def test_the_display_says_where_a_command_leads_and_of_which_alert_a_contact_is(shown):

@@ -9,7 +9,7 @@ from dsa_des.cli import main
 
 def costs(tmp_path, name, *more):
     done = CliRunner().invoke(main, [
-        "cost", "optical/pictures", "--swap", "eo=optical.eo", "--block", "eo", "--duration", "6",
+        "cost", "optical/pictures", "--swap", "eo=optical.eo", "--block", "eo", "--duration", "3",
         "--repeats", "1", "--json", "--out", str(tmp_path / name), *more,
     ])  # fmt: skip
     assert done.exit_code == 0, done.output

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from components.display import recorded_rows
 from components.display.recorded_rows import (
     Detected,
-    ThinnedStream,
-    places_in_groups,
+    index_in_groups,
     read_scans,
     scans_between,
     strides,
+    thinned,
 )
 from components.display.summary import FusedSummary, SensorSummary
 from dsa_des.block.message import Text
@@ -26,14 +26,13 @@ series = st.lists(st.integers(0, 6), max_size=300)
 
 def kept(rows, pieces, most):
     """Return series and number of the rows kept of a stream that comes in pieces."""
-    stream = ThinnedStream(most, 1)
     place = np.arange(len(rows), dtype=float)
-    cuts = [0, *sorted(pieces), len(rows)]
-    for start, end in itertools.pairwise(cuts):
-        stream.add(np.array(rows[start:end], dtype=np.int64), place[start:end])
-    found, (where,) = stream.rows()
+    numbers = {one: number for number, one in enumerate(dict.fromkeys(rows))}
+    series = np.array([numbers[one] for one in rows], dtype=np.int64)
+    cuts = list(itertools.pairwise([0, *sorted(pieces), len(rows)]))
+    found, (where,) = thinned(lambda: [(series[a:b], place[a:b]) for a, b in cuts], most, 1)
     assert np.all(np.diff(where) > 0)
-    assert [rows[int(i)] for i in where] == found.tolist()
+    assert [numbers[rows[int(i)]] for i in where] == found.tolist()
     return where.astype(int).tolist()
 
 
@@ -67,7 +66,7 @@ def test_strides_never_shrink_and_short_series_are_spared(counts, most, data):
 @given(series)
 def test_places_in_groups(rows):
     wanted = [rows[:i].count(one) for i, one in enumerate(rows)]
-    assert places_in_groups(np.array(rows, dtype=np.int64)).tolist() == wanted
+    assert index_in_groups(np.array(rows, dtype=np.int64)).tolist() == wanted
 
 
 def write(folder, name, columns, group=64):

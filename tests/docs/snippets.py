@@ -51,7 +51,7 @@ SHORTER = (
         "--replicas 1 --set set.duration_s=12",
     ),
     (re.compile(r"^dsa-des study .*--replicas"), "--replicas 2 --workers 1"),
-    (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1"),
+    (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1 --set duration_s=10"),
     (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),
     (re.compile(r"^dsa-des cost first_light --out"), "--block radar"),
     # As it stands is run what the README begins with.

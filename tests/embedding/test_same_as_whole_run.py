@@ -5,6 +5,9 @@ import pytest
 
 from components.messages.detections import Detections
 
+#: The first intruder so near that every sensor sees it at once.
+NEAR = ("blocks.traffic.intruders[0].north_m=1000",)
+
 
 def _recorded(results, table):
     """Return the rows of a table as dictionaries, from what blocks sent to the host."""
@@ -52,9 +55,9 @@ def _assert_same(results, tables, table):
                 "blocks.fusion.coincidence_s=0.06",
                 "weather.rain_rate_mm_h=5",
                 "navigation.position_noise_m=[5, 5, 5]",
-                "blocks.traffic.intruders[1].start_time_s=10",
+                "blocks.traffic.intruders[1].start_time_s=4",
             ),
-            16,
+            8,
         ),
         (
             (
@@ -102,16 +105,17 @@ def test_false_alarms_belong_to_no_plane(configs, flying):
 
 def test_the_answer_is_that_of_the_fusion(configs, flying):
     scene = configs / "first_light.toml"
-    host = flying.Host(scene)
-    simulator = flying.Simulator(scene)
+    host = flying.Host(scene, sets=NEAR)
+    simulator = flying.Simulator(scene, sets=NEAR)
     host.add_planes(simulator)
     seen = [
         (result.time_s, sighting)
-        for result in flying.fly(simulator, host, 70.0)
+        for result in flying.fly(simulator, host, 8.0)
         for sighting in result
         if sighting.detected
     ]
-    fused = flying.run_whole(scene, sets=["duration_s=70"])["fused"].to_pylist()
+    fused = flying.run_whole(scene, sets=(*NEAR, "duration_s=8"))["fused"].to_pylist()
+    assert any(row["sensors"] == "radar+eo+ir" for row in fused)
     order = {name: place for place, name in enumerate(simulator.planes)}
     fused.sort(key=lambda row: (row["tick"], order[row["target"]]))
     assert len(seen) == len(fused) > 100
@@ -129,8 +133,8 @@ def test_the_answer_is_that_of_the_fusion(configs, flying):
 def test_a_call_for_each_plane_gives_what_one_call_for_all_gives(configs, flying):
     scene = configs / "first_light.toml"
     # With memory of the last look: each plane's call must find its own.
-    sets = ("blocks.ir.dynamic_weight=0.5",)
-    host = flying.Host(scene)
+    sets = (*NEAR, "blocks.ir.dynamic_weight=0.5")
+    host = flying.Host(scene, sets=NEAR)
     together, apart = (flying.Simulator(scene, sets=sets) for _ in range(2))
     for simulator in (together, apart):
         host.add_planes(simulator)
@@ -140,8 +144,8 @@ def test_a_call_for_each_plane_gives_what_one_call_for_all_gives(configs, flying
         name = simulator.planes[i]
         return simulator.simulate(own_lla, own_att, lla[i], att[i], time_s, plane=name)
 
-    whole = flying.fly(together, host, 26.0)
-    parts = flying.fly(apart, host, 26.0, plane=one)
+    whole = flying.fly(together, host, 6.0)
+    parts = flying.fly(apart, host, 6.0, plane=one)
     assert len(whole) == len(parts)
     for result, results in zip(whole, parts, strict=True):
         for i, single in enumerate(results):
@@ -156,13 +160,14 @@ def test_a_call_for_each_plane_gives_what_one_call_for_all_gives(configs, flying
 def test_radians_rounded_anyhow_give_the_same_reports(configs, flying):
     """A host that converts degrees in the plain way gets the same grid points."""
     scene = configs / "first_light.toml"
-    host = flying.Host(scene)
-    simulator = flying.Simulator(scene)
+    host = flying.Host(scene, sets=NEAR)
+    simulator = flying.Simulator(scene, sets=NEAR)
     host.add_planes(simulator)
-    expected = flying.run_whole(scene, sets=["duration_s=60"])["detections"].to_pylist()
+    expected = flying.run_whole(scene, sets=(*NEAR, "duration_s=8"))["detections"].to_pylist()
+    assert {row["block"] for row in expected} == {"eo", "ir", "radar"}
     found = []
     time_s = simulator.next_scan_s()
-    while time_s < 60.0:
+    while time_s < 8.0:
         own_lla, own_att, lla, att = host.at(time_s)
         for array in (own_lla, lla):
             array[..., :2] = np.radians(np.degrees(array[..., :2]))

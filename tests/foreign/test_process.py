@@ -18,6 +18,7 @@ from components.foreign.process_link import ProcessError, ProcessLink, frame
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.running.simulation import Simulation
+from tests import warm_process
 
 CANNED = str(Path(__file__).with_name("canned.py"))
 EYE = {"type": "optical.range_boundary", "range_km": 20.0, "scan_rate_hz": 5}
@@ -215,10 +216,8 @@ def test_nothing_is_left_when_we_are_interrupted_or_killed(folder, number):
         'wires = ["part -> fusion"]\n[blocks.fusion]\ntype = "fusion.pass_through"\n'
         f"[blocks.part]\ntype = 'foreign.process'\nscan_rate_hz = 5\ncommand = {command}\n"
     )
-    ours = subprocess.Popen(
-        [sys.executable, "-m", "dsa_des", "run", str(file), "--out", str(folder / "out")],
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    words = ["-m", "dsa_des", "run", file, "--out", folder / "out"]
+    ours = warm_process.start(words, stdout=subprocess.DEVNULL)
     for _ in range(500):
         if (folder / "child").exists() and (folder / "child").read_text():
             break
@@ -272,19 +271,26 @@ def test_a_program_that_is_taken_back_looks_ahead_and_changes_nothing():
         assert getattr(ahead, name).to_pylist() == getattr(by_scan, name).to_pylist(), name
 
 
-@pytest.mark.parametrize("call", [1, 4, 17, 38])
-def test_one_that_is_killed_and_started_again_goes_on_from_its_state(tmp_path, call):
+def counting(**arguments):
+    """Run a program that may be killed and started again."""
     command = [sys.executable, str(Path(__file__).with_name("counts.py"))]
     found = scene(command, duration_s=8, snapshots=True, on_failure="restart")
     found["wires"].remove("eye -> part -> fusion")
     found["wires"] += [
         "eye -> part", {"from": "part", "to": "traffic", "delay_s": 0.3, "holds": "nothing"}
     ]  # fmt: skip
-    part = found["blocks"]["part"]
-    part["arguments"] = {"every": 5}
-    undisturbed = dsa_des.run(found)
-    part["arguments"] |= {"dies_at": call, "marker": str(tmp_path / "died")}
-    killed = dsa_des.run(found)
+    found["blocks"]["part"]["arguments"] = {"every": 5, **arguments}
+    return dsa_des.run(found)
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return counting()
+
+
+@pytest.mark.parametrize("call", [1, 4, 17, 38])
+def test_one_that_is_killed_and_started_again_goes_on_from_its_state(tmp_path, call, undisturbed):
+    killed = counting(dies_at=call, marker=str(tmp_path / "died"))
     assert (tmp_path / "died").exists()
     assert killed.info["summary"]["restarts"] == {"part": 1}
     assert killed.manoeuvres.to_pylist() == undisturbed.manoeuvres.to_pylist()

@@ -22,7 +22,7 @@ from dsa_des.scene.scene import load_scene
 # Two rings of slow targets about the radar's 15 km: flat Earth sees some of them half a per cent
 # nearer, and some farther, than they are.
 SCENE = """
-duration_s = 20
+duration_s = 14
 wires = ["traffic -> transform -> gate -> radar"]
 [blocks.transform]
 type = "geometry.{model}"

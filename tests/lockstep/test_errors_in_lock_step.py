@@ -40,7 +40,7 @@ def test_replicas_together_and_alone(lock, more):
 
 @pytest.mark.parametrize("more", [[], SWEEP])
 def test_any_window(more):
-    seen = scene(*more, duration_s="15")
+    seen = scene("blocks.traffic.intruders[0].north_m=1500", *more, duration_s="6")
     whole = recorded(seen)
     assert whole.num_rows > 100
     for window in (1, 17):

@@ -96,8 +96,9 @@ def test_a_delay_in_scans_follows_the_replicas_own_clock(lock):
         [DELAYED],
     ],
 )
-@pytest.mark.parametrize("changes", [({}, {}), ({HEADING: 0.5}, {HEADING: -0.5})])
-@pytest.mark.parametrize("window", [None, 7])
+@pytest.mark.parametrize(
+    ("changes", "window"), [(({}, {}), None), (({HEADING: 0.5}, {HEADING: -0.5}), 7)]
+)
 def test_delays_on_the_way_from_the_traffic(lock, sets, changes, window):
     lock.same_as_alone(lock.replicas_of(near(*sets, duration_s="15"), *changes), window=window)
 

@@ -88,6 +88,7 @@ JITTERED = SCENE.replace("delay_s = 0.7", "delay_s = 0.2, jitter_s = 2").replace
 
 @pytest.mark.parametrize("scene", [SCENE, LATE, JITTERED])
 def test_any_window_gives_the_same_rows(tmp_path: Path, scene: str) -> None:
+    scene = scene.replace("duration_s = 60", "duration_s = 40")
     _, whole = simulate(tmp_path, scene)
     assert whole["manoeuvres"].num_rows >= 3
     for options in ({"window": 1}, {"window": 7}, {"window": 31, "shuffle_ties": 2}):

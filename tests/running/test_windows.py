@@ -52,6 +52,16 @@ def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest):
     assert count == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
 
 
+def test_windows_of_a_loop_begin_where_something_happens():
+    simulation = Simulation(load_scene("configs/avoidance/crossing_pilot.toml", duration_s="20"))
+    second, starts = simulation.ticks_per_s, []
+    run_window = simulation.run_window
+    simulation.run_window = lambda window: starts.append(window.start) or run_window(window)
+    simulation.run()
+    # All scans are at whole seconds, and the horizon is half of one.
+    assert len(starts) <= 22 and all(start % second == 0 for start in starts[:-1])
+
+
 def test_windows_of_runs_together_come_back_to_each_of_them():
     runs = Runs(4, 10)
     windows = Windows(runs, 16, 9)

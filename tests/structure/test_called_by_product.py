@@ -33,7 +33,9 @@ def words(tree: ast.Module) -> Counter[str]:
 
 
 def uncalled(of: dict[Path, ast.Module], registered: str) -> set[str]:
-    used = sum((words(tree) for tree in of.values()), Counter(re.findall(r"\w+", registered)))
+    used = Counter(re.findall(r"\w+", registered))
+    for tree in of.values():
+        used.update(words(tree))
     public = (ast.FunctionDef, ast.ClassDef)
     # A command of a group is called by its name on the command line.
     commands = {

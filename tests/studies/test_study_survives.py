@@ -99,24 +99,6 @@ def test_a_killed_worker_changes_nothing(small: Path) -> None:
     assert contents(Path("pool")) == whole
 
 
-def test_runs_that_kill_their_worker_are_recorded_as_failed(small: Path) -> None:
-    text = Path("study.toml").read_text().replace("replicas = 24", "replicas = 6")
-    text = (
-        text.replace("runs_per_chunk = 8", "runs_per_chunk = 6")
-        .replace("[1, 5]", "[5]")
-        .replace("seed = 3", "seed = 1")
-    )
-    extra = '"blocks.ir.flaw" = { choice = ["die", "none", "none", "none"] }\n"blocks.traffic'
-    Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
-    study = read_study("study.toml")
-    dying = {k for k in range(6) if study.replica(k).changes["blocks.ir.flaw"] == "die"}
-    assert 0 < len(dying) < 6
-    folder = run_into(study, Path("deadly"), 2, False)
-    rows = folder.results().to_pylist()
-    assert {row["replica"] for row in rows if row["error"]} == dying
-    assert all("died" in row["error"] for row in rows if row["error"])
-
-
 def test_a_poisoned_run_does_not_stop_the_study(small: Path) -> None:
     text = Path("study.toml").read_text()
     extra = '"blocks.ir.flaw" = { choice = ["none", "none", "none", "raise"] }\n"blocks.traffic'

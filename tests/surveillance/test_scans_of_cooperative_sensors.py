@@ -65,7 +65,7 @@ def test_replicas_together_are_those_alone(sensor):
     sensor = {**sensor, "reception": "fitted"} if sensor is ADS_B else sensor
     scenes = []
     for seed, clock in enumerate(({}, {"jitter_s": 0.03}, {"offset_s": 0.25}, {})):
-        one = chain({"one": {**sensor, **clock}}, targets=TARGETS, duration_s=30)
+        one = chain({"one": {**sensor, **clock}}, targets=TARGETS, duration_s=15)
         one["blocks"]["traffic"]["ownship"] = dict(crooked.OWNSHIP)
         scenes.append({**one, "seed": 11 * seed})
     together = recorded(*scenes)["detections"].to_pylist()

@@ -201,6 +201,18 @@ def test_the_first_scan_at_or_after_an_instant(tick):
             assert clock.ticks(np.array([k - 1]))[0] < tick
 
 
+@pytest.mark.parametrize("jitter_s", [0.0, 0.004])
+def test_nothing_is_before_the_instant_that_is_said_to_have_nothing_before_it(jitter_s):
+    spec = ClockSpec(Fraction(30000, 1001), Fraction(1, 8), Fraction(-40), jitter_s)
+    clock = ScanClock(spec, 30_000 * 10**6, lambda scans: np.sin(7.0 * scans))
+    for tick in np.linspace(0, 10**12, 500).astype(int).tolist():
+        none_before = clock.none_before(tick)
+        assert len(clock.between(tick, none_before)[0]) == 0
+        first = clock.between(tick, tick + clock.offset + 2 * int(clock.period))[1][0]
+        assert none_before <= first
+        assert none_before == first or jitter_s
+
+
 def test_the_window_holds_its_start_and_not_its_end():
     (clock,), ticks_per_s = clocks_of(spec_of(2))
     assert clock.between(0, ticks_per_s)[0].tolist() == [0, 1]

@@ -10,7 +10,7 @@ import dsa_des
 from docs.make.track_consistency import NOISY, OWNSHIP, Case, scene_of_case
 from dsa_des.running.simulation import Simulation
 
-TARGETS, SECONDS, PER_SCAN = 100, 30, 20.0
+TARGETS, SECONDS, PER_SCAN = 100, 18, 20.0
 #: Up to 2 s late, of a scan each second: some come after the next one.
 LATE = {"delay_s": 0.1, "jitter_s": 1.9}
 

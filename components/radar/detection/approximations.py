@@ -292,9 +292,9 @@ def detection_table(pulses: int, false_alarm_probability: float, model: str) -> 
     low, high = int(_OCTAVES[start]), int(_OCTAVES[stop])
 
     octave = np.repeat(np.arange(low, high), _CELLS_PER_OCTAVE)
-    place = np.tile(np.arange(_CELLS_PER_OCTAVE), high - low)
+    part = np.tile(np.arange(_CELLS_PER_OCTAVE), high - low)
     width = np.ldexp(1.0 / _CELLS_PER_OCTAVE, octave)
-    left = np.ldexp(1.0 + place / _CELLS_PER_OCTAVE, octave)
+    left = np.ldexp(1.0 + part / _CELLS_PER_OCTAVE, octave)
     knots = left[:, None] + width[:, None] * (np.arange(3) / 3.0)
     values = exact(np.append(knots.reshape(-1), powers[stop]))
     edge = np.append(values[0:-1:3], values[-1])

@@ -64,8 +64,8 @@ def cfar_detection_probability(
     terms = _terms(*_checked(reference_cells, false_alarm_probability, pulses))
     flat = np.ascontiguousarray(ratio).reshape(-1)
     with np.errstate(under="ignore"):  # far from the threshold a probability is 0
-        found = _probability(flat, terms, name)
-    return unflatten(np.minimum(np.maximum(found, 0.0), 1.0), ratio.shape)
+        probability = _probability(flat, terms, name)
+    return unflatten(np.minimum(np.maximum(probability, 0.0), 1.0), ratio.shape)
 
 
 def cfar_multiplier(
@@ -253,8 +253,8 @@ class Averaging:
 
     def probability(self, snr: FloatArray, model: str) -> FloatArray:
         """Return Pd for powers over noise and clutter (flat array)."""
-        found: FloatArray = cfar_detection_probability(snr, model=model, **self._settings)
-        return found
+        pd: FloatArray = cfar_detection_probability(snr, model=model, **self._settings)
+        return pd
 
     def required_snr(self, pd: float, model: str) -> float:
         """Return the SNR at which Pd is `pd`, linear."""

@@ -174,8 +174,8 @@ def clutter_detection_probability(
     powers = (target[cluttered] / over, mean[cluttered] / over, noise / over)
     cell = (*powers, level, _ANY_THRESHOLD if rises else 0.0)
     with np.errstate(under="ignore"):  # vanishing probabilities are 0
-        found = _fluctuating(name, *cell) if kind == "fluctuating" else _constant(name, *cell)
-    result[cluttered] = np.minimum(np.maximum(found, 0.0), 1.0)
+        probability = _fluctuating(name, *cell) if kind == "fluctuating" else _constant(name, *cell)
+    result[cluttered] = np.minimum(np.maximum(probability, 0.0), 1.0)
     return unflatten(result, shape)
 
 

@@ -91,9 +91,9 @@ def _gamma_beyond(share: FloatArray, threshold: FloatArray, pulses: int) -> Floa
     from scipy.special import gammaincc, gammainccinv
 
     beyond = gammaincc(float(pulses), threshold)
-    found: FloatArray = gammainccinv(float(pulses), beyond * share)
+    output: FloatArray = gammainccinv(float(pulses), beyond * share)
     # A tail that is 0 to a double is that of an exponential beyond its end.
-    return np.where(np.isfinite(found), found, threshold - np.log(share))
+    return np.where(np.isfinite(output), output, threshold - np.log(share))
 
 
 def _steady_beyond(
@@ -109,9 +109,11 @@ def _steady_beyond(
     output[strong] = 0.5 * (middle - ndtri(above)) ** 2
     weak, power = ~strong, freedom * snr[~strong]
     below = chndtr(2.0 * threshold[weak], freedom, power)
-    found = 0.5 * chndtrix(1.0 - share[weak] * (1.0 - below), freedom, power)
+    beyond_it = 0.5 * chndtrix(1.0 - share[weak] * (1.0 - below), freedom, power)
     # Where hardly any such echo crosses, what does is a trace beyond the threshold.
-    output[weak] = np.where(np.isfinite(found), found, threshold[weak] - np.log(share[weak]))
+    output[weak] = np.where(
+        np.isfinite(beyond_it), beyond_it, threshold[weak] - np.log(share[weak])
+    )
     return output
 
 
@@ -203,9 +205,9 @@ def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability
             f"{MOST_FALSE_ALARMS / number:g}, for 1e7 false alarms in a scan"
         )
     first, cumulative = _binomial(number, float(pfa))
-    place = np.searchsorted(cumulative, draws.reshape(-1), side="right")
-    found = first + np.minimum(place, len(cumulative) - 1)
-    return unflatten(found.astype(np.int64), draws.shape)
+    index = np.searchsorted(cumulative, draws.reshape(-1), side="right")
+    count = first + np.minimum(index, len(cumulative) - 1)
+    return unflatten(count.astype(np.int64), draws.shape)
 
 
 def false_alarm_snr(

@@ -286,14 +286,14 @@ def first_declared(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
     declares = seen + 1 >= m
     weight = np.zeros((*chance.shape[:-1], states))
     weight[..., 0] = 1.0
-    found = np.empty_like(chance)
+    first = np.empty_like(chance)
     for look in range(chance.shape[-1]):
         hit = weight * chance[..., look, np.newaxis]
-        found[..., look] = hit[..., declares].sum(axis=-1)
+        first[..., look] = hit[..., declares].sum(axis=-1)
         moved = np.zeros_like(weight)
         for state in range(states):
             moved[..., after_miss[state]] += weight[..., state] - hit[..., state]
             if not declares[state]:
                 moved[..., after_hit[state]] += hit[..., state]
         weight = moved
-    return found
+    return first

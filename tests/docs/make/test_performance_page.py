@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from components.benchmark.pairs import PAIRS, VARIANTS
+from components.benchmark.pairs import PAIRS
 from components.benchmark.rates import RATES
 from components.benchmark.scenes import CASES
 from docs.make import performance as made
+from docs.make.performance_queues import VARIANTS
 
 PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
 
@@ -29,6 +30,7 @@ def measured(monkeypatch):
         }  # fmt: skip
 
     monkeypatch.setattr(made, "fresh", fresh)
+    monkeypatch.setattr(made.performance_queues, "fresh", lambda *of: fresh("queues", *of))
     return made.measured(3, quick=False), asked
 
 

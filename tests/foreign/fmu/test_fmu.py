@@ -4,7 +4,6 @@ import math
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -15,6 +14,7 @@ import pytest
 from covering import covers
 
 from dsa_des.errors import BlockFailure, SceneError, SetupFailure
+from tests import warm_process
 
 FMU = ("foreign.fmu",)
 _CHAIN = [
@@ -237,10 +237,9 @@ def test_nothing_is_left_when_we_are_interrupted_or_killed(lab, lag, number):
     folder = lab.folder / "temporary"
     folder.mkdir()
     out = lab.folder / "out"
-    ours = subprocess.Popen(
-        [sys.executable, "-m", "dsa_des", "run", str(scene), "--out", str(out)],
+    ours = warm_process.start(
+        ["-m", "dsa_des", "run", scene, "--out", out],
         env={**os.environ, "TMPDIR": str(folder)}, stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     beats: list[Path] = []
     for _ in range(1500):  # until it hangs: past its first communication points

@@ -121,29 +121,36 @@ def test_daylight():
         "azimuth_correlation_time_s", "elevation_error_deg", "elevation_bias_deg",
         "elevation_correlation_time_s", "azimuth_resolution_deg", "elevation_resolution_deg",
         of=OF)  # fmt: skip
-@pytest.mark.parametrize("angle", ["azimuth", "elevation"])
-def test_errors_that_the_scene_adds(angle):
+def test_errors_that_the_scene_adds():
+    """Of each angle its own."""
+    angles, size = ("azimuth", "elevation"), np.array([[1.0], [0.6]])
+
+    def both(key):
+        return {f"{angle}_{key}": float(of[0]) for angle, of in zip(angles, size, strict=True)}
+
     def off(**keys):
-        found = recorded(errors="stated", scan_rate_hz=40, quantised=False, **keys)
-        return np.array([row[f"{angle}_rad"] - row[f"true_{angle}_rad"] for row in rows(found)
-                         if row["target"] == "rolling"])  # fmt: skip
+        found = rows(recorded(errors="stated", scan_rate_hz=40, quantised=False, **keys))
+        return np.degrees([[row[f"{angle}_rad"] - row[f"true_{angle}_rad"] for row in found
+                            if row["target"] == "rolling"] for angle in angles])  # fmt: skip
 
     plain = off()
-    biased = off(**{f"{angle}_bias_deg": 1.0}, biases="fixed") - plain
-    assert np.degrees(biased) == pytest.approx(np.ones(len(biased)), abs=1e-6)
-    drawn = np.degrees(off(**{f"{angle}_bias_deg": 1.0}, biases="drawn") - plain)
-    assert np.ptp(drawn) < 1e-6 and abs(drawn[0]) < 0.999
-    erring = np.degrees(off(**{f"{angle}_error_deg": 0.5}) - plain)
-    assert np.std(erring) == pytest.approx(0.5, rel=0.35)
-    keys = {f"{angle}_error_deg": 0.5, f"{angle}_correlation_time_s": 100.0}
-    assert np.std(np.degrees(off(**keys) - plain)) < 0.15
-    step = np.radians(0.7)
-    grid = rows(recorded(errors="grid", **{f"{angle}_resolution_deg": 0.7}))
-    assert all(row[f"{angle}_rad"] / step == pytest.approx(round(row[f"{angle}_rad"] / step))
-               for row in grid)  # fmt: skip
-    fine = rows(recorded(errors="stated", quantised=False, **{f"{angle}_resolution_deg": 0.7}))
-    assert any(abs(row[f"{angle}_rad"] / step - round(row[f"{angle}_rad"] / step)) > 0.01
-               for row in fine)  # fmt: skip
+    biased = (off(**both("bias_deg"), biases="fixed") - plain) / size
+    assert biased == pytest.approx(np.ones(biased.shape), abs=1e-6)
+    drawn = (off(**both("bias_deg"), biases="drawn") - plain) / size
+    assert np.ptp(drawn, axis=1).max() < 2e-6 and np.abs(drawn[:, 0]).max() < 0.999
+    erring = (off(**both("error_deg")) - plain) / size
+    assert np.std(erring, axis=1) == pytest.approx([1.0, 1.0], rel=0.35)
+    lasting = {f"{angle}_correlation_time_s": 100.0 for angle in angles}
+    assert np.std((off(**both("error_deg"), **lasting) - plain) / size, axis=1).max() < 0.3
+    steps = both("resolution_deg")
+    grid = rows(recorded(errors="grid", **steps))
+    fine = rows(recorded(errors="stated", quantised=False, **steps))
+    for angle in angles:
+        step = np.radians(steps[f"{angle}_resolution_deg"])
+        assert all(row[f"{angle}_rad"] / step == pytest.approx(round(row[f"{angle}_rad"] / step))
+                   for row in grid)  # fmt: skip
+        assert any(abs(row[f"{angle}_rad"] / step - round(row[f"{angle}_rad"] / step)) > 0.01
+                   for row in fine)  # fmt: skip
 
 
 @covers("false_alarms", "false_alarms_per_frame", "marked_false_alarms", of=OF)

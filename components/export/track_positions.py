@@ -13,7 +13,7 @@ POSE = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch
         "own_roll_rad")  # fmt: skip
 
 
-def estimated_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     """Return rows of ``state_tracks`` whose states have a range, and where they are.
 
     Latitude, longitude (deg) and height above the ellipsoid (m), (3, n), at ``state_s``.
@@ -26,10 +26,10 @@ def estimated_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     return rows, offset_positions(ned[:, rows], origin)
 
 
-def held_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     """Return rows of ``tracks`` with a range, one for each measurement held, and where it was.
 
-    Places are as in `estimated_places`, at ``measured_s``.
+    Places are as in `estimated_positions`, at ``measured_s``.
     """
     nothing = np.empty(0, dtype=np.int64), np.empty((3, 0))
     if "tracks" not in run.tables:
@@ -37,19 +37,19 @@ def held_places(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     lines = [run.numbers("tracks", name) for name in ("azimuth_rad", "elevation_rad", "range_m")]
     measured_s = run.numbers("tracks", "measured_s")
     names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
-    told: dict[tuple[str, str], float] = {}
+    measured: dict[tuple[str, str], float] = {}
     kept = []
     for row in np.flatnonzero(np.isfinite(lines).all(axis=0)).tolist():
         key = blocks[row] or "", names[row] or ""
-        if told.get(key) != measured_s[row]:
-            told[key] = float(measured_s[row])
+        if measured.get(key) != measured_s[row]:
+            measured[key] = float(measured_s[row])
             kept.append(row)
     if not kept:
         return nothing
     rows = np.array(kept)
     azimuth, elevation, range_m = (part[rows] for part in lines)
-    _, places = sights(azimuth, elevation, range_m, _own_pose(run, measured_s[rows], rows))
-    return rows, places
+    _, positions = sights(azimuth, elevation, range_m, _own_pose(run, measured_s[rows], rows))
+    return rows, positions
 
 
 def _own_pose(run: RecordedTables, time_s: FloatArray, rows: IntArray) -> list[FloatArray]:
