@@ -93,18 +93,18 @@ class TurnOut(Component):
             # The first row of every run at which it is free, and then on to the next ones.
             now: dict[int, int] = {}
             later = []
-            for place, run in waiting:
+            for index, run in waiting:
                 if run in now:
-                    later.append((place, run))
-                elif wake.ticks[place] >= self._free_from.get(run, 0):
-                    now[run] = place
+                    later.append((index, run))
+                elif wake.ticks[index] >= self._free_from.get(run, 0):
+                    now[run] = index
             rows = list(now.values())
-            found = changes_out(kind, self._configuration, self._alerter, alerts, rows)
-            for (run, place), changes in zip(now.items(), found, strict=True):
+            result = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+            for (run, index), changes in zip(now.items(), result, strict=True):
                 change = None if changes is None else smaller(changes)
                 if change is not None:
-                    manoeuvres[place] = self._manoeuvre(change)
-                    self._free_from[run] = int(wake.ticks[place]) + self._pause_ticks
+                    manoeuvres[index] = self._manoeuvre(change)
+                    self._free_from[run] = int(wake.ticks[index]) + self._pause_ticks
             waiting = later
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
@@ -202,15 +202,15 @@ class TurnAway(Component):
             near |= np.isnan(tracks.range_m)
         row = tracks.row_of_entries
         manoeuvres: dict[int, Manoeuvre] = {}
-        for place in np.unique(row[near]).tolist():
-            tick = int(wake.ticks[place])
-            run = int(wake.run[place])
+        for index in np.unique(row[near]).tolist():
+            tick = int(wake.ticks[index])
+            run = int(wake.run[index])
             if tick < self._free_from.get(run, 0):
                 continue
-            entries = np.flatnonzero(near & (row == place))
+            entries = np.flatnonzero(near & (row == index))
             ranges_m = np.nan_to_num(tracks.range_m[entries], nan=np.inf)
             nearest = entries[np.argmin(ranges_m)]
-            manoeuvres[place] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
+            manoeuvres[index] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
             self._free_from[run] = tick + self._pause_ticks
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 

@@ -59,10 +59,10 @@ class AlerterKeys:
             self._problems.add("alerters names one alerter twice", line=number)
         # The longest name first: one may be the beginning of another.
         prefixes = {name: name.lower() + "_" for name in sorted(names, key=len, reverse=True)}
-        found = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
+        result = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
         self._leave_out(tuple(prefixes.values()))
         self._note_unknown()
-        return tuple(alerter for name in names if (alerter := found[name]) is not None)
+        return tuple(alerter for name in names if (alerter := result[name]) is not None)
 
     def _alerter(self, name: str, prefix: str, named_in: int) -> Alerter | None:
         of_level: dict[int, set[str]] = {}
@@ -185,18 +185,18 @@ class AlerterKeys:
     def _leave_out(self, named: tuple[str, ...]) -> None:
         """Ignore the keys of whole alerters other than those with the prefixes `named`."""
         free = self._lines.keys() - self._used
-        found: dict[str, str] = {}
+        result: dict[str, str] = {}
         for key in free:
             match = _LEVEL_OF.fullmatch(key)
             if match is None or match.group(2) != "detector":
                 continue
             prefix = match.group(1) + "_"
             if any(other.startswith(prefix + _CLASS) for other in free):
-                found[prefix] = self._lines[key][1][: len(prefix) - 1]
-        for prefix in found:
+                result[prefix] = self._lines[key][1][: len(prefix) - 1]
+        for prefix in result:
             longer = tuple(other for other in named if other.startswith(prefix))
             self._used |= {k for k in free if k.startswith(prefix) and not k.startswith(longer)}
-        self.left_out = tuple(sorted(found.values()))
+        self.left_out = tuple(sorted(result.values()))
 
     def _note_unknown(self) -> None:
         for key in sorted(self._lines.keys() - self._used):
@@ -250,19 +250,19 @@ def default_values() -> tuple[dict[str, Any], dict[str, str]]:
 
 def _lines(path: Path, problems: Problems) -> Lines:
     """Return line number, key as written and text of the value by key in lower case."""
-    found: Lines = {}
+    result: Lines = {}
     for number, line in read_lines(path, problems, "a text file", "lines key = value [unit]"):
         text = line.split("#", 1)[0].strip()
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not key:
             shown = shortened(text, MOST_OF_A_CELL)
             problems.add(f"{shown!r} is not 'key = value [unit]'", line=number)
-        elif key.lower() in found:
-            first = found[key.lower()][0]
+        elif key.lower() in result:
+            first = result[key.lower()][0]
             problems.add(f"{shortened(key)} stands in line {first} already", line=number)
         else:
-            found[key.lower()] = (number, key, value)
-    return found
+            result[key.lower()] = (number, key, value)
+    return result
 
 
 def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str, str]]:

@@ -171,10 +171,10 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
             raise BadValue(f"is {shortened(plain, 40)!r}: it must be {allowed}{hint}")
         return plain, ""
     if kind == "yes or no":
-        found = {**_YES, **_NO}.get(plain.lower())
-        if found is None:
+        result = {**_YES, **_NO}.get(plain.lower())
+        if result is None:
             raise BadValue(f"is {shortened(plain, 40)!r}: it must be true or false")
-        return found, ""
+        return result, ""
     value = _number(plain, negative)
     if kind == "count":
         if value != int(value):

@@ -49,16 +49,16 @@ def alert_files(
     paths, several = _found(encounters)
     names = {"--out": out, "--figure": figure, "--bands": bands}
     places = {option: named(name, option) for option, name in names.items() if name is not None}
-    for (option, place), (other, its) in combinations(places.items(), 2):
-        if place.resolve() == its.resolve():
+    for (option, path), (other, its) in combinations(places.items(), 2):
+        if path.resolve() == its.resolve():
             raise UsageError(f"{other} and {option} name the same place: each needs its own")
-    for option, place in places.items():
+    for option, path in places.items():
         if several:
-            OutputFolder(place).check()
+            OutputFolder(path).check()
         else:
             if option == "--figure":
-                check_ending(place, PICTURES, option)
-            check_file(place, option)
+                check_ending(path, PICTURES, option)
+            check_file(path, option)
     configuration = _read(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
@@ -67,8 +67,8 @@ def alert_files(
         if several:
             _write_folders(configuration, done, places, decimals)
         else:
-            for option, place in places.items():
-                _write(option, configuration, done[0], place, decimals)
+            for option, path in places.items():
+                _write(option, configuration, done[0], path, decimals)
     except OSError as error:
         raise OutputError(f"{error.filename or out}: cannot be written: {reason_of(error)}") from (
             error
@@ -78,7 +78,7 @@ def alert_files(
 
 def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     """Return the files that are named, those of folders sorted, and whether they may be several."""
-    found: list[Path] = []
+    result: list[Path] = []
     several = len(encounters) > 1
     for text in encounters:
         try:
@@ -86,19 +86,19 @@ def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
         except InputFileError as error:
             raise UsageError(f"{text}: {error}") from error
         if not is_folder(path):
-            found.append(path)
+            result.append(path)
             continue
         several = True
         inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
         if not inside:
             raise UsageError(f"{text}: the folder holds no {' or '.join(_SUFFIXES)} file")
-        found += inside
+        result += inside
     stems: dict[str, Path] = {}
-    for path in found:
+    for path in result:
         other = stems.setdefault(path.stem, path)
         if other is not path:
             raise UsageError(f"{other} and {path} would both be written to {path.stem}.csv")
-    return found, several
+    return result, several
 
 
 def _read(path: Path) -> Configuration:
@@ -152,9 +152,9 @@ def _wind_mps(wind: tuple[float, float] | None) -> tuple[float, float] | None:
 def _write_folders(
     configuration: Configuration, done: list[_Done], places: dict[str, Path], decimals: int
 ) -> None:
-    for option, place in places.items():
+    for option, target in places.items():
         suffix = ".png" if option == "--figure" else ".csv"
-        with OutputFolder(place).writing() as folder:
+        with OutputFolder(target).writing() as folder:
             for one in done:
                 path = folder / f"{one.path.stem}{suffix}"
                 _write(option, configuration, one, path, decimals)
@@ -192,5 +192,5 @@ def _show(configuration: Configuration, done: list[_Done], places: dict[str, Pat
                 f"note: {one.path}: {one.encounter.left_out} rows of targets are left out: the "
                 "ownship has none at their times"
             )
-    for place in places.values():
-        say(f"written: {place}")
+    for path in places.values():
+        say(f"written: {path}")

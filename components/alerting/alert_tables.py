@@ -67,7 +67,7 @@ def alert_table(
 
 def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
     """Return unit and factor to SI by kind of quantity: those of recovery sizes and steps."""
-    found = {"time": ("s", 1.0)}
+    result = {"time": ("s", 1.0)}
     for kind, key, factors in (
         ("horizontal", "min_horizontal_recovery", LENGTH_M),
         ("vertical", "min_vertical_recovery", LENGTH_M),
@@ -75,8 +75,8 @@ def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
         ("vertical rate", "step_vs", SPEED_MPS),
     ):
         unit = configuration.units[key]
-        found[kind] = unit, factors[unit]
-    return found
+        result[kind] = unit, factors[unit]
+    return result
 
 
 def _shown(configuration: Configuration) -> tuple[tuple[str, str, str], ...]:
@@ -98,7 +98,7 @@ def _rows(
     first = configuration.corrective_level(configuration.alerters[0])
     volume = None if first is None else first.volume
     distance_m = volume.horizontal_m if isinstance(volume, Volume) else np.nan
-    found = separation(
+    result = separation(
         tuple(part[cells] for part in encounter.relative),
         configuration["lookahead_time"],
         np.full(len(row), distance_m),
@@ -114,23 +114,23 @@ def _rows(
         texts.append(number_texts(alerts.violation_s[cells][:, number], decimals))
     units = _units(configuration)
     for _, key, kind in _shown(configuration):
-        texts.append(number_texts(found[key] / units[kind][1], decimals))
+        texts.append(number_texts(result[key] / units[kind][1], decimals))
     return [", ".join(parts) for parts in zip(*texts, strict=True)]
 
 
 def number_texts(values: FloatArray, decimals: int) -> list[str]:
     """Return numbers as text: rounded, without trailing zeros; infinite ones as ``infty``."""
-    found = []
+    result = []
     for value in values.tolist():
         if value != value:
-            found.append("")
+            result.append("")
         elif value == np.inf:
-            found.append("infty")
+            result.append("infty")
         else:
             text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
             text += "0" if text.endswith(".") else ""
-            found.append("0.0" if text == "-0.0" else text)
-    return found
+            result.append("0.0" if text == "-0.0" else text)
+    return result
 
 
 #: Factor to SI units and radians of each kind's values in a table: deg, knot, ft/min, ft.
@@ -171,12 +171,12 @@ def bands_over_time(
                 bounds = some_bounds(pairs.bounds, (slice(None), target))
                 intruders.append(GuidedIntruders(state, alerter, early, there, bounds))
     memory = GuidanceMemory(configuration, kind_name)
-    found = guidance_of_many(kind_name, configuration, own, intruders)
+    result = guidance_of_many(kind_name, configuration, own, intruders)
     bands = [
         memory.step(now_s, one).bands
-        for now_s, one in zip(encounter.time_s.tolist(), found, strict=True)
+        for now_s, one in zip(encounter.time_s.tolist(), result, strict=True)
     ]
-    return BandsOverTime(encounter.time_s, np.array([one.own_value for one in found]), bands)
+    return BandsOverTime(encounter.time_s, np.array([one.own_value for one in result]), bands)
 
 
 def bands_table(
@@ -194,6 +194,6 @@ def bands_table(
             bands = over_time.bands[row]
             edges = np.array([(band.low, band.high) for band in bands]) / TABLE_UNITS[kind]
             low, high = (number_texts(edge, decimals) for edge in edges.T)
-            for place, band in enumerate(bands):
-                lines.append(f"{now_s},{kind},{low[place]},{high[place]},{band.region}")
+            for index, band in enumerate(bands):
+                lines.append(f"{now_s},{kind},{low[index]},{high[index]},{band.region}")
     return "\n".join(lines) + "\n"

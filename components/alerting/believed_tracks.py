@@ -74,8 +74,8 @@ class EstimatedFlights:
         last = self._rows.last(now)
         some = np.flatnonzero(last >= 0)
         rows = self._rows.take(last[some])
-        place, entry = _each(rows.begin, rows.count)
-        instant = some[place]
+        index, entry = _each(rows.begin, rows.count)
+        instant = some[index]
         order = np.lexsort((self._tracks.number[entry], instant))
         instant, tracks = instant[order], self._tracks.take(entry[order])
         ahead_s = now_s[instant] - tracks.time_s
@@ -99,8 +99,8 @@ def _in_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) ->
         reference_alt_m=tracks.origin[2],
     )  # fmt: skip
     # The frame's axes are those of its origin; velocity counts along those of the target's place.
-    place = np.stack([lat_deg, lon_deg])
-    v_north, v_east, v_down = vectors_in_frame(place, tracks.origin, tracks.state[3:])
+    position_deg = np.stack([lat_deg, lon_deg])
+    v_north, v_east, v_down = vectors_in_frame(position_deg, tracks.origin, tracks.state[3:])
     own_lat, own_lon, own_alt_m = own_place
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
     return np.stack(
@@ -163,8 +163,8 @@ class BelievedTracks:
         # Without two poses the ownship's own velocity is not known, and no relative one.
         moving = np.flatnonzero(np.isfinite(own["east_mps"]))
         now = asked.take(moving)
-        found = self._estimates.states(now, times_s[moving], poses.place(now))
-        scan, number, state, deviations = moving[found[0]], *found[1:]
+        result = self._estimates.states(now, times_s[moving], poses.place(now))
+        scan, number, state, deviations = moving[result[0]], *result[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
         relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))

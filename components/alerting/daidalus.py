@@ -173,7 +173,7 @@ class DaidalusAlerting(Component):
         row, column = np.nonzero(known)
         entry = row * columns + column
         lookahead_s = self._configuration["lookahead_time"]
-        found = separation(relative, lookahead_s, np.full(known.size, np.nan))
+        result = separation(relative, lookahead_s, np.full(known.size, np.nan))
         times_s = np.where(np.isfinite(times_s), times_s, np.nan)[entry]
         numbered = range(1, len(self._alerter.levels) + 1)
         wrong = {} if flights.deviations is None else flights.deviations._asdict()
@@ -183,9 +183,9 @@ class DaidalusAlerting(Component):
             column if flights.target is None else flights.target,
             level[entry],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
-            found.time_to_closest_s[entry],
-            found.miss_horizontal_m[entry],
-            found.miss_vertical_m[entry],
+            result.time_to_closest_s[entry],
+            result.miss_horizontal_m[entry],
+            result.miss_vertical_m[entry],
             {} if flights.number is None else {"track": flights.number},
             {name: np.ravel(part)[entry] for name, part in wrong.items()},
             {name: part[entry] for name, part in zip(_RELATIVE, relative, strict=True)},

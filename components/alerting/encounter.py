@@ -76,8 +76,8 @@ def read_encounter(
         for key, part in zip(("ve", "vn"), wind, strict=True):
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
-    place, present = _at_once(own["time"], others)
-    targets = {key: _gather([o[key] for o in others], place) for key in own}
+    index, present = _at_once(own["time"], others)
+    targets = {key: _gather([o[key] for o in others], index) for key in own}
     flat = "sx" in own
     state = _flat_states if flat else _projected_states
     relative, own_state, own_plane, target_plane = state(own, targets)
@@ -113,10 +113,10 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
 
 def _at_once(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
     """Return each target's sample at each of the ownship's times, and whether there is one."""
-    place = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
-    place = np.minimum(place, np.array([len(other["time"]) - 1 for other in others]))
-    times = _gather([other["time"] for other in others], place)
-    return place, times == own_s[:, np.newaxis]
+    index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
+    index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))
+    times = _gather([other["time"] for other in others], index)
+    return index, times == own_s[:, np.newaxis]
 
 
 def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:

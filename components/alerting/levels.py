@@ -41,13 +41,13 @@ def due_by_spread(
                 middle = kind.own_value[:, np.newaxis]
                 low, high = kind.values[:, :-1] - middle, kind.values[:, 1:] - middle
                 near = (low < spread) & (high > -spread) & kind.there[:, :-1] & kind.there[:, 1:]
-                for found, horizon_s in (
+                for level_due, horizon_s in (
                     (due, level.alerting_time_s),
                     (early, level.early_alerting_time_s),
                 ):
                     unsafe = conflicts.unsafe(0.0, horizon_s)
                     met = (near & (unsafe[:, :-1] | unsafe[:, 1:])).any(axis=1)
-                    found[part, number] |= met
+                    level_due[part, number] |= met
     return due, early
 
 
@@ -85,7 +85,7 @@ def violation_times_s(
 ) -> FloatArray:
     """Return the time to violation of each level, (n, levels)."""
     count = len(relative[0])
-    found = np.empty((count, len(levels)))
+    result = np.empty((count, len(levels)))
     for start in range(0, count, _MOST_AT_ONCE):
         part = slice(start, start + _MOST_AT_ONCE)
         states = tuple(value[part] for value in relative)
@@ -100,8 +100,8 @@ def violation_times_s(
                 known[key] = detection_span(
                     level.volume, states, vertical, of_part, 0.0, lookahead_s
                 ).begin_s
-            found[part, number] = known[key]
-    return found
+            result[part, number] = known[key]
+    return result
 
 
 def due_levels(levels: tuple[Level, ...], violation_s: FloatArray) -> tuple[BoolArray, BoolArray]:
@@ -134,19 +134,19 @@ def levels_without_memory(
 ) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Return the time to each level's volume, and whether it is due, at once and early."""
     own, levels = pairs.own, alerter.levels
-    found = violation_times_s(
+    result = violation_times_s(
         levels,
         pairs.relative,
         configuration["lookahead_time"],
         pairs.bounds,
         None if own is None else (own.up_m, own.climb_mps),
     )
-    due, early = due_levels(levels, found)
+    due, early = due_levels(levels, result)
     if own is not None and any(level.spreads for level in levels):
         intruder = State(*(mine - part for mine, part in zip(own, pairs.relative, strict=True)))
         by_spread = due_by_spread(configuration, levels, own, intruder, pairs.bounds)
         due, early = due | by_spread[0], early | by_spread[1]
-    return found, due, early
+    return result, due, early
 
 
 def alert_levels(
@@ -173,9 +173,9 @@ def alert_levels(
     for number, one in enumerate(configuration.alerters):
         cells = np.nonzero((which == number) & present)
         if len(cells[0]) and one.levels:
-            found = levels_without_memory(configuration, one, pairs.some(cells))
+            result = levels_without_memory(configuration, one, pairs.some(cells))
             count = len(one.levels)
-            for whole, part in zip((violation_s, due, early), found, strict=True):
+            for whole, part in zip((violation_s, due, early), result, strict=True):
                 whole[cells[0], cells[1], :count] = part
     level = np.full(shape, -1, dtype=np.int64)
     early_level = np.zeros(shape, dtype=np.int64)

@@ -131,12 +131,12 @@ class LevelMemory:
         if len(number) == 0:
             return level
         present = np.ones(len(number), dtype=bool) if present is None else present
-        place = self._places(RunTicks(run, number))
-        for rows in turns(place):
-            part, level[rows] = self._known.take(place[rows]).step(
+        index = self._places(RunTicks(run, number))
+        for rows in turns(index):
+            part, level[rows] = self._known.take(index[rows]).step(
                 self._rule, now_s[rows], present[rows], due[rows], early[rows]
             )
-            self._put(place[rows], part)
+            self._put(index[rows], part)
         return level
 
     def forget(self, runs: IntArray, times_s: FloatArray) -> None:
@@ -157,9 +157,9 @@ class LevelMemory:
     def _places(self, those: RunTicks) -> IntArray:
         """Return the rows of targets, by run and number, all of them remembered from now on."""
         known = self._known.keys
-        place = last_of_run(known, those)
-        if len(known) and bool(((place >= 0) & (known.tick[place] == those.tick)).all()):
-            return place
+        index = last_of_run(known, those)
+        if len(known) and bool(((index >= 0) & (known.tick[index] == those.tick)).all()):
+            return index
         order = those.order()
         every = union([known, those if order is None else those.take(order)])
         old, before = last_of_run(every, known), self._known

@@ -53,11 +53,11 @@ class OwnPoses:
 
     def add(self, came: RunTicks, states: TrafficStates) -> None:
         """Take in poses, and when they came."""
-        place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
+        position = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
         self._keep(
             self._poses.with_more(
-                came, tick=states.tick, place=np.stack(place), attitude=np.stack(angles)
+                came, tick=states.tick, place=np.stack(position), attitude=np.stack(angles)
             )
         )
 
@@ -72,15 +72,15 @@ class OwnPoses:
 
     def pose_of(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
         """Return the pose of when something was measured, of those that had come; -1 for none."""
-        place = np.minimum(last_of_run(self._made, measured), self._poses.last(came))
+        index = np.minimum(last_of_run(self._made, measured), self._poses.last(came))
         first = first_of_run(self._poses.instants, came.run)
-        if self._old and bool((asked & (place <= first)).any()):
+        if self._old and bool((asked & (index <= first)).any()):
             every = Received.joined([*self._old, self._poses])
             order = every.instants.order()
             self._keep(every if order is None else every.take(order))
             self._old = []
             return self.pose_of(measured, came, asked)
-        return place
+        return index
 
     def attitude_rad(self, place: IntArray) -> FloatArray:
         """Return heading, pitch and roll of some poses, (3, n)."""

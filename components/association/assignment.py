@@ -119,5 +119,5 @@ def _solved(
     cost[np.arange(len(tracks)), len(detections) + np.arange(len(tracks))] = price.max()
     pair = np.full(cost.shape, -1, dtype=np.int64)
     pair[row, column] = np.arange(len(track))
-    found = pair[linear_sum_assignment(cost)]
-    return np.sort(found[found >= 0])
+    result = pair[linear_sum_assignment(cost)]
+    return np.sort(result[result >= 0])

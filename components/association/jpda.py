@@ -26,16 +26,16 @@ def marginals(
     track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
 ) -> FloatArray:
     """Return the probability of each pair; what a track's pairs leave to 1 is that of a miss."""
-    found = np.empty(len(track))
+    result = np.empty(len(track))
     if len(track) == 0:
-        return found
+        return result
     # A detection in one gate only ties no tracks together: its track is decided in closed form.
     shared = np.bincount(detection)[detection] > 1
     mixed_up = np.zeros(int(track.max()) + 1, dtype=bool)
     mixed_up[track[shared]] = True
     simple = ~mixed_up[track]
     total = 1.0 + np.bincount(track[simple], weights=weight[simple], minlength=len(mixed_up))
-    found[simple] = weight[simple] / total[track[simple]]
+    result[simple] = weight[simple] / total[track[simple]]
     left = np.flatnonzero(~simple)
     for part in groups(labels(track[left], detection[left])):
         pairs = left[part]
@@ -44,8 +44,8 @@ def marginals(
         weights = np.zeros((len(tracks), len(detections)))
         weights[row, column] = weight[pairs]
         solve = exact if len(detections) <= exact_up_to else propagated
-        found[pairs] = solve(weights)[row, column]
-    return found
+        result[pairs] = solve(weights)[row, column]
+    return result
 
 
 def exact(weights: FloatArray) -> FloatArray:
@@ -67,12 +67,12 @@ def exact(weights: FloatArray) -> FloatArray:
         after[i] = after[i + 1] * nothing[i]
         for j in np.flatnonzero(scaled[i]).tolist():
             after[i, free[j]] += after[i + 1, free[j] | 1 << j] * scaled[i, j]
-    found = np.zeros_like(weights)
+    result = np.zeros_like(weights)
     for i in range(many):
         for j in np.flatnonzero(scaled[i]).tolist():
             together = before[i, free[j]] * after[i + 1, free[j] | 1 << j]
-            found[i, j] = scaled[i, j] * together.sum() / after[0, 0]
-    return found
+            result[i, j] = scaled[i, j] * together.sum() / after[0, 0]
+    return result
 
 
 def propagated(weights: FloatArray) -> FloatArray:

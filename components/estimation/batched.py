@@ -71,25 +71,25 @@ def cholesky(matrix: FloatArray) -> FloatArray:
 
 def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return root⁻¹ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
-    found = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    result = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
     for i in range(len(root)):
         value = right[i]
         for k in range(i):
-            value = value - root[i, k] * found[k]
-        np.divide(value, root[i, i], out=found[i])
-    return found
+            value = value - root[i, k] * result[k]
+        np.divide(value, root[i, i], out=result[i])
+    return result
 
 
 def solve_upper(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return root⁻ᵀ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
     size = len(root)
-    found = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    result = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
     for i in range(size - 1, -1, -1):
         value = right[i]
         for k in range(i + 1, size):
-            value = value - root[k, i] * found[k]
-        np.divide(value, root[i, i], out=found[i])
-    return found
+            value = value - root[k, i] * result[k]
+        np.divide(value, root[i, i], out=result[i])
+    return result
 
 
 def squared_length(vector: FloatArray) -> FloatArray:

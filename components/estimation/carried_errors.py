@@ -2,27 +2,33 @@
 
 An error that is forgotten in a time constant (Gauss-Markov) is a state like any other: its variance
 is 1 throughout, a measurement says by how much to multiply it, so that a track needs to know no
-deviation before it is told one. They follow position and velocity in a track's state, and what a
+deviation before one is reported. They follow position and velocity in a track's state, and what a
 motion model has besides comes after them.
 
 Source: Schmidt, *Application of state-space methods to navigation problems* (1966), where such
 states are only considered; here they are estimated as well, which is the Kalman filter of the whole
 (Bar-Shalom, Li, Kirubarajan (2001), §8.2).
+
+A position is reported of some time ago and carried on by a velocity that is reported of another.
+What the target's motion has changed since is an error of both, and the same change is in the error
+of the predicted state: a filter that takes the two for independent is too sure of the velocity
+(the same, §8.3.1, correlated noises).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.estimation.batched import product
+from components.estimation.batched import product, product_transposed
 from components.estimation.frame import SensorPose
+from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, linearised
-from components.estimation.motion import Motion
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from components.estimation.motion import ConstantVelocity, Motion
+from dsa_des.arrays.types import BoolArray, FloatArray
 
-#: Which way an error goes: of a place along north or east, and of a velocity; of its height and of
-#: its vertical rate; of the bearing and of the range at which it is seen.
+#: Which way an error goes: of a position along north or east, and of a velocity; of its height and
+#: of its vertical rate; of the bearing and of the range at which it is seen.
 NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE = range(8)
 # Position and velocity.
 _MOVING = 6
@@ -82,7 +88,7 @@ class MotionWithErrors:
 
 
 @dataclass(frozen=True, eq=False)
-class ToldErrors:
+class ReportedErrors:
     """The errors of measurements that aircraft report, or of pairs of them with tracks."""
 
     ways: Sequence[int]  # Which way each error goes (`NORTH` to `RANGE`)
@@ -91,15 +97,9 @@ class ToldErrors:
     # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
 
-    def take(self, which: IntArray) -> "ToldErrors":
-        """Return those of some of them."""
-        return ToldErrors(
-            self.ways, self.deviation[:, which], self.age_s[which], self.at_range[which]
-        )
-
-    def repeated(self, times: int) -> "ToldErrors":
+    def repeated(self, times: int) -> "ReportedErrors":
         """Return them so many times, one after the other."""
-        return ToldErrors(
+        return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
         )  # fmt: skip
@@ -112,10 +112,10 @@ class ToldErrors:
         self, kind: Kind, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same, and its derivative by position, velocity and errors."""
-        told, by_place, cylinder = self._displaced(state, pose)
-        seen, slope = linearised(kind, told, pose)
+        reported, by_position, cylinder = self._displaced(state, pose)
+        seen, slope = linearised(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
-        whole[:, :3] = product(slope[:, :3], by_place)
+        whole[:, :3] = product(slope[:, :3], by_position)
         if slope.shape[1] > 3:
             whole[:, 3:6] = slope[:, 3:6]
         effect = self._effects(cylinder)
@@ -123,7 +123,7 @@ class ToldErrors:
         return seen, whole
 
     def effects(self, position_m: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return how errors move what is told of places and velocities, (6, errors, n)."""
+        """Return how errors move reported positions and velocities, (6, errors, n)."""
         still = np.zeros((_MOVING + len(self.ways), position_m.shape[1]))
         still[:3] = position_m
         return self._effects(self._displaced(still, pose)[2])
@@ -138,24 +138,24 @@ class ToldErrors:
     def _displaced(
         self, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, ...]]:
-        """Return states as they are told, the derivative of places, and cosines of directions."""
-        told = state[:_MOVING].copy()
-        told[3] += self._sum(state, SPEED_NORTH)
-        told[4] += self._sum(state, SPEED_EAST)
-        told[5] -= self._sum(state, CLIMB)
+        """Return states as reported, the derivative of positions, and cosines of directions."""
+        reported = state[:_MOVING].copy()
+        reported[3] += self._sum(state, SPEED_NORTH)
+        reported[4] += self._sum(state, SPEED_EAST)
+        reported[5] -= self._sum(state, CLIMB)
         height = self._sum(state, HEIGHT)
-        told[0] += self._sum(state, NORTH) + self.age_s * (told[3] - state[3])
-        told[1] += self._sum(state, EAST) + self.age_s * (told[4] - state[4])
-        told[2] += self.age_s * (told[5] - state[5]) - np.where(self.at_range, 0.0, height)
-        by_place = np.zeros((3, 3, state.shape[1]))
+        reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
+        reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
+        reported[2] += self.age_s * (reported[5] - state[5]) - np.where(self.at_range, 0.0, height)
+        by_position = np.zeros((3, 3, state.shape[1]))
         for i in range(3):
-            by_place[i, i] = 1.0
-        x, y, z = away = told[:3] - pose.position_m
+            by_position[i, i] = 1.0
+        x, y, z = away = reported[:3] - pose.position_m
         ground = np.hypot(x, y)
         far = np.maximum(np.sqrt(ground**2 + z**2), 1.0)
         if not self.at_range.any():
             safe = np.maximum(ground, _LEVEL * far)
-            return told, by_place, (x / safe, y / safe, safe, -z, far)
+            return reported, by_position, (x / safe, y / safe, safe, -z, far)
         # In a cylinder about the vertical: a bearing turns, a height leaves the range as it is.
         up = -z + np.where(self.at_range, height, 0.0)
         distance = np.maximum(far + self._sum(state, RANGE), 1.0)
@@ -167,36 +167,90 @@ class ToldErrors:
         by_level = (distance / far * away) / level
         by_level[2] += up / level
         by_bearing = np.stack([-y, x, np.zeros_like(x)]) / safe**2
-        moved = np.zeros_like(by_place)
+        moved = np.zeros_like(by_position)
         for j in range(3):
             moved[0, j] = cos * by_level[j] - level * sin * by_bearing[j]
             moved[1, j] = sin * by_level[j] + level * cos * by_bearing[j]
         moved[2, 2] = 1.0
         at = self.at_range
-        told[:3] = np.where(at, turned, told[:3])
-        return told, np.where(at, moved, by_place), (
+        reported[:3] = np.where(at, turned, reported[:3])
+        return reported, np.where(at, moved, by_position), (
             np.where(at, cos, x / safe), np.where(at, sin, y / safe), np.where(at, level, safe),
             np.where(at, up, -z), np.where(at, distance, far),
         )  # fmt: skip
 
     def _effects(self, cylinder: tuple[FloatArray, ...]) -> FloatArray:
         cos, sin, level, up, distance = cylinder
-        found = np.zeros((_MOVING, len(self.ways), len(cos)))
+        result = np.zeros((_MOVING, len(self.ways), len(cos)))
         for i, (way, deviation) in enumerate(zip(self.ways, self.deviation, strict=True)):
             if way in (NORTH, EAST):
-                found[way - NORTH, i] = deviation
+                result[way - NORTH, i] = deviation
             elif way in (SPEED_NORTH, SPEED_EAST):
-                found[3 + way - SPEED_NORTH, i] = deviation
-                found[way - SPEED_NORTH, i] = deviation * self.age_s
+                result[3 + way - SPEED_NORTH, i] = deviation
+                result[way - SPEED_NORTH, i] = deviation * self.age_s
             elif way == CLIMB:
-                found[5, i], found[2, i] = -deviation, -deviation * self.age_s
+                result[5, i], result[2, i] = -deviation, -deviation * self.age_s
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
-                found[0, i], found[1, i] = deviation * outward * cos, deviation * outward * sin
-                found[2, i] = -deviation
+                result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin
+                result[2, i] = -deviation
             elif way == BEARING:
-                found[0, i], found[1, i] = -deviation * level * sin, deviation * level * cos
+                result[0, i], result[1, i] = -deviation * level * sin, deviation * level * cos
             else:
                 outward = deviation * distance / level
-                found[0, i], found[1, i] = outward * cos, outward * sin
-        return found
+                result[0, i], result[1, i] = outward * cos, outward * sin
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Ages:
+    """How old reported positions and velocities are, (n,) each, s; 0 where not reported."""
+
+    position: FloatArray
+    velocity: FloatArray
+    since: FloatArray  # Since the track was last updated: what was new before is in its state
+
+    def errors(self, model: Motion, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return covariances of reported position and velocity, and of the state with it.
+
+        Both are (6, 6, n), in m and m/s; of the second one rows are the state's.
+        """
+        own = model.model if isinstance(model, MotionWithErrors) else model
+        age, now = self.position, self.velocity
+        both = np.minimum(age, now)
+        then, reported, common = (own.noise(t) for t in (age, now, both))
+        held, gained = (own.noise(np.minimum(self.since, t)) for t in (age, now))
+        error, shared = np.zeros((6, 6, len(age))), np.zeros((6, 6, len(age)))
+        for i in range(3):
+            v = i + 3
+            error[i, i] = then[i, i] - 2.0 * age * (then[i, v] - common[i, v])
+            error[i, i] += age * age * (then[v, v] + reported[v, v] - 2.0 * common[v, v])
+            error[i, v] = common[i, v] - age * (common[v, v] - reported[v, v])
+            error[v, i], error[v, v] = error[i, v], reported[v, v]
+            shared[i, i] = age * (held[i, v] - gained[i, v]) - held[i, i]
+            shared[v, i] = age * (held[v, v] - gained[v, v]) - held[i, v]
+            shared[i, v], shared[v, v] = -gained[i, v], -gained[v, v]
+        if not isinstance(own, ConstantVelocity):
+            # By how much the model itself has it change: that is not carried back.
+            changed = model.move(state, -now)[3:6] - state[3:6]
+            for i in range(3):
+                error[i, i] += (age * changed[i]) ** 2
+                error[i + 3, i + 3] += changed[i] ** 2
+        return error, shared
+
+    def added(self, moments: Moments, model: Motion, state: FloatArray) -> Moments:
+        """Return what is expected of measurements, with what ages add to it."""
+        error, shared = self.errors(model, state)
+        slope = np.ascontiguousarray(moments.jacobian[:, :6])
+        known = slope.shape[1]
+        new = product_transposed(product(slope, error[:known, :known]), slope)
+        with_state = product_transposed(shared[:, :known], slope)  # (6, m, n)
+        both = product(slope, with_state[:known])
+        cross = moments.cross.copy()
+        cross[:6] += with_state
+        own = new + both.swapaxes(0, 1)
+        return replace(
+            moments, total=moments.total + own + both, cross=cross,
+            left_over=own if moments.left_over is None else moments.left_over + own,
+            shared=with_state.swapaxes(0, 1),
+        )  # fmt: skip

@@ -53,8 +53,8 @@ def intersected(
         weight = best_weight(eigenvalues, cost, 1 if rule == "determinant" else 2)
         share = 1.0 - weight
     spread = 1.0 / (weight + share * eigenvalues)
-    found = symmetric(product_transposed(turned * spread, turned))
-    return share * times(found, pull), found, weight
+    result = symmetric(product_transposed(turned * spread, turned))
+    return share * times(result, pull), result, weight
 
 
 def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatArray:

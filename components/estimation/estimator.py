@@ -20,7 +20,7 @@ from components.estimation.batched import (
     sum_of,
     symmetric,
 )
-from components.estimation.carried_errors import MotionWithErrors, ToldErrors
+from components.estimation.carried_errors import MotionWithErrors, ReportedErrors
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import (
     Innovation,
@@ -102,7 +102,7 @@ class PairMeasurement:
 class Estimator(Protocol):
     """A filter over many tracks; a subclass gives `models`, `predict` and `expect`.
 
-    Every operation is an elementwise one over tracks, so that a track's result is the same to the
+    Every operation is an elementwise one over tracks, so that a track's one is the same to the
     bit however many others are computed with it (`components.estimation.batched`).
     """
 
@@ -125,7 +125,11 @@ class Estimator(Protocol):
         return self
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what every model expects to be measured of predicted tracks.
 
@@ -229,10 +233,14 @@ class ExtendedKalmanFilter(SingleModelFilter):
         return Estimates([state], [covariance], tracks.weights)
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what is expected to be measured."""
-        how = linearised if told is None else told.linearised
+        how = linearised if reported is None else reported.linearised
         seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
 
@@ -246,12 +254,12 @@ def pair_measurement(
     weights: FloatArray,
 ) -> PairMeasurement:
     """Return what every model says of pairs."""
-    innovations = [found.innovation(variance, track) for found in moments]
-    residuals = [residual(measured, found.expected) for found in innovations]
+    innovations = [one.innovation(variance, track) for one in moments]
+    residuals = [residual(measured, one.expected) for one in innovations]
     distances = [distance_squared(i.root, r) for i, r in zip(innovations, residuals, strict=True)]
     likelihoods = np.empty((len(innovations), len(track)))
-    for i, (found, apart) in enumerate(zip(innovations, distances, strict=True)):
-        likelihoods[i] = log_likelihood(found, apart)
+    for i, (one, apart) in enumerate(zip(innovations, distances, strict=True)):
+        likelihoods[i] = log_likelihood(one, apart)
     distance = distances[0]
     for other in distances[1:]:
         distance = np.minimum(distance, other)
@@ -262,12 +270,12 @@ def pair_measurement(
         for i in range(len(spread)):
             spread[i] += selected(weight * expected.total[i, i], track)
     new = variance_of_what_is_new(variance, common, spread)
-    learning = [found.innovation(new, track) for found in moments]
+    learning = [one.innovation(new, track) for one in moments]
     odds = None
     if len(learning) > 1:  # the odds of a single model are known
         odds = np.empty_like(likelihoods)
-        for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
-            odds[i] = log_likelihood(found, distance_squared(found.root, apart))
+        for i, (one, apart) in enumerate(zip(learning, residuals, strict=True)):
+            odds[i] = log_likelihood(one, distance_squared(one.root, apart))
     return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
 
@@ -280,8 +288,8 @@ def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntAr
     for weight, apart in zip(weights[1:], residuals[1:], strict=True):
         mean = mean + weight * apart
     spread = np.zeros((len(mean), *mean.shape))
-    for weight, apart, found in zip(weights, residuals, pairs.innovations, strict=True):
-        root, off = selected(found.root, which), apart - mean
+    for weight, apart, one in zip(weights, residuals, pairs.innovations, strict=True):
+        root, off = selected(one.root, which), apart - mean
         spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
     return distance_squared(cholesky(spread), mean)
 

@@ -64,7 +64,7 @@ def vectors_in_frame(
 
 
 def _along_others(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
-    """Return vectors along new axes, of those along old ones, both told in the Earth's axes."""
+    """Return vectors along new axes, of those along old ones, both in the Earth's axes."""
     in_space = sum(v * axis for v, axis in zip(vector, old, strict=True))
     return np.array([dot(in_space, axis) for axis in new])
 

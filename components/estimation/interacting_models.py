@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from components.estimation.batched import product, sum_of, symmetric
-from components.estimation.carried_errors import ToldErrors
+from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import LEAST, Estimates, Estimator
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -65,11 +65,15 @@ class InteractingMultipleModels(Estimator):
         return replace(self, filters=tuple(one.carrying(lasts_s) for one in self.filters))
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what every model expects to be measured."""
         return [
-            one.expect(kind, Estimates([x], [p], tracks.weights), pose, told)[0]
+            one.expect(kind, Estimates([x], [p], tracks.weights), pose, reported)[0]
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
         ]
 

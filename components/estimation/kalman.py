@@ -101,41 +101,41 @@ def innovation(
 
 
 def updated(
-    state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
+    state: FloatArray, covariance: FloatArray, innovation: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return state and covariance after a measurement, in Joseph form."""
     count = state.shape[1]
     if count <= _TOGETHER:
-        return _updated(state, covariance, found, residual)
+        return _updated(state, covariance, innovation, residual)
     moved, spread = np.empty_like(state), np.empty_like(covariance)
     for first in range(0, count, _TOGETHER):
         part = slice(first, first + _TOGETHER)
         moved[:, part], spread[:, :, part] = _updated(
-            state[:, part], covariance[:, :, part], found.take(part), residual[:, part]
+            state[:, part], covariance[:, :, part], innovation.take(part), residual[:, part]
         )
     return moved, spread
 
 
 def _updated(
-    state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
+    state: FloatArray, covariance: FloatArray, innovation: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     # With S = root · rootᵀ: K r = (root⁻¹ (P Hᵀ)ᵀ)ᵀ (root⁻¹ r).
-    weighted = solve_lower(found.root, found.cross.swapaxes(0, 1))
-    apart = solve_lower(found.root, residual)
+    weighted = solve_lower(innovation.root, innovation.cross.swapaxes(0, 1))
+    apart = solve_lower(innovation.root, residual)
     moved = state + weighted[0] * apart[0]
     for k in range(1, len(apart)):
         moved += weighted[k] * apart[k]
-    return moved, joseph(covariance, weighted, found)
+    return moved, joseph(covariance, weighted, innovation)
 
 
-def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> FloatArray:
+def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation) -> FloatArray:
     """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n), symmetric to the bit.
 
-    For the components that are measured (the first of `found.jacobian`) it is worked out as
+    For the components that are measured (the first of `innovation.jacobian`) it is worked out as
     D - (D Hᵀ - K R) Kᵀ with D = P - K S Kᵀ, which is the same whatever the gain's rounding. What
     is left over, of and with the others, is P - K S Kᵀ in either form: H has no columns there.
     """
-    known, size = found.jacobian.shape[1], len(covariance)
+    known, size = innovation.jacobian.shape[1], len(covariance)
     whole = np.empty(covariance.shape)
     if known < size:
         _less_squares(covariance, weighted, slice(known, size), slice(0, size), whole)
@@ -143,16 +143,16 @@ def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> F
     measured = slice(0, known)
     block = whole[measured, measured]
     _less_squares(covariance, weighted, measured, measured, whole)
-    gain = solve_upper(found.root, weighted[:, measured])
-    if found.spread.ndim == 2:
-        own = gain * found.spread[:, np.newaxis]
+    gain = solve_upper(innovation.root, weighted[:, measured])
+    if innovation.spread.ndim == 2:
+        own = gain * innovation.spread[:, np.newaxis]
     else:
-        own = product(found.spread, gain)
-    error = product(found.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
-    if found.shared is not None:
+        own = product(innovation.spread, gain)
+    error = product(innovation.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
+    if innovation.shared is not None:
         # With errors that the state shares, S = H P Hᵀ + R + H M + (H M)ᵀ and K S = P Hᵀ + M:
         # D Hᵀ = K (R + H M) - M, and `spread` is R + (H M)ᵀ.
-        error[:, : found.shared.shape[1]] += found.shared
+        error[:, : innovation.shared.shape[1]] += innovation.shared
     term = np.empty_like(block)
     for k in range(len(gain)):
         np.multiply(error[k, :, np.newaxis], gain[k, np.newaxis], out=term)
@@ -197,7 +197,7 @@ def variance_of_what_is_new(
     return np.where(common > 0.0, np.clip(new, variance, _MOST * variance), variance)
 
 
-def log_likelihood(found: Innovation, distance: FloatArray) -> FloatArray:
+def log_likelihood(innovation: Innovation, distance: FloatArray) -> FloatArray:
     """Return the logarithm of the density of measurements at squared distances, (n,)."""
-    many = len(found.root)
-    return -0.5 * (distance + log_determinant(found.root) + many * np.log(2.0 * np.pi))
+    many = len(innovation.root)
+    return -0.5 * (distance + log_determinant(innovation.root) + many * np.log(2.0 * np.pi))

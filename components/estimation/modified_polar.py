@@ -38,7 +38,7 @@ _UPRIGHT = 0.1
 def moved_in_polar(
     before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a correction that was found in Cartesian coordinates as one in modified polar ones."""
+    """Return a correction in Cartesian coordinates as one in modified polar ones."""
     axes, distance, by_range, to_polar = _polar(before, sensor_m)
     change = times(to_polar, after[:6] - before[:6])
     return _moved(axes, distance, by_range, to_polar, change, after, covariance, sensor_m)
@@ -191,17 +191,17 @@ def _to_polar(axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
     across it, divided by the range.
     """
     line, across, third = axes
-    found = np.zeros((6, 6, len(distance)))
+    result = np.zeros((6, 6, len(distance)))
     inverse = 1.0 / distance
-    found[0, :3], found[1, :3] = across * inverse, third * inverse
-    found[2, :3] = -line * (inverse * inverse)
+    result[0, :3], result[1, :3] = across * inverse, third * inverse
+    result[2, :3] = -line * (inverse * inverse)
     along, side, up = (dot(axis, velocity) for axis in axes)
-    found[3, :3] = along * found[2, :3] + inverse * (side * found[0, :3] + up * found[1, :3])
-    found[4, :3] = side * found[2, :3] - inverse * along * found[0, :3]
-    found[5, :3] = up * found[2, :3] - inverse * along * found[1, :3]
+    result[3, :3] = along * result[2, :3] + inverse * (side * result[0, :3] + up * result[1, :3])
+    result[4, :3] = side * result[2, :3] - inverse * along * result[0, :3]
+    result[5, :3] = up * result[2, :3] - inverse * along * result[1, :3]
     for i, axis in enumerate(axes):
-        found[3 + i, 3:] = axis * inverse
-    return found
+        result[3 + i, 3:] = axis * inverse
+    return result
 
 
 def _turned(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[FloatArray]:
@@ -222,17 +222,17 @@ def _from_polar(
     line, across, third = axes
     along, side, up = by_range
     distance, cos, sin = 1.0 / inverse, np.cos(other), np.sin(other)
-    found = np.zeros((6, 6, len(inverse)))
-    found[:3, 0], found[:3, 1] = distance * cos * across, distance * third
-    found[:3, 2] = -distance * distance * line
-    found[3:, 0] = distance * (
+    result = np.zeros((6, 6, len(inverse)))
+    result[:3, 0], result[:3, 1] = distance * cos * across, distance * third
+    result[:3, 2] = -distance * distance * line
+    result[3:, 0] = distance * (
         (along * cos - up * sin) * across + side * (sin * third - cos * line)
     )
-    found[3:, 1] = distance * (along * third - up * line)
-    found[3:, 2] = -distance * distance * (along * line + side * across + up * third)
+    result[3:, 1] = distance * (along * third - up * line)
+    result[3:, 2] = -distance * distance * (along * line + side * across + up * third)
     for i, axis in enumerate(axes):
-        found[3:, 3 + i] = distance * axis
-    return found
+        result[3:, 3 + i] = distance * axis
+    return result
 
 
 def _cross(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from components.estimation.batched import (
     solve_upper,
     symmetric,
 )
-from components.estimation.carried_errors import ToldErrors
+from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import Estimates, SingleModelFilter
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -67,11 +67,15 @@ class UnscentedKalmanFilter(SingleModelFilter):
         return Estimates([state], [covariance], weights)
 
     def expect(
-        self, kind: Kind, tracks: Estimates, pose: SensorPose, told: ToldErrors | None = None
+        self,
+        kind: Kind,
+        tracks: Estimates,
+        pose: SensorPose,
+        reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what is expected to be measured."""
         (state,), (covariance,), _ = tracks
-        return [unscented_moments(kind, state, covariance, pose, self.sigma, told)]
+        return [unscented_moments(kind, state, covariance, pose, self.sigma, reported)]
 
 
 def predict_unscented(
@@ -99,7 +103,7 @@ def unscented_moments(
     covariance: FloatArray,
     pose: SensorPose,
     sigma: SigmaPoints,
-    told: ToldErrors | None = None,
+    reported: ReportedErrors | None = None,
 ) -> Moments:
     """Return the moments of what sigma points would be measured as.
 
@@ -115,7 +119,7 @@ def unscented_moments(
         np.tile(pose.to_body, many),
         None if pose.velocity_m_s is None else np.tile(pose.velocity_m_s, many),
     )
-    how = expected if told is None else told.repeated(many).expected
+    how = expected if reported is None else reported.repeated(many).expected
     seen = how(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
     mean = _weighted(seen, of_mean)
     for angle in range(2):

@@ -283,11 +283,11 @@ def latest_in_gate(
     row = np.repeat(np.arange(len(counts)), counts)
     entry_key = arrivals.message.target * span + came[row]
     order = np.argsort(entry_key, kind="stable")
-    place = np.searchsorted(entry_key[order], targets * span + now, side="right") - 1
-    entry = order[np.maximum(place, 0)]
+    index = np.searchsorted(entry_key[order], targets * span + now, side="right") - 1
+    entry = order[np.maximum(index, 0)]
     of = row[entry]
     fits = (
-        (place >= 0)
+        (index >= 0)
         & (arrivals.message.target[entry] == targets)
         & (arrivals.message.run[of] == asked.run)
         & (asked.tick - arrivals.tick[of] <= gate_ticks)

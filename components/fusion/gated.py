@@ -122,8 +122,8 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
     # ones are told apart by what was measured of them, as long as that differs.
     keys = (candidate, range_m, elevation, azimuth, apart_m, apart_rad, late, which)
     chosen = inside[np.lexsort([key[inside] for key in keys])]
-    anchor, place = np.unique(which[chosen], return_index=True)
-    best[anchor] = candidate[chosen[place]]
+    anchor, index = np.unique(which[chosen], return_index=True)
+    best[anchor] = candidate[chosen[index]]
     return best
 
 
@@ -232,7 +232,7 @@ class Gated(Fusion):
         target = np.full(len(next(iter(entries.values()))), FALSE_TARGET, dtype=np.int64)
         for name in reversed(order):
             entry = entries[name]
-            found = np.flatnonzero(entry >= 0)
-            seen = arrivals[name].message.target[entry[found]]
-            target[found[seen >= 0]] = seen[seen >= 0]
+            some = np.flatnonzero(entry >= 0)
+            seen = arrivals[name].message.target[entry[some]]
+            target[some[seen >= 0]] = seen[seen >= 0]
         return target

@@ -86,15 +86,15 @@ class PickBest(Fusion):
         self, arrivals: Mapping[str, Arrivals], wake: Wake
     ) -> dict[str, tuple[IntArray, IntArray]]:
         """Return row and entry of the false alarms that came now, by sensor in order of rank."""
-        found = {}
+        result = {}
         for name in (name for name in self.sensors if name in arrivals):
             new = arrivals[name]
             at, now = positions_among(wake.instants, new.instants)
             row = new.message.row_of_entries
             false = new.message.target == FALSE_TARGET
             entry = np.flatnonzero(false if now is None else false & now[row])
-            found[name] = at[row[entry]], entry
-        return found
+            result[name] = at[row[entry]], entry
+        return result
 
 
 def _true_entries(new: Arrivals) -> IntArray | None:

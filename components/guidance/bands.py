@@ -256,5 +256,5 @@ class _Painter:
         if ways:
             layers.append(("RECOVERY", ways, False))
         line = painted(layers, least, most)
-        found = Guidance(own_value, line, recovery, line)
-        return found._replace(bands=named_recovery(line)) if found.recovers else found
+        result = Guidance(own_value, line, recovery, line)
+        return result._replace(bands=named_recovery(line)) if result.recovers else result

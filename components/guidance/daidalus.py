@@ -87,7 +87,7 @@ def bands_around(
 
     Parameters are those of `changes_out`.
     """
-    found: list[Guidance | None] = [None] * len(rows)
+    result: list[Guidance | None] = [None] * len(rows)
     own = np.array([alerts.own_motion[name][rows] for name in _OWN]).reshape(len(_OWN), -1)
     known = np.flatnonzero(np.isfinite(own).all(axis=0))
     first = alerts.offsets[np.asarray(rows, dtype=np.int64)]
@@ -100,9 +100,9 @@ def bands_around(
             _intruder(alerts, first[alike] + i, state, configuration, alerter) for i in range(count)
         ]
         every = guidance_of_many(kind_name, configuration, state, intruders)
-        for place, guided in zip(alike.tolist(), every, strict=True):
-            found[place] = guided
-    return found
+        for index, guided in zip(alike.tolist(), every, strict=True):
+            result[index] = guided
+    return result
 
 
 def _intruder(
@@ -123,14 +123,14 @@ def _intruder(
     return GuidedIntruders(state, alerter, early, bounds=bounds)
 
 
-def _changes(found: Guidance, region: str, cyclic: bool) -> Changes | None:
-    way = resolution(found.bands, found.own_value, region, cyclic)
+def _changes(guided: Guidance, region: str, cyclic: bool) -> Changes | None:
+    way = resolution(guided.bands, guided.own_value, region, cyclic)
     if way is None:
         return None
     if not cyclic:
-        return way.low - found.own_value, way.high - found.own_value
-    low = -((found.own_value - way.low) % FULL_TURN) if math.isfinite(way.low) else -math.inf
-    high = (way.high - found.own_value) % FULL_TURN if math.isfinite(way.high) else math.inf
+        return way.low - guided.own_value, way.high - guided.own_value
+    low = -((guided.own_value - way.low) % FULL_TURN) if math.isfinite(way.low) else -math.inf
+    high = (way.high - guided.own_value) % FULL_TURN if math.isfinite(way.high) else math.inf
     return low, high
 
 
@@ -186,21 +186,21 @@ class DaidalusGuidance(Component):
         if alerts is None:
             return None
         rows = np.flatnonzero(alerts.highest() >= self.p.level).tolist()
-        found: list[tuple[int, int, int, float, float]] = []
+        result: list[tuple[int, int, int, float, float]] = []
         for number, kind in enumerate(BAND_KINDS):
             if kind not in self.p.kinds:
                 continue
             every = bands_around(_NAMES[kind], self._configuration, self._alerter, alerts, rows)
-            for place, guided in enumerate(every):
-                found += [
-                    (place, number, BAND_REGIONS.index(band.region), band.low, band.high)
+            for index, guided in enumerate(every):
+                result += [
+                    (index, number, BAND_REGIONS.index(band.region), band.low, band.high)
                     for band in (() if guided is None else guided.bands)
                     if band.region != "NONE"
                 ]
-        if not found:
+        if not result:
             return None
-        found.sort(key=lambda one: one[0])
-        table = np.array(found)
+        result.sort(key=lambda one: one[0])
+        table = np.array(result)
         line, code = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
         ends = [
             np.where(code == number, table[:, k], math.nan)

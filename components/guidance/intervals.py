@@ -57,14 +57,14 @@ def clear_intervals(
 ) -> list[Interval]:
     """Return the intervals of values that are clear, within the limits."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], clear.astype(int), [0]])))
-    found = []
+    result = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         if end - first >= 2:
-            found.append(Interval(float(values[first]), float(values[end - 1])))
+            result.append(Interval(float(values[first]), float(values[end - 1])))
     if not cyclic:
-        clipped = [Interval(max(low, least), min(high, most)) for low, high in found]
+        clipped = [Interval(max(low, least), min(high, most)) for low, high in result]
         return [one for one in clipped if one.low < one.high]
-    return [part for one in found for part in _wrapped(one)]
+    return [part for one in result for part in _wrapped(one)]
 
 
 def _wrapped(interval: Interval) -> list[Interval]:
@@ -95,7 +95,7 @@ def painted(
     for _, intervals, _ in layers:
         for interval in intervals:
             for value in interval:
-                if not any(same_place(value, place) for place in places):
+                if not any(same_place(value, known) for known in places):
                     places.append(value)
     places.sort()
     bands = []
@@ -118,10 +118,10 @@ def named_recovery(bands: list[Band]) -> list[Band]:
 
 def joined(bands: Iterable[Band]) -> list[Band]:
     """Return bands from the lowest to the highest value with equal neighbours as one."""
-    found: list[Band] = []
+    result: list[Band] = []
     for band in bands:
-        if found and found[-1].region == band.region:
-            found[-1] = Band(found[-1].low, band.high, band.region)
+        if result and result[-1].region == band.region:
+            result[-1] = Band(result[-1].low, band.high, band.region)
         else:
-            found.append(band)
-    return found
+            result.append(band)
+    return result

@@ -68,15 +68,15 @@ class BandMemory:
                 (self._first(a), self._first(b)) for a, b in zip(left, right, strict=True)
             ]
         self._meet(places, left, right)
-        found: list[int] = []
+        result: list[int] = []
         for queues, a, b in zip(self._queues, left, right, strict=True):
             for queue, colour in zip(queues, (a, b), strict=True):
                 queue.append(colour)
                 del queue[0]
-            found.append(sorted(queues[1])[-self._m])
+            result.append(sorted(queues[1])[-self._m])
         made = joined(
             Band(low, high, REGIONS[max(colour, 0)])
-            for low, high, colour in zip(places[:-1], places[1:], found[:-1], strict=True)
+            for low, high, colour in zip(places[:-1], places[1:], result[:-1], strict=True)
         )
         last = len(self._places) - 1
         kept = [
@@ -164,7 +164,7 @@ def _painted_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
     places = [line[0].low, *(band.high for band in line)]
     least, most = places[0], places[-1]
     for value in (edge for span in spans for edge in span):
-        if least < value < most and not any(same_place(place, value) for place in places):
+        if least < value < most and not any(same_place(known, value) for known in places):
             places.append(value)
     places.sort()
     made = []
@@ -208,7 +208,7 @@ class ResolutionMemory:
     def step(
         self,
         now_s: float,
-        found: Resolution | None,
+        way: Resolution | None,
         bands: list[Band],
         own_value: float,
         recovery: Recovery | None,
@@ -219,8 +219,8 @@ class ResolutionMemory:
             self._clear()
         self._last_s = now_s
         if self._hysteresis_s == 0.0:
-            return found
-        raw = [math.nan, math.nan] if found is None else [found.low, found.high]
+            return way
+        raw = [math.nan, math.nan] if way is None else [way.low, way.high]
         shrinks = -1 if recovery is None else recovery.shrinks
         if self._since_s is None or now_s <= self._since_s or self._near == 0.0:
             self._shown, self._shrinks, self._since_s = list(raw), [shrinks, shrinks], None
@@ -231,7 +231,7 @@ class ResolutionMemory:
                 if not self._keeps(side, raw[side], bands, own_value, holds):
                     self._shown[side], self._shrinks[side] = raw[side], shrinks
         self._prefer(now_s, raw, own_value, shrinks)
-        if found is None:
+        if way is None:
             return None
         return Resolution(self._shown[_LOW], self._shown[_HIGH], self._prefers_high)
 
@@ -324,10 +324,10 @@ class GuidanceMemory:
         self._bands = BandMemory(configuration, self._cyclic)
         self._resolutions = ResolutionMemory(configuration, kind_name)
 
-    def step(self, now_s: float, found: Guidance) -> Remembered:
+    def step(self, now_s: float, guided: Guidance) -> Remembered:
         """Take in the guidance of one instant, later than the last, and return what is shown."""
-        own_value, recovery = found.own_value, found.recovery
-        bands = self._bands.step(now_s, found.line, own_value, recovery)
+        own_value, recovery = guided.own_value, guided.recovery
+        bands = self._bands.step(now_s, guided.line, own_value, recovery)
         way = resolution(bands, own_value, self._corrective, self._cyclic)
         shown = self._resolutions.step(now_s, way, bands, own_value, recovery)
         return Remembered(bands, shown)

@@ -44,11 +44,11 @@ def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> S
     """
     keys = "min_horizontal_recovery", "min_vertical_recovery"
     given = (configuration[key] for key in keys)
-    found = [
+    result = [
         np.full(np.shape(altitude_m), size) if size > 0.0 else table
         for size, table in zip(given, recovery_sizes_m(altitude_m), strict=True)
     ]
-    return found[0], found[1]
+    return result[0], result[1]
 
 
 def _of_row(sizes: Sizes, row: int) -> tuple[float, float]:
@@ -78,7 +78,7 @@ class _Search:
         self._sizes = recovery_cylinder(configuration, own.up_m)
         regions = Regions(configuration, self._kind, own, intruders)
         _, self._concerned = regions.concerned(configuration["corrective_region"])
-        self._volumes = [regions.conflicts(one.place, one.level) for one in self._concerned]
+        self._volumes = [regions.conflicts(one.intruder, one.level) for one in self._concerned]
         # Cylinder about each intruder that counts, of the sizes that are tried.
         self._cylinders: list[Conflicts] = []
 
@@ -87,11 +87,11 @@ class _Search:
         values = self._configuration
         nmac = values["horizontal_nmac"], values["vertical_nmac"]
         count = len(self._kind.own_value)
-        found: list[tuple[Recovery, list[Interval]] | None] = [None] * count
+        result: list[tuple[Recovery, list[Interval]] | None] = [None] * count
         self._try((np.full(count, nmac[0]), np.full(count, nmac[1])))
         on = self._leads(self._clear_of_cylinder())
         for row in np.flatnonzero(~on).tolist():
-            found[row] = Recovery(-math.inf, nmac, 0), []
+            result[row] = Recovery(-math.inf, nmac, 0), []
         sizes = self._sizes
         shrinks = 0
         while on.any():
@@ -103,7 +103,7 @@ class _Search:
                 leads &= self._leads(clear) & (time_s <= self._latest_s)
                 for row in np.flatnonzero(leads).tolist():
                     recovery = Recovery(float(time_s[row]), _of_row(sizes, row), shrinks)
-                    found[row] = recovery, intervals_of(self._kind, row, clear)
+                    result[row] = recovery, intervals_of(self._kind, row, clear)
                 on = on & ~leads
             ends = on
             if values["ca_bands"]:
@@ -116,15 +116,15 @@ class _Search:
                 # That of a collision is not looked at again: there is neither a time nor a way.
                 ends = on & (sizes[0] <= nmac[0]) & (sizes[1] <= nmac[1])
             for row in np.flatnonzero(ends).tolist():
-                found[row] = Recovery(-math.inf, _of_row(sizes, row), shrinks), []
+                result[row] = Recovery(-math.inf, _of_row(sizes, row), shrinks), []
             on = on & ~ends
-        return [one for one in found if one is not None]
+        return [one for one in result if one is not None]
 
     def _try(self, sizes: Sizes) -> None:
         """Look at cylinders of sizes (r,)."""
         detector = Detector(cylinder_m=(sizes[0][:, np.newaxis], sizes[1][:, np.newaxis]))
         self._cylinders = [
-            self._kind.against(self._intruders[one.place].state.columns(), detector)
+            self._kind.against(self._intruders[one.intruder].state.columns(), detector)
             for one in self._concerned
         ]
 

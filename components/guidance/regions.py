@@ -51,7 +51,7 @@ class GuidedIntruders(NamedTuple):
 class Concerned(NamedTuple):
     """An intruder whose volume of a region counts, of some ownships."""
 
-    place: int  # Which of the intruders
+    intruder: int  # Index of the intruder
     level: Level  # Whose volume
     of_whom: BoolArray  # (n,) of bool
     horizon_s: FloatArray  # (n, 1): how long after a manoeuvre
@@ -70,7 +70,7 @@ class Regions:
         self._configuration, self._kind, self._own = configuration, kind, own
         self._intruders = intruders
         self._lookahead_s = configuration["lookahead_time"]
-        # Levels often share a volume; what it is met by is found once.
+        # Levels often share a volume; when it is met is worked out once.
         self._conflicts: dict[_Key, Conflicts] = {}
         self._begins: dict[_Key, FloatArray] = {}
         self._concerned: dict[str, tuple[BoolArray, list[Concerned]]] = {}
@@ -96,7 +96,7 @@ class Regions:
         known, concerned = self.concerned(region)
         clear = self._kind.there.copy()
         for one in concerned:
-            unsafe = self.conflicts(one.place, one.level).unsafe(0.0, one.horizon_s)
+            unsafe = self.conflicts(one.intruder, one.level).unsafe(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return known, clear
 
@@ -107,10 +107,10 @@ class Regions:
     def inside_corrective(self) -> BoolArray:
         """Tell who is inside the corrective volume of an intruder now."""
         inside = np.zeros(len(self._own.up_m), dtype=bool)
-        for place, intruder in enumerate(self._intruders):
+        for index, intruder in enumerate(self._intruders):
             level = self._configuration.corrective_level(intruder.alerter)
             if level is not None:
-                inside |= (self._begin_s(place, level) == 0.0) & intruder.is_there()
+                inside |= (self._begin_s(index, level) == 0.0) & intruder.is_there()
         return inside
 
     def _begin_s(self, place: int, level: Level) -> FloatArray:
@@ -127,25 +127,25 @@ class Regions:
 
     def _find_concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
         known = np.zeros(len(self._own.up_m), dtype=bool)
-        found = []
-        for place, intruder in enumerate(self._intruders):
+        result = []
+        for index, intruder in enumerate(self._intruders):
             numbered = _level_of(intruder.alerter, region)
             if numbered is None:
                 continue
             number, level = numbered
             there = intruder.is_there()
             known |= there
-            begin_s = self._begin_s(place, level)
+            begin_s = self._begin_s(index, level)
             early = intruder.early_level == number
             due_s = np.where(early, level.early_alerting_time_s, level.alerting_time_s)
             ahead = (begin_s == 0.0) | surely_less(begin_s, due_s)
             soon_s = min(level.alerting_time_s, self._lookahead_s)
             horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
-            met = self.conflicts(place, level).soon(0.0, horizon_s).any(axis=1)
+            met = self.conflicts(index, level).soon(0.0, horizon_s).any(axis=1)
             of_whom = there & (ahead | met)
             if of_whom.any():
-                found.append(Concerned(place, level, of_whom, horizon_s))
-        return known, found
+                result.append(Concerned(index, level, of_whom, horizon_s))
+        return known, result
 
 
 def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:

@@ -55,5 +55,5 @@ class Detector:
 
 def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
     """Tell whether a volume is met in part of the time that was looked at; never in none."""
-    found = surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
-    return np.asarray(found & (np.asarray(begin_s) < end_s))
+    result = surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
+    return np.asarray(result & (np.asarray(begin_s) < end_s))

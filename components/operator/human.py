@@ -76,13 +76,13 @@ class Console(Component):
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
         """Send what was decided."""
         came = list(wake.arrivals("alerts"))
-        place = 0
+        index = 0
         made = []
         for tick, decision in self.due(wake):
-            place = self._take_alerts(came, place, tick)
+            index = self._take_alerts(came, index, tick)
             taken = self._commanded(tick / self.context.ticks_per_s, decision)
             made.append((tick, decision, self._alerts.get(decision.target), taken))
-        self._take_alerts(came, place, None)
+        self._take_alerts(came, index, None)
         if not made:
             return None
         sent = self._messages(made)
@@ -117,9 +117,9 @@ class Console(Component):
             rows = len(alerts)
             if until is not None:
                 rows = int(np.searchsorted(arrived.tick, until, side="right"))
-            for place in range(row, rows):
-                entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-                self._alerts = self._after(alerts, entries, int(arrived.tick[place]))
+            for index in range(row, rows):
+                entries = slice(int(alerts.offsets[index]), int(alerts.offsets[index + 1]))
+                self._alerts = self._after(alerts, entries, int(arrived.tick[index]))
             row = max(row, rows)
         return row
 
@@ -127,10 +127,10 @@ class Console(Component):
         """Return the alerts that are on once a row of levels has come."""
         now = {}
         level, contacts = alerts.level[entries], alerts.contacts()[entries]
-        for place in np.flatnonzero(level > 0).tolist():
-            name = contact_name(alerts.roster.names, int(contacts[place])) or ""
+        for index in np.flatnonzero(level > 0).tolist():
+            name = contact_name(alerts.roster.names, int(contacts[index])) or ""
             began = self._alerts.get(name)
-            now[name] = _Alert(int(level[place]), tick if began is None else began.tick)
+            now[name] = _Alert(int(level[index]), tick if began is None else began.tick)
         return now
 
     def _messages(
@@ -139,7 +139,7 @@ class Console(Component):
         per_s = self.context.ticks_per_s
         known = dict.fromkeys([*self._targets, *(d.target for _, d, *_ in made if d.target)])
         self._targets = tuple(known)
-        code = {name: place for place, name in enumerate(self._targets)}
+        code = {name: index for index, name in enumerate(self._targets)}
         ticks = np.array([tick for tick, *_ in made], dtype=np.int64)
         began = np.array([math.nan if a is None else a.tick / per_s for _, _, a, _ in made])
         decisions = Decisions(
@@ -205,15 +205,15 @@ class Desk:
     def take(self, time_s: float) -> list[PendingDecision]:
         """Take all that waits, at an instant of the simulation."""
         with self._lock:
-            found, self._waiting = self._waiting, []
-        return found
+            result, self._waiting = self._waiting, []
+        return result
 
     def close(self) -> list[PendingDecision]:
         """Take nothing more; return what was never taken in, and so never acknowledged."""
         with self._lock:
             self._open = False
-            found, self._waiting = self._waiting, []
-        return found
+            result, self._waiting = self._waiting, []
+        return result
 
 
 class HumanParameters(ConsoleParameters):

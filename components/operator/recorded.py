@@ -70,7 +70,7 @@ def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
         rows = _of_parquet(path) if path.suffix == ".parquet" else _of_csv(path)
     except InputFileError as error:
         raise ValueError(f"{path}: {error}") from None
-    found: list[tuple[float, OperatorDecision]] = []
+    result: list[tuple[float, OperatorDecision]] = []
     problems: list[str] = []
     for where, row in rows:
         try:
@@ -78,14 +78,14 @@ def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
         except ValidationError as error:
             problems += [_said(where, problem) for problem in error.errors(include_url=False)]
             continue
-        if found and read.time_s < found[-1][0]:
+        if result and read.time_s < result[-1][0]:
             problems.append(f"{where}: time_s is {read.time_s:g}: it must not go back")
-        found.append((read.time_s, read.decided()))
+        result.append((read.time_s, read.decided()))
     if problems:
         more = len(problems) - _MOST_PROBLEMS
         said = problems[:_MOST_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
         raise ValueError(f"{path}: " + "; ".join(said))
-    return found
+    return result
 
 
 def _of_csv(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
@@ -143,10 +143,10 @@ class RecordedOperator(Console):
     def setup(self) -> None:
         """Read the table."""
         super().setup()
-        found = read_decisions(self.p.decisions)
+        result = read_decisions(self.p.decisions)
         per_s = self.context.ticks_per_s
-        self._ticks = np.array([round(time_s * per_s) for time_s, _ in found], dtype=np.int64)
-        self._decided = tuple(decision for _, decision in found)
+        self._ticks = np.array([round(time_s * per_s) for time_s, _ in result], dtype=np.int64)
+        self._decided = tuple(decision for _, decision in result)
         self._next = 0
 
     def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:

@@ -249,15 +249,15 @@ class Stochastic(Component):
         followed = np.isin(runs, np.union1d(runs[alerted], np.array(busy, dtype=np.int64)))
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
-        for place in np.flatnonzero(followed).tolist():
-            run = int(runs[place])
+        for index in np.flatnonzero(followed).tolist():
+            run = int(runs[index])
             mind = self._minds.get(run, Mind(run))
-            mind, chooses, acts = self._followed(mind, int(wake.ticks[place]), int(highest[place]))
+            mind, chooses, acts = self._followed(mind, int(wake.ticks[index]), int(highest[index]))
             self._minds[run] = mind
             if chooses:
-                choosing.append((place, mind))
+                choosing.append((index, mind))
             if acts:
-                acting.append((place, run))
+                acting.append((index, run))
         return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
 
     def _sent(
@@ -269,14 +269,14 @@ class Stochastic(Component):
         """Return the manoeuvres that begin, by row; what is chosen and not begun is kept."""
         chosen = self._manoeuvres_at(alerts, choosing)
         latest: dict[int, Manoeuvre | None] = {}
-        begins = sorted([(place, 0, mind.run) for place, mind in choosing]
-                        + [(place, 1, run) for place, run in acting])  # fmt: skip
+        begins = sorted([(index, 0, mind.run) for index, mind in choosing]
+                        + [(index, 1, run) for index, run in acting])  # fmt: skip
         sent = {}
-        for place, acts, run in begins:
+        for index, acts, run in begins:
             if not acts:
-                latest[run] = chosen.get(place)
+                latest[run] = chosen.get(index)
             elif (told := latest.get(run, self._minds[run].chosen)) is not None:
-                sent[place] = told
+                sent[index] = told
         for run, told in latest.items():
             self._minds[run] = self._minds[run]._replace(chosen=told)
         return sent
@@ -332,16 +332,18 @@ class Stochastic(Component):
         """Return what operators who act at some rows of the alerts steer, by row."""
         by_turn: dict[int, bool] = {}
         draws: dict[int, Draws | None] = {}
-        for place, mind in acting:
-            by_turn[place], draws[place] = self.p.turn_share >= 0.5, None
+        for index, mind in acting:
+            by_turn[index], draws[index] = self.p.turn_share >= 0.5, None
             if not self.p.deterministic:
-                by_turn[place] = self._draw(mind, self._steering, 0) < self.p.turn_share
-                draws[place] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
-        found: dict[int, Manoeuvre] = {}
+                by_turn[index] = self._draw(mind, self._steering, 0) < self.p.turn_share
+                draws[index] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
+        result: dict[int, Manoeuvre] = {}
         # Who finds no way out by one kind tries the other.
         for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
             for turns in (True, False):
-                rows = [n for n, it in by_turn.items() if n not in found and (it == turns) == first]
+                rows = [
+                    n for n, it in by_turn.items() if n not in result and (it == turns) == first
+                ]
                 if not rows:
                     continue
                 kind = "hdir" if turns else "alt"
@@ -351,12 +353,12 @@ class Stochastic(Component):
                     if changes is not None:
                         change = steering(changes, turns, draws[row], self.p.goes_beyond)
                     if change != 0.0 and turns:
-                        found[row] = self._turn(change, alerts, row)
+                        result[row] = self._turn(change, alerts, row)
                     elif change != 0.0:
-                        found[row] = Manoeuvre(
+                        result[row] = Manoeuvre(
                             climb_m=change, climb_rate_mps=self.p.vertical_rate_mps
                         )
-        return found
+        return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:
         """Return a turn by a change of the track that the ownship has in a row of the alerts."""

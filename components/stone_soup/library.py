@@ -43,8 +43,8 @@ class Repeatable:
             own = object.__getattribute__(thing, "__dict__")
             if "_dsa_des_place" not in own:
                 own["_dsa_des_place"] = next(numbers)
-            found: int = own["_dsa_des_place"]
-            return found
+            result: int = own["_dsa_des_place"]
+            return result
 
         # The global generators are what Stone Soup draws from.
         theirs, pythons = np.random.get_state(), random.getstate()  # noqa: NPY002

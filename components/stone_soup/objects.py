@@ -36,25 +36,25 @@ def instant(time_s: float) -> datetime:
 
 def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> list[StateVector]:
     """Return states of positions and velocities, each (3, n) along north, east, down."""
-    found = np.empty((6, position_ned_m.shape[1]))
+    result = np.empty((6, position_ned_m.shape[1]))
     for part, ned in ((POSITION, position_ned_m), (VELOCITY, velocity_ned_m_s)):
-        found[list(part)] = ned[1], ned[0], -ned[2]
-    return [StateVector(column) for column in found.T]
+        result[list(part)] = ned[1], ned[0], -ned[2]
+    return [StateVector(column) for column in result.T]
 
 
 class Poses:
     """Where sensors are and how they are turned, as measurement models take it."""
 
     def __init__(
-        self, place: SensorPose, mapping: Sequence[int] = POSITION, state_size: int = 6
+        self, pose: SensorPose, mapping: Sequence[int] = POSITION, state_size: int = 6
     ) -> None:
         self._mapping, self._size = tuple(mapping), state_size
-        north, east, down = place.position_m
+        north, east, down = pose.position_m
         self._offset = np.stack([east, north, -down])
-        self._angles = rotation_offsets(place.to_body)
-        moves = np.full_like(place.position_m, np.nan)
-        if place.velocity_m_s is not None:
-            moves = place.velocity_m_s
+        self._angles = rotation_offsets(pose.to_body)
+        moves = np.full_like(pose.position_m, np.nan)
+        if pose.velocity_m_s is not None:
+            moves = pose.velocity_m_s
         self._velocity = np.stack([moves[1], moves[0], -moves[2]])
 
     def position(self, i: int) -> StateVector:
@@ -118,7 +118,7 @@ def detections(
         Azimuth, elevation, range and range rate, NaN where not measured. What follows, such as the
         velocity that a target tells (`Scans.measured`), none of the measurement models has.
     """
-    found = set()
+    result = set()
     for k, i in enumerate(which):
         azimuth, elevation, range_m, rate = measured[:4, k].tolist()
         ranged = range_m == range_m
@@ -137,8 +137,8 @@ def detections(
             metadata=metadata[k],
         )
         one.number = k
-        found.add(one)
-    return found
+        result.add(one)
+    return result
 
 
 # Nearer to straight up or down than this, yaw and roll are one and the same turn.

@@ -298,12 +298,12 @@ class StoneSoupTracker(Component):
         models = Poses(
             poses.take(np.array([look])), self.p.position_mapping, self.p.state_size
         )  # fmt: skip
-        found = detections(
+        result = detections(
             models, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
             [{"sensor": name} for name in names],
         )  # fmt: skip
         with self._repeatable.working():
-            _, tracks = self._tracker.update_tracker(when, found)
+            _, tracks = self._tracker.update_tracker(when, result)
             self._masks.update(zip(names, masks, strict=True))
             return self._follower.after(tracks, time_s, when, self._masks)
 
@@ -356,7 +356,7 @@ class StoneSoupTracker(Component):
             azimuth_variance_rad2=angular[0],
             elevation_variance_rad2=angular[1],
             has_range=ranged,
-            covariance={name: known(spread[place]) for place, name in COVARIANCE.items()},
+            covariance={name: known(spread[index]) for index, name in COVARIANCE.items()},
             extras={},
             sensors=sensors,
             **moments,

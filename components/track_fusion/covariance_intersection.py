@@ -44,10 +44,10 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     if reported is not None:
         row = np.repeat(np.searchsorted(wake.ticks, reported.tick), np.diff(reported.offsets))
         mine = np.flatnonzero(reported.has_range & (reported.track <= _TRACKS))
-        place = row[mine], reported.track[mine] - 1
-        position[place] = np.stack([getattr(reported, name)[mine] for name in POSITION], axis=-1)
+        index = row[mine], reported.track[mine] - 1
+        position[index] = np.stack([getattr(reported, name)[mine] for name in POSITION], axis=-1)
         variance = sum(reported.covariance[f"covariance_{i}{i}_m2"][mine] for i in range(3))
-        spread[place] = np.sqrt(np.asarray(variance))
+        spread[index] = np.sqrt(np.asarray(variance))
     return {"position": position, "spread": spread}
 
 

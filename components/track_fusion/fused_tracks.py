@@ -55,9 +55,9 @@ def fused_states(
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
                 information = product(weighed, angles.jacobian)
                 pull = times(weighed, angles.residual)
-            shift, found, _ = intersected(p[:, :, into], information, pull, rule)
+            shift, result, _ = intersected(p[:, :, into], information, pull, rule)
             x[:, into] += shift
-            p[:, :, into] = found
+            p[:, :, into] = result
     status = np.full(count, TENTATIVE)
     for held in (COASTED, CONFIRMED):
         status[of[tracks.status == held]] = held
@@ -85,7 +85,7 @@ def fused_states(
 
 
 def _ranks(tracks: LocalTracks, of: IntArray) -> IntArray:
-    """Return the place of each member in its fused track: by range, then by tracker."""
+    """Return the rank of each member in its fused track: by range, then by tracker."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, of))
     counts = np.bincount(of)
     rank = np.empty(len(of), dtype=np.int64)
@@ -174,7 +174,7 @@ def state_tracks(
         run=instants.run,
         offsets=offsets_of(np.searchsorted(rows, reported.row), len(rows)),
         has_range=reported.has_range,
-        covariance={name: reported.covariance[place] for place, name in COVARIANCE.items()},
+        covariance={name: reported.covariance[index] for index, name in COVARIANCE.items()},
         extras={},
         sensors=sensors,
         **{name: reported.columns[name] for name in names},

@@ -21,7 +21,7 @@ _NUMBERS = 1 << 36
 class LocalTracks(KeyedTable):
     """Tracks of several trackers, in the frame of the replica that they belong to.
 
-    ``tracker`` is its place among all of the scene, ``number`` its own number of the track,
+    ``tracker`` is its index among all of the scene, ``number`` its own number of the track,
     ``system`` that of the fused track that it belongs to, 0 for none yet. ``state`` (6, n) and
     ``covariance`` (6, 6, n) of a track without a range are 0 and the identity. ``azimuth_rad`` and
     ``elevation_rad`` are the direction along the tracker's own axes, ``own_m`` (3, n) is where the
@@ -59,10 +59,10 @@ class LocalTracks(KeyedTable):
         known = old.key()
         order = np.argsort(known)
         mine = self.key()
-        place = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
-        return self.with_columns(system=np.where(known[place] == mine, old.system[place], 0))
+        index = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
+        return self.with_columns(system=np.where(known[index] == mine, old.system[index], 0))
 
-    def place(self) -> SensorPose:
+    def pose(self) -> SensorPose:
         """Return from where, and along which axes, each reports its direction."""
         return SensorPose(self.own_m, self.turn.swapaxes(0, 1))
 
@@ -97,7 +97,7 @@ def local_tracks(
     one = np.eye(6)[:, :, np.newaxis]
     covariance = np.where(ranged, full_covariance(message.covariance, which), one)
     change = frame_change(np.stack([column(name) for name in ORIGIN]), origin_deg_m[:, row])
-    found = LocalTracks(
+    result = LocalTracks(
         replica=replica[row],
         tracker=np.full(len(which), tracker, dtype=np.int64),
         number=column("track"),
@@ -118,15 +118,15 @@ def local_tracks(
         contributors=_among_all(column("contributors"), masks),
         updated_by=_among_all(column("updated_by"), masks),
     )
-    return found, row
+    return result, row
 
 
 def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
     """Return masks over a tracker's own sensors as masks over those of all."""
-    found = np.zeros(len(mask), dtype=np.int64)
+    result = np.zeros(len(mask), dtype=np.int64)
     for i, bit in enumerate(masks):
-        found |= np.where(mask >> i & 1 == 1, np.int64(bit), 0)
-    return found
+        result |= np.where(mask >> i & 1 == 1, np.int64(bit), 0)
+    return result
 
 
 def records_of(replicas: IntArray) -> KeyedTable:

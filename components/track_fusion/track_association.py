@@ -49,11 +49,11 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
-    seen, by_place = linearised(_DIRECTION, then, tracks.place())
+    seen, by_position = linearised(_DIRECTION, then, tracks.pose())
     measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
     return Bearing(
         residual(measured, seen),
-        np.concatenate([by_place, back_s * by_place], axis=1),
+        np.concatenate([by_position, back_s * by_position], axis=1),
         np.stack([tracks.azimuth_variance_rad2, tracks.elevation_variance_rad2]),
     )
 
@@ -83,9 +83,9 @@ def gate_share(
         spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
-        found = distance_squared(cholesky(spread), angles.residual) / two
+        result = distance_squared(cholesky(spread), angles.residual) / two
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
-        share[where] = found
+        share[where] = result
     if none.any():
         share[none] = _between_bearings(rules, leader.take(none), other.take(none)) / two
     return share
@@ -106,7 +106,7 @@ def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -
 
 
 def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return the leader of every fused track, and of every track the place of its leader."""
+    """Return the leader of every fused track, and of every track its index."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -160,22 +160,22 @@ def matched(
         _join(rules, now, free, time_s, system)
         new = free[system[free] == 0]
         new = new[np.lexsort((tracks.number[new], tracks.replica[new]))]
-        place = np.searchsorted(replica, tracks.replica[new])
-        counts = np.bincount(place, minlength=len(replica))
-        within = np.arange(len(new)) - (np.cumsum(counts) - counts)[place]
-        system[new] = next_number[place] + within
+        index = np.searchsorted(replica, tracks.replica[new])
+        counts = np.bincount(index, minlength=len(replica))
+        within = np.arange(len(new)) - (np.cumsum(counts) - counts)[index]
+        system[new] = next_number[index] + within
         next_number += counts
     return tracks.with_columns(system=system), next_number
 
 
 def _alone(tracks: LocalTracks) -> BoolArray:
     """Return which tracks are the only member of their fused track."""
-    found = np.zeros(len(tracks), dtype=bool)
+    result = np.zeros(len(tracks), dtype=bool)
     member = np.flatnonzero(tracks.system > 0)
     if len(member):
         leader, of = leaders(tracks.take(member))
-        found[member] = (np.bincount(of, minlength=len(leader)) == 1)[of]
-    return found
+        result[member] = (np.bincount(of, minlength=len(leader)) == 1)[of]
+    return result
 
 
 def _join(

@@ -275,7 +275,7 @@ def joined(parts: Sequence[Any]) -> Any:
 
 def _log_volume(one: GatedPairs) -> FloatArray:
     """Return ln |S| of every pair; of several models the least, whose gate is the tightest."""
-    found = log_determinant(one.measured.innovations[0].root)
+    result = log_determinant(one.measured.innovations[0].root)
     for other in one.measured.innovations[1:]:
-        found = np.minimum(found, log_determinant(other.root))
-    return found
+        result = np.minimum(result, log_determinant(other.root))
+    return result

@@ -13,9 +13,9 @@ from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
+from components.tracking.reported_errors import by_angles, levelled
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
-from components.tracking.told_errors import by_angles, levelled
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -81,16 +81,16 @@ def gated_pairs(
             own_m_s = None
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
-                told = rules.carried.told(scans, cells)
+                reported = rules.carried.reported(scans, cells)
                 white = rules.carried.white(scans, cells, rows)
-                measured[:2], place = levelled(measured[:2], pose.take(track))
+                measured[:2], level_pose = levelled(measured[:2], pose.take(track))
                 mine_then = part.take(track)
                 since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
                 ages = rules.carried.ages(scans, cells, since)
                 foreseen = [
-                    ages.added(found, model, state)
-                    for found, model, state in zip(
-                        rules.estimator.expect(kind, mine_then.estimates(), place, told),
+                    ages.added(result, model, state)
+                    for result, model, state in zip(
+                        rules.estimator.expect(kind, mine_then.estimates(), level_pose, reported),
                         rules.estimator.models, mine_then.states(), strict=True,
                     )
                 ]  # fmt: skip
@@ -163,7 +163,7 @@ def _near(
 
 
 class _PairVariance:
-    """Variances of pairs: as reported, and of the ownship's place as far as the track is."""
+    """Variances of pairs: as reported, and of the ownship's position as far as the track is."""
 
     def __init__(
         self, rules: TrackerRules, part: TrackStore, pose: SensorPose, scans: Scans
@@ -188,16 +188,16 @@ class _PairVariance:
 
 
 def _box(
-    found: Moments, variance: FloatArray, threshold: float, more: FloatArray | None
+    moments: Moments, variance: FloatArray, threshold: float, more: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return where one model expects angles and range, and half the widths of boxes about gates.
 
     They are wide enough for the worst detection of all, and for rounding.
     """
-    expected = found.expected[: len(variance)]
+    expected = moments.expected[: len(variance)]
     half = np.empty_like(expected)
     for i, worst in enumerate(variance.max(axis=1).tolist()):
-        spread = found.total[i, i] + worst
+        spread = moments.total[i, i] + worst
         if more is not None and i < 2:
             spread = spread + more[i]
         half[i] = np.sqrt((threshold * _WIDER) * spread)
@@ -227,10 +227,10 @@ def _inside(
 
 def _picked(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
     """Return some rows of values at some detections."""
-    found = np.empty((len(rows), len(cells)))
+    result = np.empty((len(rows), len(cells)))
     for i, row in enumerate(rows):
-        values[row].take(cells, out=found[i], mode="clip")
-    return found
+        values[row].take(cells, out=result[i], mode="clip")
+    return result
 
 
 def _parts(part: IntArray) -> list[tuple[int, int]]:

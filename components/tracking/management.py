@@ -83,11 +83,6 @@ def bits_set(values: IntArray) -> IntArray:
     return np.asarray((v + (v >> 32)) & 0x7F, dtype=np.int64)
 
 
-def existence(score: FloatArray) -> FloatArray:
-    """Return the probability that belongs to the logarithm of odds."""
-    return np.asarray(1.0 / (1.0 + np.exp(-score)))
-
-
 def after_hits_and_misses(
     history: IntArray, looks: IntArray, misses: IntArray, hit: BoolArray, missed: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
@@ -126,7 +121,7 @@ def initiated(
     if rules.p.start_climb_m_s is not None:
         spread[5, 5] = rules.p.start_climb_m_s**2
     states, covariances = [], []
-    begin = _start_by_told(rules, scans, pose, codes, detection, position, spread)
+    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
     known = 6 + rules.estimator.errors
     for size in sizes:
         state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
@@ -295,13 +290,13 @@ def _update_by_rates(
     known, slope = linearised(kind, selected(state, which), pose.take(which))
     cells = detection[which]
     rate, variance = selected(scans.measured[3:4], cells), selected(scans.variance[3:4], cells)
-    found = innovation(known[2:], slope[2:], selected(covariance, which), variance)
+    result = innovation(known[2:], slope[2:], selected(covariance, which), variance)
     state[:, which], covariance[:, :, which] = updated(
-        selected(state, which), selected(covariance, which), found, rate - known[2:]
+        selected(state, which), selected(covariance, which), result, rate - known[2:]
     )
 
 
-def _start_by_told(
+def _start_by_reports(
     rules: TrackerRules,
     scans: Scans,
     pose: SensorPose,
@@ -310,9 +305,9 @@ def _start_by_told(
     position: FloatArray,
     spread: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return new tracks with the velocities that are told, and with the errors that they carry.
+    """Return new tracks with the velocities that are reported, and with the errors that they carry.
 
-    `spread` (6, 6, n) is that of position and velocity where nothing is told. What is told is off
+    `spread` (6, 6, n) is that of position and velocity where nothing is reported. A report is off
     by its errors, so that the target lies that far on the other side.
     """
     errors, count = rules.estimator.errors, len(detection)
@@ -328,7 +323,7 @@ def _start_by_told(
     if rules.carried is None or not len(telling):
         return state, covariance
     cells = detection[telling]
-    effects = rules.carried.told(scans, cells).effects(position[:, telling], pose.take(telling))
+    effects = rules.carried.reported(scans, cells).effects(position[:, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
     white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
     own = covariance[:6, :6, telling]
@@ -347,7 +342,7 @@ def _start_by_told(
 
 
 def _diagonal(variance: FloatArray) -> FloatArray:
-    found = np.zeros((len(variance), *variance.shape))
+    result = np.zeros((len(variance), *variance.shape))
     for i, values in enumerate(variance):
-        found[i, i] = values
-    return found
+        result[i, i] = values
+    return result

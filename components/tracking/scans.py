@@ -48,7 +48,7 @@ class Scans:
     variance: FloatArray  # (7, detections), the same
     contributors: IntArray
     source: IntArray  # (7, detections), index of the sensor that gave each quantity; -1 for none
-    told: FloatArray | None  # (`TOLD`, detections), what is told of each; None where nothing is
+    reported: FloatArray | None  # (`TOLD`, detections), what each reports; None where none does
 
     def __len__(self) -> int:
         return len(self.row)
@@ -65,9 +65,9 @@ class Scans:
             moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
             used = moves & (self.variance[3] > 0.0) & ~np.isnan(self.measured[3])
             code += 2 * (used & (self.contributors & ~rates_of == 0))
-        if self.told is None:
+        if self.reported is None:
             return code
-        errs = ~np.isnan(self.told[-1])
+        errs = ~np.isnan(self.reported[-1])
         moves = ~np.isnan(self.measured[4:]).any(axis=0) & (code & 1 > 0)
         moves &= (self.variance[4:] > 0.0).all(axis=0) & (
             rates_of >> np.maximum(self.source[2], 0) & 1 > 0
@@ -97,7 +97,7 @@ class Scans:
             selected(self.pose, looks), selected(self.velocity, looks), offsets,
             selected(self.measured, which), selected(self.variance, which),
             self.contributors[which], self.source.take(which, axis=-1),
-            None if self.told is None else selected(self.told, which),
+            None if self.reported is None else selected(self.reported, which),
         )  # fmt: skip
 
     @classmethod
@@ -109,10 +109,10 @@ class Scans:
         names = ("row", "run", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
                  "variance", "contributors", "source")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
-        told = [part.told for part in parts if part.told is not None]
+        reported = [part.reported for part in parts if part.reported is not None]
         return cls(
             offsets=np.concatenate(([0], np.cumsum(counts))),
-            told=np.concatenate(told, axis=-1) if told else None, **columns,
+            reported=np.concatenate(reported, axis=-1) if reported else None, **columns,
         )  # fmt: skip
 
 
@@ -207,11 +207,11 @@ def scans_of(fused: FusedDetections) -> Scans:
     np.bitwise_or.at(union, number, sensors[order])
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
-    told = np.full((len(TOLD), len(mask)), np.nan)
+    reported = np.full((len(TOLD), len(mask)), np.nan)
     if fused.told_by_target is not None:
-        told = np.stack([fused.told_by_target[name] for name in TOLD])
-    measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *told[:3]])
-    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *told[3:6]])
+        reported = np.stack([fused.told_by_target[name] for name in TOLD])
+    measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *reported[:3]])
+    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *reported[3:6]])
     seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
@@ -225,7 +225,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
         measured=selected(measured, entries),
         variance=selected(variance, entries),
-        told=None if fused.told_by_target is None else selected(told, entries),
+        reported=None if fused.told_by_target is None else selected(reported, entries),
         contributors=mask[entries],
         source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )

@@ -150,9 +150,9 @@ def _matched(before: TrackStore, now: TrackStore, tick: IntArray) -> tuple[IntAr
         return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
     keys = before.replica * _NUMBERS + before.number
     key = now.replica * _NUMBERS + now.number
-    place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-    there = (keys[place] == key) & (before.status[place] != DELETED)
-    return place, there & (before.tick[place] <= tick)
+    index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+    there = (keys[index] == key) & (before.status[index] != DELETED)
+    return index, there & (before.tick[index] <= tick)
 
 
 def _retrodicted(

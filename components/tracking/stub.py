@@ -166,9 +166,9 @@ def _pool(
     if replica[0] == replica[-1]:
         return pool, np.arange(start), np.arange(start, start + count)
     order = np.argsort(np.concatenate([before.replica, replica]), kind="stable")
-    place = np.empty(start + count, dtype=np.int64)
-    place[order] = np.arange(start + count)
-    return {name: v[order] for name, v in pool.items()}, place[:start], place[start:]
+    index = np.empty(start + count, dtype=np.int64)
+    index[order] = np.arange(start + count)
+    return {name: v[order] for name, v in pool.items()}, index[:start], index[start:]
 
 
 def _present(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:

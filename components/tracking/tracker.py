@@ -28,12 +28,11 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.report import state_tracks, tracks_after
+from components.tracking.reported_errors import reported_errors
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
-from components.tracking.told_errors import told_errors
-from components.tracking.track_store import TrackStore, records_of
+from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_after
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
@@ -100,7 +99,7 @@ class Tracker(Component):
         self.rules: TrackerRules | None = None
         self._association = self.association()
         self._estimator = self.estimator()
-        if errors := told_errors(offers):
+        if errors := reported_errors(offers):
             self._estimator = self._estimator.carrying(tuple(one.lasts_s for one, _ in errors))
         self._sensors: tuple[str, ...] = ()
         self._store = self._no_tracks(0)
@@ -125,15 +124,15 @@ class Tracker(Component):
             lag_s, why = Fraction(0), "late is 'drop'"
         offers = sensor_offers(self.context.producers)
         shares = left_out(offers, lag_s, self.context.duration_s)
-        found = [warning(n, share, why) for n, share in shares.items()]
+        result = [warning(n, share, why) for n, share in shares.items()]
         for name, offer in sorted(offers.items()):
             if not isinstance(offer, SensorOffer) or offer.lasting is None:
-                found.append(
+                result.append(
                     f"{name} does not say what of its errors lasts from look to look "
                     "(SensorOffer.lasting): all are taken for new, and tracks are too sure where "
                     "they are not"
                 )
-        return super().warnings() + found
+        return super().warnings() + result
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name."""

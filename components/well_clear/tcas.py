@@ -84,10 +84,10 @@ def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     ownship's altitude.
     """
     sizes = [one for one in RESOLUTION_ADVISORY if one is not None]
-    place = np.maximum(sensitivity_level(altitude_m) - FIRST_LEVEL - 1, 0)
+    index = np.maximum(sensitivity_level(altitude_m) - FIRST_LEVEL - 1, 0)
     return (
-        np.array([one.miss_m for one in sizes])[place],
-        np.array([one.height_m for one in sizes])[place],
+        np.array([one.miss_m for one in sizes])[index],
+        np.array([one.height_m for one in sizes])[index],
     )
 
 

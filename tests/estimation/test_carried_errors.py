@@ -13,7 +13,7 @@ from components.estimation.carried_errors import (
     SPEED_EAST,
     SPEED_NORTH,
     MotionWithErrors,
-    ToldErrors,
+    ReportedErrors,
 )
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
@@ -38,7 +38,7 @@ def pose(count):
 def told(count, at_range):
     deviation = DEVIATIONS[:, np.newaxis] * np.ones(count)
     deviation[[0, 1, 4, 5, 8] if at_range else [6, 7]] = 0.0
-    return ToldErrors(WAYS, deviation, np.full(count, 0.4), np.full(count, at_range))
+    return ReportedErrors(WAYS, deviation, np.full(count, 0.4), np.full(count, at_range))
 
 
 @pytest.mark.parametrize("at_range", [False, True])
@@ -165,7 +165,7 @@ def test_tracks_are_those_of_one_batch_that_knows_how_errors_are_correlated(name
     mean = batch @ (np.linalg.solve(prior, START) + design.T @ np.linalg.solve(whole, told_states))
     mean, batch = onward @ mean, onward @ batch @ onward.T
     looks = []
-    plain = ToldErrors(WAYS, 0.0 * errors.deviation, errors.age_s, errors.at_range)
+    plain = ReportedErrors(WAYS, 0.0 * errors.deviation, errors.age_s, errors.at_range)
     for k in range(COUNT):
         still[:6, 0] = told_states[6 * k : 6 * k + 6]
         looks.append(plain.expected(kind, still, place)[:, 0])

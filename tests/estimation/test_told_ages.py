@@ -18,13 +18,13 @@ from components.estimation.carried_errors import (
     NORTH,
     SPEED_EAST,
     SPEED_NORTH,
-    ToldErrors,
+    Ages,
+    ReportedErrors,
 )
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantVelocity
-from components.estimation.told_ages import Ages
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
 
 KIND = Kind(True, False, True)
@@ -69,7 +69,7 @@ def nees_of(estimator, intensity, flown, seed=5):
     true[:3] = np.array([[90_000.0], [-50_000.0], [-3000.0]])
     true[3:] = 40.0 * rng.normal(size=(3, COUNT))
     tracks, found, now_s = None, [], 0.0
-    plain = ToldErrors((), np.zeros((0, COUNT)), np.zeros(COUNT), np.zeros(COUNT, dtype=bool))
+    plain = ReportedErrors((), np.zeros((0, COUNT)), np.zeros(COUNT), np.zeros(COUNT, dtype=bool))
     for look in range(LOOKS):
         end_s = look + 1.0
         ages, seen = ages_of(look), {}
@@ -83,7 +83,7 @@ def nees_of(estimator, intensity, flown, seed=5):
         white = np.sqrt(WHITE_M2) * rng.normal(size=(6, COUNT))
         said = np.concatenate([seen["place"][:3], seen["velocity"][3:]]) + off + white
         said[:3] += ages[0] * (said[3:] - white[3:])
-        told = ToldErrors(
+        told = ReportedErrors(
             WAYS, np.repeat(DEVIATION[:, np.newaxis], COUNT, axis=1), np.full(COUNT, ages[0]),
             np.zeros(COUNT, dtype=bool),
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Which errors of what aircraft tell a tracker carries in its states, and how large they are.
+"""Which errors of what aircraft report a tracker carries in its states, and how large they are.
 
 An error that an aircraft has, whoever hears it, is one state for all sensors: its altimeter speaks
 through its broadcasts and through its replies.
@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from components.estimation.batched import times
-from components.estimation.carried_errors import BEARING, RANGE, ToldErrors
+from components.estimation.carried_errors import BEARING, RANGE, Ages, ReportedErrors
 from components.estimation.frame import SensorPose
-from components.estimation.told_ages import Ages
 from components.geometry import unit_vector_unchecked
 from components.messages.columns import TOLD
 from components.messages.detections import SensorOffer, ToldError
@@ -25,13 +24,13 @@ _AGES = ("age_s", "velocity_age_s")
 _LEAST_COS = 1e-3
 
 
-def told_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
+def reported_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
     """Return the errors that sensors tell of, and whose they are: once for those of an aircraft."""
-    found: dict[tuple[ToldError, str], list[str]] = {}
+    result: dict[tuple[ToldError, str], list[str]] = {}
     for name, offer in sorted(offers.items()):
         for one in offer.told_errors if isinstance(offer, SensorOffer) else ():
-            found.setdefault((one, "" if one.of_aircraft else name), []).append(name)
-    return found
+            result.setdefault((one, "" if one.of_aircraft else name), []).append(name)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ class CarriedErrors:
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
         """Return those that some sensors tell of."""
-        errors = told_errors(offers)
+        errors = reported_errors(offers)
         mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
         return cls(
@@ -55,45 +54,47 @@ class CarriedErrors:
             mine, (mine & ranging[:, np.newaxis]).any(axis=0),
         )  # fmt: skip
 
-    def told(self, scans: Scans, cells: IntArray) -> ToldErrors:
-        """Return what some detections are told of their errors."""
-        assert scans.told is not None
-        source, told = scans.source[0][cells], scans.told[:, cells]
-        deviation = np.where(self.mine[:, source], told[self.column], 0.0)
-        return ToldErrors(self.ways, deviation, told[TOLD.index("age_s")], self.at_range[source])
+    def reported(self, scans: Scans, cells: IntArray) -> ReportedErrors:
+        """Return the errors that some detections report."""
+        assert scans.reported is not None
+        source, reported = scans.source[0][cells], scans.reported[:, cells]
+        deviation = np.where(self.mine[:, source], reported[self.column], 0.0)
+        return ReportedErrors(
+            self.ways, deviation, reported[TOLD.index("age_s")], self.at_range[source]
+        )
 
     def own_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
         """Return the ownship's velocity (north, east, down) where a bearing is coarse, else NaN."""
-        assert scans.told is not None
-        return scans.told[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
+        assert scans.reported is not None
+        return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
     def white(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
-        """Return variances of what is new in some detections, of a place along all axes alike."""
-        assert scans.told is not None
+        """Return variances of what is new in detections, of a position along all axes alike."""
+        assert scans.reported is not None
         variance = scans.variance[rows][:, cells]
-        variance[:3] = scans.told[TOLD.index("white_variance"), cells]
+        variance[:3] = scans.reported[TOLD.index("white_variance"), cells]
         return np.asarray(variance)
 
     def ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
-        """Return how old what some detections tell is, for tracks last updated so long ago."""
-        assert scans.told is not None
-        place, velocity = (scans.told[TOLD.index(name), cells] for name in _AGES)
-        return Ages(place, velocity, since_s)
+        """Return how old the reports in detections are, for tracks last updated so long ago."""
+        assert scans.reported is not None
+        position, velocity = (scans.reported[TOLD.index(name), cells] for name in _AGES)
+        return Ages(position, velocity, since_s)
 
 
 def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
     """Return variances along three axes, m², as those of azimuth, elevation and range."""
-    found, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
+    result, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
     level = np.maximum(np.cos(measured[1]), _LEAST_COS)
-    found[0] /= (distance * level) ** 2
-    found[1] /= distance**2
-    return found
+    result[0] /= (distance * level) ** 2
+    result[1] /= distance**2
+    return result
 
 
 def levelled(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
     """Return azimuths and elevations (2, n) in body axes as ones in the frame's, and that pose.
 
-    What is told of bearings and heights is told in level axes: there it is linear.
+    Bearings and heights are reported in level axes: there it is linear.
     """
     body = np.stack(unit_vector_unchecked(*angles_rad))
     x, y, z = times(pose.to_body.swapaxes(0, 1), body)
