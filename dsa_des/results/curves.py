@@ -39,11 +39,11 @@ def _series_along(
     others = [k for k, name in enumerate(axes) if name != axis]
     if by is not None:  # the named axis first, so that its values share a colour
         others.sort(key=lambda k: axes[k] != by)
-    result: dict[str, list[Line]] = {}
+    series: dict[str, list[Line]] = {}
     for line in lines:
         named = ", ".join(value_label(axes[k], line.at[k]) for k in others)
-        result.setdefault(named, []).append(line)
-    return result
+        series.setdefault(named, []).append(line)
+    return series
 
 
 def draw_axis(
@@ -360,11 +360,11 @@ def _bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
-    result = [
+    bounds = [
         np.array(chi_square_bounds(freedom * n, confidence)) / n if n else (math.nan, math.nan)
         for n in (line.estimate.count for line in lines)
     ]
-    low, high = np.array(result).T
+    low, high = np.array(bounds).T
     axes.fill_between(
         x, low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0,
         label=f"{100 * confidence:g} % bounds of χ², {freedom:g} degrees",
