@@ -333,22 +333,7 @@ class LineOfSight:
         lon_deg: Any,
         alt_m: Any,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Find azimuth, elevation and slant range in the ownship's NED frame, with checks.
-
-        Parameters
-        ----------
-        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m : array_like
-            As for `components.geometry.ellipsoid.line_of_sight`.
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : ndarray
-
-        Raises
-        ------
-        ValueError
-            As for `components.geometry.ellipsoid.line_of_sight`.
-        """
+        """Find azimuth, elevation and slant range in the NED frame, as `line_of_sight` does."""
         places = own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m
         return self._in_ned(places, validate=True)
 

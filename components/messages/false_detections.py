@@ -103,17 +103,7 @@ AnyDetections = TypeVar("AnyDetections", Detections, FusedDetections)
 
 
 def true_entries(message: AnyDetections) -> AnyDetections:
-    """Return the message without false alarms; the message itself where it has none.
-
-    Parameters
-    ----------
-    message : Detections or FusedDetections
-
-    Returns
-    -------
-    Detections or FusedDetections
-        The same rows.
-    """
+    """Return the same rows without false alarms; the message itself where it has none."""
     if np.count_nonzero(message.target < 0) == 0:
         return message
     keep = np.flatnonzero(message.target >= 0)

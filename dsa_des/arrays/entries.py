@@ -6,14 +6,7 @@ from dsa_des.arrays.types import BoolArray, IntArray
 
 
 def offsets_of(row: IntArray, rows: int) -> IntArray:
-    """Return the offsets of entries that belong to rows, given each entry's row, ascending.
-
-    Parameters
-    ----------
-    row : (entries,) of int64
-    rows : int
-        How many rows there are.
-    """
+    """Return the offsets of entries (rows + 1,), given each entry's row, ascending."""
     count = len(row)
     if count == 0:
         return np.zeros(rows + 1, dtype=np.int64)

@@ -229,20 +229,7 @@ def _positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the position of the last instant at or before each that is asked for, of its run.
-
-    Parameters
-    ----------
-    instants : RunTicks
-        In order.
-    asked : RunTicks
-        Each run's together, its ticks in any order.
-
-    Returns
-    -------
-    (n,) of int64
-        -1 where the run has none.
-    """
+    """Return the last instant of its run at or before each asked (ticks in any order); -1: none."""
     return _last_of_run(instants, asked)[0]
 
 
@@ -269,13 +256,7 @@ def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
 
 
 def positions_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
-    """Return the position of each instant that is asked for, and whether it is there; None for all.
-
-    Parameters
-    ----------
-    instants, asked : RunTicks
-        As for `last_of_run`.
-    """
+    """Return the position of each asked instant, and whether it is there; None for all."""
     positions, met = _last_of_run(instants, asked)
     if met or len(instants) == 0:
         return positions, None if met else np.zeros(len(asked), dtype=bool)

@@ -46,23 +46,7 @@ class DeclaredColumns:
         self._sound: dict[tuple[str, str], tuple[str, ...]] = {}
 
     def check(self, block: str, table: str, columns: Iterable[str], message: str) -> None:
-        """Refuse what would be lost without a word; the same columns again cost nothing.
-
-        Parameters
-        ----------
-        block : str
-            Who sends.
-        table : str
-        columns : iterable of str
-        message : str
-            Name of the message's class.
-
-        Raises
-        ------
-        ValueError
-            If no message of the run declares the table or the column, or the table has no
-            instants.
-        """
+        """Raise ValueError for what would be lost silently; the same columns again cost nothing."""
         names = tuple(name for name in columns if name != "replica")
         if self._sound.get((block, table)) == names:
             return

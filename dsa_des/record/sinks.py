@@ -23,20 +23,7 @@ def attempt(
     *arguments: Any,
     unless: type[Exception] = BrokenPipeError,
 ) -> Any:
-    """Return what a call gives; if it raises, add a note that says so and return None.
-
-    Parameters
-    ----------
-    what : str
-        What the call makes, for the note.
-    notes : list of str
-        Takes the note.
-    call : callable
-    *arguments
-        Of the call.
-    unless : type of exception
-        What is raised all the same; by default, that the reader of our output went away.
-    """
+    """Return what a call gives; where it raises (but `unless`), add a note and return None."""
     try:
         return call(*arguments)
     except unless:
