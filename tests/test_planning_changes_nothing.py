@@ -39,15 +39,16 @@ ENDS_S = {
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
     "tracking/do365_sensors.toml": 80,
-    "operator/session.toml": 15,
+    "operator/session.toml": 10,
     "optical/pictures.toml": 5,
     "published/degas.toml": 30,
     "published/degas_radar.toml": 60,
     "published/see_and_avoid.toml": 30,
-    "systems/afrl_tracked.toml": 25,
+    "systems/afrl_tracked.toml": 15,
     "tracking/architectures.toml": 10,
-    "tracking/cueing.toml": 20,
-    "tracking/flown_intercept.toml": 30,
+    "tracking/cueing.toml": 14,
+    "tracking/flown_intercept.toml": 20,
+    "tracking/one_target.toml": 30,
 }
 #: Perfect surveillance has no sensor; the pilot of one encounter finds nobody in its time.
 UNSEEN = {

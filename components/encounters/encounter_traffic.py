@@ -21,13 +21,12 @@ from components.encounters.pair_densities import PairingRules, pairing_rules
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
 from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
 from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
 from components.geometry import enu_to_geodetic, line_of_sight
 from components.traffic.files import FileParameters, RecordedTraffic
-from components.traffic.scripted import Ownship, flight_arguments
+from components.traffic.scripted import Ownship, flight_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.block.ladder import Verified
@@ -212,10 +211,7 @@ class _EncounterTraffic(RecordedTraffic):
         super().__init__(name, parameters, context)
         if (own := self.p.scripted_ownship) is not None:
             self._refuse_another_place(own.lat_deg, own.lon_deg)
-            self.own = ScriptedTrajectory(
-                "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg,
-                **flight_arguments(own, self.wind),
-            )  # fmt: skip
+            self.own = flight_of(own, own.start, self.wind)
 
     def read(self) -> TrafficFile:
         """Return the flights of the encounter."""

@@ -8,7 +8,7 @@ from pydantic import Field
 from components.geometry import line_of_sight
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.block.component import (
     ClockedParameters,
     Component,
@@ -61,11 +61,10 @@ class ClosestApproachPassed(Component):
     def setup(self) -> None:
         """Start without having seen anybody."""
         self._after_ticks = int(self.p.after_s * self.context.ticks_per_s)
-        #: By run and target: the last range, infinite while it is away; since when it has grown;
+        #: By target and run: the last range, infinite while it is away; since when it has grown;
         #: and whether the target has been there.
-        self._range_m: FloatArray = np.empty((0, 0))
-        self._since: IntArray = np.empty((0, 0), dtype=np.int64)
-        self._seen: BoolArray = np.empty((0, 0), dtype=bool)
+        types = {"replica": int, "range_m": float, "since": int, "seen": bool}
+        self._known = KeyedTable.empty(types)
 
     def run(self, wake: Wake) -> RunEnd | None:
         """Compare the distances of every look with those of the one before."""
@@ -79,39 +78,38 @@ class ClosestApproachPassed(Component):
         )
         starts = wake.instants.first_of_each
         numbers = wake.run[starts]
-        self._make_room(int(numbers[-1]) + 1, range_m.shape[1])
+        shape = range_m.shape[1], len(numbers)
+        known = self._known.continued(
+            KeyedTable(
+                replica=numbers,
+                range_m=np.full(shape, np.inf),
+                since=np.full(shape, -1),
+                seen=np.zeros(shape, dtype=bool),
+            )
+        )
         ticks, row = wake.ticks[:, np.newaxis], np.arange(len(wake))[:, np.newaxis]
         # The first row of each one's run: a running maximum of rows that is less is of another.
-        first = np.repeat(starts, np.diff(np.append(starts, len(wake))))[:, np.newaxis]
+        counts = np.diff(np.append(starts, len(wake)))
+        first = np.repeat(starts, counts)[:, np.newaxis]
 
         there = np.where(states.present, row, -1)
-        before = np.where(self._seen[numbers], row[starts], -1)
+        before = np.where(known.seen.T, row[starts], -1)
         there[starts] = np.maximum(there[starts], before)
         seen = np.maximum.accumulate(there, axis=0) >= first
 
         last_m = np.empty_like(range_m)
         now_m = np.where(states.present, range_m, np.inf)
         last_m[1:] = now_m[:-1]
-        last_m[starts] = self._range_m[numbers]
+        last_m[starts] = known.range_m.T
         growing = (now_m > last_m) | (~states.present & seen)
         shrank = np.maximum.accumulate(np.where(growing, -1, row), axis=0)
-        remembered = self._since[wake.run]
+        remembered = np.repeat(known.since.T, counts, axis=0)
         since = np.where(shrank >= first, ticks[np.maximum(shrank, 0), 0], remembered)
 
         passed = (ticks - since >= self._after_ticks) & growing & (now_m >= self.p.beyond_m)
         over = passed.all(axis=1)
         ends = np.append(starts[1:], len(wake)) - 1
-        self._range_m[numbers], self._since[numbers] = now_m[ends], since[ends]
-        self._seen[numbers] = seen[ends]
+        now = {"range_m": now_m[ends].T, "since": since[ends].T, "seen": seen[ends].T}
+        newer = KeyedTable(replica=numbers, **now)
+        self._known = self._known.after(numbers, newer, wake.first_run)
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
-
-    def _make_room(self, runs: int, targets: int) -> None:
-        """Have a row for so many runs."""
-        more = runs - len(self._range_m)
-        if more > 0:
-            shape = more, targets
-            old = (self._range_m, self._since, self._seen) if len(self._range_m) else ()
-            new = np.full(shape, np.inf), np.full(shape, -1), np.zeros(shape, dtype=bool)
-            if old:
-                new = tuple(np.concatenate(pair) for pair in zip(old, new, strict=True))  # type: ignore[assignment]
-            self._range_m, self._since, self._seen = new

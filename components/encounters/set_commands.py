@@ -41,7 +41,11 @@ def convert_sets(
     try:
         encounters = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
         if weights is not None:
-            encounters = replace(encounters, weights=_weights(weights, encounters))
+            options = "--weights", "--weights"
+            new = _by_encounter(encounters, weights, "weight", *options, least=False)
+            if not (new > 0.0).any():
+                raise UsageError(f"{weights}: all weights are 0")
+            encounters = replace(encounters, weights=new)
         if path.suffix.lower() == SET:
             write_set(path, {"made_by": "conversion"}, [encounters])
         else:
@@ -57,20 +61,24 @@ def convert_sets(
         say(f"{encounters.skipped} damaged encounters were skipped")
 
 
-def _weights(text: str, encounters: EncounterSet) -> FloatArray:
-    """Return the weights that a table with the columns ``encounter`` and ``weight`` gives."""
+def _by_encounter(
+    encounters: EncounterSet, text: str, column: str, *options: str, least: bool
+) -> FloatArray:
+    """Return each encounter's value in a table's column; the least or the last one of several.
+
+    `options` of the command line ask for the columns ``encounter`` and `column`.
+    """
     table = read_table(text)
-    number, wrong = numbers(table, "encounter", "--weights", flag=False)
-    weight, also = numbers(table, "weight", "--weights", flag=False)
+    number, wrong = numbers(table, "encounter", options[0], flag=False)
+    value, also = numbers(table, column, options[1], flag=False)
     kept_rows(table, [wrong, also], skip=False)
-    known = dict(zip(number.astype(np.int64).tolist(), weight.tolist(), strict=True))
+    known: dict[int, float] = {}
+    for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
+        known[n] = min(v, known.get(n, math.inf)) if least else v
     missing = [n for n in encounters.numbers.tolist() if n not in known]
     if missing:
-        raise UsageError(f"{text}: encounter {missing[0]}: weight is missing")
-    weights = np.array([known[n] for n in encounters.numbers.tolist()])
-    if not (weights > 0.0).any():
-        raise UsageError(f"{text}: all weights are 0")
-    return weights
+        raise UsageError(f"{text}: encounter {missing[0]}: {column} is missing")
+    return np.array([known[n] for n in encounters.numbers.tolist()])
 
 
 _DRAWN = 12
@@ -246,7 +254,7 @@ def split_encounters(
     if scores is None or score is None:
         near = np.array([nearness(encounters, index) for index in range(len(encounters))])
     else:
-        near = _scores(scores, score, encounters)
+        near = _by_encounter(encounters, scores, score, "--scores", "--score", least=True)
     try:
         expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
     except ValueError as error:
@@ -268,18 +276,3 @@ def _numbers(option: str, text: str) -> FloatArray:
         return np.array([float(word) for word in text.split(",")])
     except ValueError:
         raise UsageError(f"{option} {text}: must be numbers with commas between them") from None
-
-
-def _scores(text: str, column: str, encounters: EncounterSet) -> FloatArray:
-    """Return each encounter's least value in a table or a study's folder."""
-    table = read_table(text)
-    number, wrong = numbers(table, "encounter", "--scores", flag=False)
-    value, also = numbers(table, column, "--score", flag=False)
-    kept_rows(table, [wrong, also], skip=False)
-    least: dict[int, float] = {}
-    for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
-        least[n] = min(v, least.get(n, math.inf))
-    missing = [n for n in encounters.numbers.tolist() if n not in least]
-    if missing:
-        raise UsageError(f"{text}: encounter {missing[0]}: {column} is missing")
-    return np.array([least[n] for n in encounters.numbers.tolist()])

@@ -78,7 +78,7 @@ def read_asterix(path: str | PathLike[str], ownship: str | None = None) -> Traff
     problems = Problems(str(path), of="record")
     names = _names(records)
     cells = {name: SampleColumn(k + 1, name, 1.0) for k, name in enumerate(_NUMBERS)}
-    table = SampleTable(problems, 0, cells, optional=_MOVES)
+    table = SampleTable(problems, ("name", *_NUMBERS), 0, cells, optional=_MOVES)
     table.notes = notes
     rows: dict[tuple[object, ...], dict[float, int]] = {}
     samples: dict[int, list[str]] = {}

@@ -10,7 +10,6 @@ from os import PathLike
 from pathlib import Path
 
 from components.formats.sample_table import (
-    UNITS,
     VELOCITIES,
     ColumnSpec,
     SampleColumn,
@@ -74,22 +73,16 @@ def read_csv(path: str | PathLike[str], ownship: str | None = None) -> TrafficFi
     headers = _split(header_text, delimiter)
     columns = _find_columns(problems, headers, header_line)
     identity = columns.pop("id").index
-    table = SampleTable(problems, identity, columns, parse_time=_time_parser(columns["time"]))
-    used = {identity, *(column.index for column in columns.values())}
-    if ignored := [header for i, header in enumerate(headers) if i not in used]:
-        table.notes.append(f"columns ignored: {', '.join(ignored)}")
+    parse_time = _time_parser(columns["time"])
+    table = SampleTable(problems, headers, identity, columns, parse_time=parse_time)
     skipped = 0
     for number, text in lines[1:]:
         row = _split(text, delimiter)
-        if len(row) != len(headers):
-            problems.add(
-                f"the row has {len(row)} values: the header names {len(headers)} columns",
-                line=number,
-            )
-        elif any(row[columns[q].index] for q in ("lat", "lon", "alt")):
-            table.add_row(number, row)
-        else:
+        fits = len(row) == len(headers)
+        if fits and not any(row[columns[q].index] for q in ("lat", "lon", "alt")):
             skipped += 1
+        else:
+            table.add_row(number, row)
     if skipped:
         table.notes.append(f"{skipped} rows without a position were skipped")
     return table.finish(ownship, _with_velocity)
@@ -127,9 +120,9 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
             continue
         index = indices[quantity]
         factor = 1.0
-        if quantity in UNITS:
+        if spec.unit:
             unit = parsed[index][1] or spec.unit
-            factor = unit_factor(problems, quantity, unit, line=line, header=headers[index])
+            factor = unit_factor(problems, spec, unit, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
     problems.raise_if_any()
     if "trk" not in columns and not complete_velocity(columns) and "yaw" in columns:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import add, mul
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from components.formats.sample_table import (
-    UNITS,
     ColumnSpec,
     SampleColumn,
     SampleTable,
@@ -23,7 +25,6 @@ from components.formats.text_rows import (
     Problems,
     TrafficFile,
     TrafficFileError,
-    cell_count,
     cells,
     clean_token,
     did_you_mean,
@@ -31,7 +32,7 @@ from components.formats.text_rows import (
     shown_columns,
     tokens,
 )
-from components.geometry import enu_to_geodetic, local_axes
+from components.geometry import Vector, enu_to_geodetic, local_axes
 from dsa_des.arrays.types import FloatArray
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
@@ -128,29 +129,16 @@ def _table(
     for quantity in [*_wanted(indices), *(q for q in extra if q in indices)]:
         index = indices[quantity]
         line, token = units[quantity]
-        if quantity in _OPTIONAL and clean_token(token) not in UNITS[quantity]:
+        if quantity in _OPTIONAL and clean_token(token) not in EXTRA_COLUMNS[quantity].units:
             notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
             continue
-        factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
+        spec = (COLUMNS | EXTRA_COLUMNS)[quantity]
+        factor = unit_factor(problems, spec, token, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
-    ignored = [
-        h
-        for i, h in enumerate(headers)
-        if i != indices["name"] and i not in {c.index for c in columns.values()}
-    ]
-    if ignored:
-        notes.append(f"columns ignored: {', '.join(ignored)}")
-    table = SampleTable(problems, indices["name"], columns, optional=_OPTIONAL)
-    table.notes = notes
+    table = SampleTable(problems, headers, indices["name"], columns, optional=_OPTIONAL)
+    table.notes[:0] = notes
     for number, text in body:
-        row = cells(text, len(headers), indices["name"])
-        if row is None:
-            problems.add(
-                f"the row has {cell_count(text)} values: the header names {len(headers)} columns",
-                line=number,
-            )
-        else:
-            table.add_row(number, row)
+        table.add_row(number, cells(text, len(headers), indices["name"]))
     return table, columns
 
 
@@ -209,7 +197,7 @@ def _find_units(
             line=line,
         )
     units: dict[str, tuple[int | None, str]] = {
-        q: (line, row[indices[q]]) for q in indices if q in UNITS
+        q: (line, row[indices[q]]) for q in indices if q != "name"
     }
     return units, lines[1:]
 
@@ -221,7 +209,6 @@ def _geodetic(
     velocity = enu_velocity(samples)
     if "sx" not in samples:
         return {**samples, **velocity}
-    attitude = {}
     lat, lon, _ = enu_to_geodetic(
         samples["sx"],
         samples["sy"],
@@ -230,30 +217,28 @@ def _geodetic(
         reference_lon_deg=reference[1],
         reference_alt_m=reference[2],
     )
+    # The file's axes are the reference point's; the aircraft's own have turned a little.
+    origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
+    here = local_axes(lat, lon)
     if velocity:
-        # The file's axes are the reference point's; the aircraft's own have turned a little.
-        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
-        parts = [velocity[key] for key in ("ve", "vn", "vu")]
-        x, y, z = (
-            parts[0] * origin[0][i] + parts[1] * origin[1][i] + parts[2] * origin[2][i]
-            for i in range(3)
-        )
-        velocity = {
-            key: x * axis[0] + y * axis[1] + z * axis[2]
-            for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
-        }
+        along = [velocity[key] for key in ("ve", "vn", "vu")]
+        velocity = dict(zip(("ve", "vn", "vu"), _turned(along, origin, here), strict=True))
+    attitude = {}
     if "yaw" in samples:
         # A heading counts from the reference point's north as well.
         nose = np.radians(samples["yaw"])
-        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
-        ahead = [np.sin(nose) * origin[0][i] + np.cos(nose) * origin[1][i] for i in range(3)]
-        east, north = (
-            sum(part * axis[i] for i, part in enumerate(ahead)) for axis in local_axes(lat, lon)[:2]
-        )
+        east, north, _ = _turned([np.sin(nose), np.cos(nose)], origin, here)
         attitude = {"yaw": np.degrees(np.arctan2(east, north))}
     # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
     alt = samples["sz"] + reference[2]
     return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity, **attitude}
+
+
+def _turned(parts: Sequence[FloatArray], origin: Sequence[Vector], axes: Sequence[Vector]) -> Any:
+    """Return a vector of east, north (and up) at an origin in the axes of other positions."""
+    by_axis = zip(*origin[: len(parts)], strict=True)
+    xyz = [reduce(add, map(mul, parts, of_all)) for of_all in by_axis]
+    return [reduce(add, map(mul, xyz, axis)) for axis in axes]
 
 
 def daa_columns() -> list[tuple[str, ...]]:

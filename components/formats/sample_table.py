@@ -11,13 +11,10 @@ import numpy as np
 
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.text_rows import (
-    ANGLE_DEG,
-    LENGTH_M,
     MOST_OF_A_CELL,
     MOST_PROBLEMS,
     NO_UNIT,
-    SPEED_MPS,
-    TIME_S,
+    UNIT_KINDS,
     Problems,
     TrafficFile,
     clean_token,
@@ -25,30 +22,6 @@ from components.formats.text_rows import (
 from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import shortened
 
-UNITS = {
-    "time": TIME_S,
-    "lat": ANGLE_DEG,
-    "lon": ANGLE_DEG,
-    "alt": LENGTH_M,
-    "sx": LENGTH_M,
-    "sy": LENGTH_M,
-    "sz": LENGTH_M,
-    "trk": ANGLE_DEG,
-    "gs": SPEED_MPS,
-    "vs": SPEED_MPS,
-    "vx": SPEED_MPS,
-    "vy": SPEED_MPS,
-    "vz": SPEED_MPS,
-    "yaw": ANGLE_DEG,
-    "airspeed": SPEED_MPS,
-    "pitch": ANGLE_DEG,
-    "roll": ANGLE_DEG,
-    "alerter": NO_UNIT,
-    **{f"s_{axes}_std": LENGTH_M for axes in ("ew", "ns", "en")},
-    **{f"v_{axes}_std": SPEED_MPS for axes in ("ew", "ns", "en")},
-    "sz_std": LENGTH_M,
-    "vz_std": SPEED_MPS,
-}
 _LIMITS = {
     "lat": (-90.0, 90.0, "lie in [-90, 90] degrees"),
     "lon": (-1080.0, 1080.0, "lie within ±1080 degrees"),
@@ -81,6 +54,11 @@ class ColumnSpec:
     unit: str = ""
     required: bool = False
 
+    @property
+    def units(self) -> Mapping[str, float]:
+        """What the units are worth that its column may have: those of the kind of its own."""
+        return next(kind for kind in UNIT_KINDS if self.unit in kind)
+
 
 def indices_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
     """Return in which column of a file each quantity stands that is there."""
@@ -111,10 +89,10 @@ class _Rows:
 
 
 def unit_factor(
-    problems: Problems, quantity: str, token: str, *, line: int | None, header: str
+    problems: Problems, spec: ColumnSpec, token: str, *, line: int | None, header: str
 ) -> float:
     """Look up what a unit token is worth; an unknown one is noted and taken as 1."""
-    known = UNITS[quantity]
+    known = spec.units
     plain = clean_token(token)
     if plain in known:
         return known[plain]
@@ -137,6 +115,7 @@ class SampleTable:
     def __init__(
         self,
         problems: Problems,
+        headers: Sequence[str],
         name_column: int,
         columns: dict[str, SampleColumn],
         parse_time: Callable[[str], float] | None = None,
@@ -147,9 +126,19 @@ class SampleTable:
         self._parse_time = parse_time
         self._aircraft: dict[str, _Rows] = {}
         self.notes: list[str] = []
+        self._width = len(headers)
+        used = {name_column, *(column.index for column in columns.values())}
+        if ignored := [header for i, header in enumerate(headers) if i not in used]:
+            self.notes.append(f"columns ignored: {', '.join(ignored)}")
 
-    def add_row(self, line: int, row: list[str]) -> None:
-        """Add a sample; whatever is wrong with its cells is noted."""
+    def add_row(self, line: int, row: list[str] | int) -> None:
+        """Add a sample, or note what is wrong; a row may be the number of its cells alone."""
+        if isinstance(row, int) or len(row) != self._width:
+            count = row if isinstance(row, int) else len(row)
+            self._problems.add(
+                f"the row has {count} values: the header names {self._width} columns", line=line
+            )
+            return
         name = row[self._name_column]
         if not name:
             self._problems.add("the aircraft has no name", line=line)

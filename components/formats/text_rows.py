@@ -69,7 +69,9 @@ TIME_S = {
 }
 NO_UNIT = {"none": 1.0, "unitless": 1.0, "": 1.0, "-": 1.0, "1": 1.0}
 
-ALL_TOKENS = {*LENGTH_M, *SPEED_MPS, *ANGLE_DEG, *TIME_S, *NO_UNIT}
+#: In m, m/s, deg and s.
+UNIT_KINDS = (LENGTH_M, SPEED_MPS, ANGLE_DEG, TIME_S, NO_UNIT)
+ALL_TOKENS = {token for kind in UNIT_KINDS for token in kind}
 
 
 def clean_token(token: str) -> str:
@@ -234,8 +236,8 @@ def tokens(line: str) -> list[str]:
     return _TOKEN.findall(line)
 
 
-def cells(line: str, count: int, name_column: int) -> list[str] | None:
-    """Split a row of values into as many cells as there are columns; None where that cannot be.
+def cells(line: str, count: int, name_column: int) -> list[str] | int:
+    """Split a row of values into as many cells as there are columns, or say how many it has.
 
     Commas (or semicolons, or tabs where there are neither) separate first; a cell that holds
     blanks is split further until the count fits, the aircraft's name last of all, so that names
@@ -258,11 +260,6 @@ def cells(line: str, count: int, name_column: int) -> list[str] | None:
             split.pop()
         if len(split) == count:
             return split
-    return None
-
-
-def cell_count(line: str) -> int:
-    """Count the values of a row that does not fit, for the message."""
     return len([part for part in re.split(r"[,;\s]+", line) if part])
 
 

@@ -1,8 +1,7 @@
 """False alarms of noise alone, and of clutter over a threshold that is set for noise."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -28,21 +27,6 @@ MOST_PER_SCAN = 1e5
 _NO_TARGET = np.uint64(0)
 #: Keys of false alarms within cue cones, beyond any number of those of a scan.
 _OF_CUED = 2**40
-
-
-@dataclass(frozen=True, eq=False)
-class Alarms:
-    """Threshold crossings without a target, in ascending order of the reports' rows.
-
-    `key` is that of its draws, `where` its position by quantity in the sensor's axes, `snr` how
-    strong it came out (linear, above 0) and `rate` a uniform number that says its range rate.
-    """
-
-    row: IntArray
-    key: AnyArray
-    where: Mapping[str, FloatArray]
-    snr: FloatArray
-    rate: FloatArray
 
 
 class NoiseReports:
@@ -118,9 +102,11 @@ class NoiseReports:
             threshold=crossing.threshold,
         )
         rate = places.uniform(key, scan, 4)
-        alarms = Alarms(row, key, where, np.maximum(snr, FAINTEST), rate)
+        snr = np.maximum(snr, FAINTEST)
         cued = bool(which) if len(self._crossings) > 1 else None
-        return self._block.with_noise_reports(detections, targets, rows, alarms, cued=cued)
+        return self._block.with_noise_reports(
+            detections, targets, rows, row, where, key=key, snr=snr, rate=rate, cued=cued
+        )
 
 
 class FalseAlarms(Effect[Reporting]):
@@ -236,8 +222,9 @@ class GroundReports:
         beyond = -np.log1p(-draws.uniform(key, scan, 4)) * (1.0 + cnr)
         snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
         rate = draws.uniform(key, scan, 5)
-        alarms = Alarms(row, key + _OF_GROUND, where, snr, rate)
-        joined = self._block.with_noise_reports(detections, targets, rows, alarms)
+        joined = self._block.with_noise_reports(
+            detections, targets, rows, row, where, key=key + _OF_GROUND, snr=snr, rate=rate
+        )
         # Without any here, the report is in that order already.
         return in_measured_order(joined)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -333,17 +333,8 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         return replace(budget, integration_gain_db=gain_db)
 
     def _stated_link_budget(self) -> LinkBudget:
-        budget = LinkBudget(
-            power_w=self.power_w,
-            antenna_gain_db=self.antenna_gain_db,
-            bandwidth_hz=self.bandwidth_hz or 1.0,
-            wavelength_m=self.wavelength_m,
-            frequency_hz=self.frequency_hz,
-            integration_gain_db=self.integration_gain_db,
-            noise_figure_db=self.noise_figure_db,
-            losses_db=self.losses_db,
-            minimum_range_m=self.minimum_range_m,
-        )
+        given = {one.name: getattr(self, one.name) for one in fields(LinkBudget)}
+        budget = LinkBudget(**{**given, "bandwidth_hz": self.bandwidth_hz or 1.0})
         if self.calibrate is None:
             return budget
         try:

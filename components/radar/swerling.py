@@ -1,7 +1,7 @@
 """A radar that detects with the probability its SNR gives (``radar.swerling``, thesis §4.1.2)."""
 
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -31,7 +31,6 @@ from components.sensor.cued_looks import CUE
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
-from dsa_des.time.randomness import Stream
 
 
 class SwerlingParameters(LinkBudgetParameters):
@@ -245,14 +244,8 @@ class SwerlingRadar(LinkBudgetRadar):
             if self._fading is not None and self._lasts(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
-            target, scan = keys[chosen], cells.scan[chosen]
             draws = self._rcs_draws.of_runs(cells.run[chosen])
-
-            def draw(
-                number: int, target: Any = target, scan: Any = scan, draws: Stream = draws
-            ) -> FloatArray:
-                return draws.uniform(target, scan, number)
-
+            draw = partial(draws.uniform, keys[chosen], cells.scan[chosen])
             rcs[chosen] = scan_rcs(
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"
             )

@@ -19,7 +19,6 @@ from components.radar.detection.probability import required_snr
 from components.radar.detection.threshold import Crossing
 from components.radar.doppler import DopplerFilter
 from components.radar.false_alarms import (
-    Alarms,
     ClutterAlarms,
     FalseAlarms,
     high_false_alarms,
@@ -199,23 +198,30 @@ class LinkBudgetRadar(Radar):
         detections: Detections,
         targets: RelativeTargets,
         rows: IntArray,
-        alarms: Alarms,
+        row: IntArray,
+        where: dict[str, FloatArray],
         *,
+        key: AnyArray,
+        snr: FloatArray,
+        rate: FloatArray,
         cued: bool | None = None,
     ) -> Detections:
-        """Return a report with what is not there beside, reported as if it were.
+        """Return a report with threshold crossings without a target, reported as if it were there.
 
-        `cued` says whether only those inside cue cones are kept, or those outside; None keeps all.
+        They are given by ascending row of the report, position by quantity in the sensor's axes,
+        key of their draws, how strong they came out (linear, above 0), and a uniform number that
+        says the range rate. `cued` says whether only those inside cue cones are kept, or those
+        outside; None keeps all.
         """
-        where, row = dict(alarms.where), alarms.row
         if self.p.measures_range_rate:
-            where["range_rate"] = self.noise_range_rate(alarms.rate, where, targets, rows[row])
+            range_rate = self.noise_range_rate(rate, where, targets, rows[row])
+            where = {**where, "range_rate": range_rate}
         scan, tick, run = detections.scan[row], detections.tick[row], detections.run[row]
         instant_ns = nanosecond_of(tick, self.context.ticks_per_s)
         azimuth, elevation, range_m, measured = self.report_noise(
-            where, {"snr": alarms.snr}, (alarms.key, scan, instant_ns, run)
+            where, {"snr": snr}, (key, scan, instant_ns, run)
         )
-        snr_db = 10.0 * np.log10(alarms.snr)
+        snr_db = 10.0 * np.log10(snr)
         extras: dict[str, AnyArray] = {"snr_db": snr_db}
         kept: Any = slice(None)
         if cones := self.built_one(CUE):

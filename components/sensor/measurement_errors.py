@@ -105,13 +105,11 @@ class ErrorModel:
         `true` is the truth by quantity, in the sensor's axes.
         """
         signal = {name: all_[detected] for name, all_ in look.signal.items()}
-        of_signal = self._of_signal(signal)
         keys = cells.roster.keys_of(cells.target[detected])
-        when = cells.scan[detected], cells.instant_ns[detected], cells.run[detected]
+        scan, run = cells.scan[detected], cells.run[detected]
         if look.noise is not None and self._signal:
-            true = self._in_cells(true, look.noise[detected], keys, when[0], when[2])
-        values = self._off(true, lambda name, error: error(keys, *when, of_signal.get(name)))
-        return self._stated(self._valid(values), of_signal, signal)
+            true = self._in_cells(true, look.noise[detected], keys, scan, run)
+        return self.of_noise(true, signal, (keys, scan, cells.instant_ns[detected], run))
 
     def _in_cells(
         self,
@@ -130,7 +128,7 @@ class ErrorModel:
             return true
         silent = {"snr": np.zeros(1)}
         places = dict(true)
-        for number, (name, most) in enumerate(self._of_signal(silent).items()):
+        for number, (name, most) in enumerate(self._block.signal_variances(silent).items()):
             width = math.sqrt(12.0 * float(most[0]))
             part = self._places.of_runs(run[noise]).uniform(keys[noise], scan[noise], number)
             middle = np.rint(true[name][noise] / width) * width
@@ -158,54 +156,33 @@ class ErrorModel:
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
         """
-        of_signal = self._of_signal(signal)
+        of_signal: Values = self._block.signal_variances(signal) if self._signal else {}
         if drawn is not None:
             keys, scan, instant_ns, run = drawn
-            when = scan, instant_ns, run
-            where = self._off(where, lambda name, error: error(keys, *when, of_signal.get(name)))
-        return self._stated(self._valid(where), of_signal, signal)
-
-    def _off(
-        self,
-        true: Values,
-        drawn: Callable[[str, QuantityError], FloatArray],
-    ) -> dict[str, FloatArray]:
-        """Return values with their errors, which some have as a share of the value."""
-        return {
-            name: true[name] + drawn(name, error) * (true[name] if name in self._shares else 1.0)
-            for name, error in self._errors.items()
-        }
-
-    def _stated(
-        self,
-        values: dict[str, FloatArray],
-        of_signal: Values,
-        signal: Values,
-    ) -> Measured:
-        """Return what is measured, with its variances by column."""
-        columns = self._columns(len(values["azimuth"]), of_signal)
-        for name, share in self._shares.items():
-            columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + share * values[name] ** 2
+            errors = {
+                name: error(keys, scan, instant_ns, run, of_signal.get(name))
+                for name, error in self._errors.items()
+            }
+            # Some are a share of the value.
+            where = {
+                name: where[name] + error * (where[name] if name in self._shares else 1.0)
+                for name, error in errors.items()
+            }
+        values = self._valid(where)
+        count, columns = len(values["azimuth"]), {}
+        for name, constant in self._variances.items():
+            if name in of_signal:
+                variance = constant + of_signal[name]
+            else:
+                variance = constant_column(constant, count)
+            if name in self._shares:
+                variance = variance + self._shares[name] * values[name] ** 2
+            columns[VARIANCE_OF[name]] = variance
         if self._block.wander is not None:
             added = self._block.wander.variances(values, signal, self._block.pixel_rad)
             for name, more in added.items():
                 columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + more
         return values, columns
-
-    def _of_signal(self, signal: Values) -> Values:
-        of_signal: Values = {}
-        if self._signal:
-            of_signal = self._block.signal_variances(signal)
-        return of_signal
-
-    def _columns(self, count: int, of_signal: Values) -> dict[str, FloatArray]:
-        """Return variances by column: what all detections share, and what their signals add."""
-        return {
-            VARIANCE_OF[name]: value + of_signal[name]
-            if name in of_signal
-            else constant_column(value, count)
-            for name, value in self._variances.items()
-        }
 
     def _valid(self, values: Values) -> dict[str, FloatArray]:
         """Return erring values as they are reported: on the grid, and what their kind can be.

@@ -32,14 +32,9 @@ def altimetry_error_ft(
     its uniform draw `kind`, which says whether its altimeter is one of the better ones there, so
     that the error changes with the layer alone.
     """
-    return np.asarray(laplace * altimetry_scale_ft(altitude_ft, kind))
-
-
-def altimetry_scale_ft(altitude_ft: FloatArray, kind: FloatArray) -> FloatArray:
-    """Return the scale of the error at altitudes, for aircraft of a kind (see above)."""
     layer = np.searchsorted(LAYER_TOPS_FT, altitude_ft, side="left")
     better: BoolArray = kind < SHARE_OF_BETTER[layer]
-    return np.where(better, BETTER_FT[layer], OTHER_FT[layer])
+    return np.asarray(laplace * np.where(better, BETTER_FT[layer], OTHER_FT[layer]))
 
 
 def altimetry_variance_ft2(altitude_ft: FloatArray) -> FloatArray:

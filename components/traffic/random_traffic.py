@@ -14,9 +14,8 @@ from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import straight_fleet
-from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry import enu_to_geodetic
-from components.traffic.scripted import Ownship, flight_arguments
+from components.traffic.scripted import Ownship, flight_of
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.time.randomness import target_keys
@@ -66,9 +65,7 @@ class RandomTraffic(TrafficSource):
         super().__init__(name, parameters, context)
         p = parameters
         own = p.ownship
-        self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own, self.wind)
-        )
+        self.own = flight_of(own, own.start, self.wind)
         names = tuple(f"intruder_{number}" for number in range(1, p.intruders + 1))
         keys = target_keys(names)
         stream = self.stream("start")

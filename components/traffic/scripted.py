@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
-from components.flights.legs import AnyLeg
+from components.flights.legs import AnyLeg, Position
 from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import enu_to_geodetic
@@ -67,6 +67,11 @@ class Ownship(Flight):
     lon_deg: float = Field(description="Longitude at the start, deg.")
     alt_m: float = Field(description="Altitude at the start, m.")
 
+    @property
+    def start(self) -> Position:
+        """Latitude, longitude and altitude of the start."""
+        return self.lat_deg, self.lon_deg, self.alt_m
+
 
 class Intruder(Flight, Aircraft):
     """An intruder: a name, a start, a flight and what sensors need to know of it."""
@@ -113,15 +118,12 @@ class ScriptedTraffic(TrafficSource):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         own = parameters.ownship
-        reference = (own.lat_deg, own.lon_deg, own.alt_m)
-        self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own, self.wind)
-        )
+        self.own = flight_of(own, own.start, self.wind)
         crafts = parameters.targets
         used = Counter(intruder.name for intruder in crafts)
         for twice in sorted(name for name, count in used.items() if count > 1):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        self.targets = _intruders(crafts, reference, self.wind)
+        self.targets = _intruders(crafts, own.start, self.wind)
         self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 
     def flights_of_runs(
@@ -136,13 +138,9 @@ class ScriptedTraffic(TrafficSource):
         roster = joint_roster(self.roster, [(craft.name, craft) for craft in crafts])
         if roster is None:
             return None
-        positions = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
-        references = np.repeat(np.array(positions, dtype=np.float64), width, axis=0)
-        starts = _start_positions(crafts, references)
-        ownships, targets = (
-            _straight(own, positions, self.wind),
-            _straight(crafts, starts, self.wind),
-        )
+        origins = np.array([flight.start for flight in own], dtype=np.float64)
+        starts = _start_positions(crafts, np.repeat(origins, width, axis=0))
+        ownships, targets = _straight(own, origins, self.wind), _straight(crafts, starts, self.wind)
         return FlightsOfRuns(ownships, targets, roster)
 
     def sample_times(self) -> list[SampleTimes]:
@@ -162,63 +160,69 @@ def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
         raise ValueError(f"{name}: {error}") from None
 
 
-def flight_arguments(
-    flight: Flight, wind: Wind | None = None, name: str = "ownship"
-) -> dict[str, Any]:
-    """Return what a scene says of a flight as arguments of `ScriptedTrajectory`."""
-    return {
-        "alt_m": flight.alt_m,
-        "heading_deg": flight.heading_deg,
-        "speed_mps": over_the_ground_mps(flight, name, wind),
-        "climb_mps": flight.climb_mps,
-        "yaw_deg": flight.yaw_deg,
-        "pitch_deg": flight.pitch_deg,
-        "roll_deg": flight.roll_deg,
-        "legs": flight.legs,
-    }
-
-
-def _intruders(
-    crafts: Sequence[Intruder], reference: tuple[float, float, float], wind: Wind | None
-) -> ScriptedFleet:
-    """Return the flights of all intruders; starts given as offsets are converted together."""
-    known = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
-    if not any(craft.legs for craft in crafts):
-        return _straight(crafts, known, wind)
-    return ScriptedFleet(
-        [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
+def flight_of(
+    flight: Flight, start: Position, wind: Wind | None, reference: Position | None = None
+) -> ScriptedTrajectory:
+    """Return what a scene says of a flight, from where it starts; see `ScriptedTrajectory`."""
+    lat_deg, lon_deg, alt_m = start
+    return ScriptedTrajectory(
+        _name(flight),
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        alt_m=alt_m,
+        heading_deg=flight.heading_deg,
+        speed_mps=over_the_ground_mps(flight, _name(flight), wind),
+        climb_mps=flight.climb_mps,
+        yaw_deg=flight.yaw_deg,
+        pitch_deg=flight.pitch_deg,
+        roll_deg=flight.roll_deg,
+        legs=flight.legs,
+        reference=reference,
+        start_time_s=getattr(flight, "start_time_s", 0.0),
+        end_time_s=getattr(flight, "end_time_s", None),
     )
 
 
-def _start_positions(
-    crafts: Sequence[Intruder], references: FloatArray
-) -> list[tuple[float, float, float]]:
-    """Return where intruders start, each with its offset from a reference (n, 3) of its own."""
-    starts: list[tuple[float, float, float] | None] = []
-    offsets: list[tuple[float, float, float]] = []
-    for craft in crafts:
+def _intruders(crafts: Sequence[Intruder], reference: Position, wind: Wind | None) -> ScriptedFleet:
+    """Return the flights of all intruders."""
+    starts = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
+    if not any(craft.legs for craft in crafts):
+        return _straight(crafts, starts, wind)
+    return ScriptedFleet(
+        [flight_of(craft, tuple(at), wind, reference)
+         for craft, at in zip(crafts, starts.tolist(), strict=True)]
+    )  # fmt: skip
+
+
+def _start_positions(crafts: Sequence[Intruder], references: FloatArray) -> FloatArray:
+    """Return where intruders start (n, 3), offsets counted from a reference (n, 3) of each."""
+    starts: FloatArray = np.zeros((len(crafts), 3))
+    relative = np.zeros(len(crafts), dtype=bool)
+    for number, craft in enumerate(crafts):
         geodetic = (craft.lat_deg, craft.lon_deg, craft.alt_m)
         offset = (craft.east_m, craft.north_m, craft.up_m)
-        if None not in geodetic and offset == (None, None, None):
-            starts.append((craft.lat_deg or 0.0, craft.lon_deg or 0.0, craft.alt_m or 0.0))
-        elif None not in offset[:2] and geodetic == (None, None, None):
-            starts.append(None)
-            offsets.append((craft.east_m or 0.0, craft.north_m or 0.0, craft.up_m or 0.0))
-        else:
+        relative[number] = geodetic == (None, None, None)
+        given, other = (offset, geodetic) if relative[number] else (geodetic, offset)
+        if other != (None, None, None) or None in (given[:2] if relative[number] else given):
             raise ValueError(
                 f"intruder {craft.name!r}: its start must be given as lat_deg, lon_deg and alt_m, "
                 "or as east_m, north_m and up_m from the ownship's start"
             )
-    relative = np.array([start is None for start in starts], dtype=bool)
-    converted = iter(_geodetic(offsets, references[relative]))
-    return [next(converted) if start is None else start for start in starts]
+        starts[number] = [part or 0.0 for part in given]
+    lat_deg, lon_deg, alt_m = references[relative].T
+    starts[relative] = np.stack(
+        enu_to_geodetic(
+            *starts[relative].T, reference_lat_deg=lat_deg, reference_lon_deg=lon_deg,
+            reference_alt_m=alt_m,
+        ),
+        axis=-1,
+    )  # fmt: skip
+    return starts
 
 
-def _straight(
-    crafts: Sequence[Flight], known: list[tuple[float, float, float]], wind: Wind | None
-) -> ScriptedFleet:
-    """Return flights without legs from where they start."""
-    lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).reshape(-1, 3).T.copy()
+def _straight(crafts: Sequence[Flight], starts: FloatArray, wind: Wind | None) -> ScriptedFleet:
+    """Return flights without legs from where they start (n, 3)."""
+    lat_deg, lon_deg, alt_m = starts.T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:
         values = [getattr(craft, name, None) for craft in crafts]
@@ -235,36 +239,3 @@ def _straight(
 
 def _name(flight: Flight) -> str:
     return getattr(flight, "name", "ownship")
-
-
-def _geodetic(
-    offsets: list[tuple[float, float, float]], references: FloatArray
-) -> list[tuple[float, float, float]]:
-    east, north, up = np.array(offsets).reshape(-1, 3).T
-    lat, lon, alt = enu_to_geodetic(
-        east,
-        north,
-        up,
-        reference_lat_deg=references[:, 0],
-        reference_lon_deg=references[:, 1],
-        reference_alt_m=references[:, 2],
-    )
-    return list(zip(lat.tolist(), lon.tolist(), alt.tolist(), strict=True))
-
-
-def _intruder(
-    craft: Intruder,
-    start: tuple[float, float, float],
-    reference: tuple[float, float, float],
-    wind: Wind | None,
-) -> ScriptedTrajectory:
-    lat_deg, lon_deg, alt_m = start
-    return ScriptedTrajectory(
-        craft.name,
-        lat_deg=lat_deg,
-        lon_deg=lon_deg,
-        reference=reference,
-        start_time_s=craft.start_time_s,
-        end_time_s=craft.end_time_s,
-        **flight_arguments(craft, wind, craft.name) | {"alt_m": alt_m},
-    )

@@ -287,9 +287,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     variants, first = costs_of("first_light.toml")
     draw_costs(images / "cost_first_light.png", variants.scene.title, first)
-    chain = run_chain(variants, first, compare)
+    chain, picked = run_chain(variants, first, compare)
     label = compare.difference.label
-    draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows, label)
+    draw_chain(images / "cost_chain.png", variants.scene.title, chain, label)
     flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
     draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
     _, third = costs_of(*TRACKERS, block="tracker", duration_s="20")
@@ -297,7 +297,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         head=head_lines(second, radar_sees_from(flown.scene)),
         error_map=error_map_section(images),
         first_light=_tables(first),
-        chain=_chain(chain),
+        chain=_chain(chain, picked),
         encounter=_tables(second),
         encounter_name=options.encounter.name,
         encounter_says=options.encounter_says,
@@ -357,14 +357,14 @@ def _line(cost: Any) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _chain(chain: Any) -> str:
+def _chain(chain: list[dict[str, Any]], picked: str) -> str:
     lines = [
-        f"{chain.picked[0].upper()}{chain.picked[1:]}. The front:",
+        f"{picked[0].upper()}{picked[1:]}. The front:",
         "",
         "| µs/target-scan | detections that differ | rungs |",
         "|---|---|---|",
     ]
-    front = [row for row in chain.rows if row["pareto"]]
+    front = [row for row in chain if row["pareto"]]
     for row in sorted(front, key=lambda row: float(row["cpu_us_per_target_scan"])):
         share = f"{row['error_p95']:.2%}"
         lines.append(f"| {row['cpu_us_per_target_scan']:.2f} | {share} | {row['rung']} |")

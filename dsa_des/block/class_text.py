@@ -19,19 +19,9 @@ class ClassText(str):
 
 
 def type_text(cls: type, group: str) -> str:
-    """Return how a scene names a class.
+    """Return how a scene names a class: as registered in a group of entry points.
 
-    Parameters
-    ----------
-    cls : type
-    group : str
-        Entry points among which it may be registered.
-
-    Returns
-    -------
-    str
-        Its registered name, or ``module:Class`` where any process can import it, or else a
-        `ClassText`.
+    Else as ``module:Class`` where any process can import it, and else as a `ClassText`.
     """
     path = f"{cls.__module__}:{cls.__qualname__}"
     for name, point in registered(group).items():

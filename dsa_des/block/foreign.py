@@ -30,18 +30,7 @@ _HOME = Path(__file__).parents[2]
 
 
 def refuse_hidden(module_name: str) -> None:
-    """Make sure that a module of ours is imported from our package.
-
-    Parameters
-    ----------
-    module_name : str
-        Such as ``components.gate``.
-
-    Raises
-    ------
-    UsageError
-        If another package of the name comes first, with its file.
-    """
+    """Raise UsageError if a module of ours, by name, would be imported from another package."""
     top = module_name.partition(".")[0]
     ours = _HOME / top
     found = _place_of(top)
@@ -83,17 +72,10 @@ class NotAllowed(NotImportable):
 
 @dataclass(frozen=True)
 class Foreign:
-    """One foreign module that something names.
+    """One foreign module that something names: `key`, for example ``blocks.radar.type``.
 
-    Parameters
-    ----------
-    key : str
-        Who names it, for example ``blocks.radar.type``.
-    name : str
-        As it is named there, for example ``mine:Radar``.
-    module : str
-    file : str
-        Where it would be imported from, or what it is instead of a file.
+    `name` is as it stands there, for example ``mine:Radar``; `file` is where it would be imported
+    from, or what it is instead of a file.
     """
 
     key: str
@@ -104,28 +86,14 @@ class Foreign:
 
 @dataclass
 class Imports:
-    """What may be imported, and who is told before it is.
-
-    Parameters
-    ----------
-    allowed : bool
-        Whether foreign modules may be imported at all.
-    announce : callable, optional
-        Called with each `Foreign` before it is imported, or not.
-    """
+    """What may be imported, and what is called with each `Foreign` before that, or instead."""
 
     allowed: bool = True
     announce: Callable[[Foreign], None] | None = None
     seen: set[Foreign] = field(default_factory=set)
 
     def about_to(self, foreign: Foreign) -> None:
-        """Tell who wants to know.
-
-        Raises
-        ------
-        NotAllowed
-            If nothing foreign may be imported.
-        """
+        """Call the announcement; NotAllowed if nothing foreign may be imported."""
         if self.announce is not None and foreign not in self.seen:
             self.seen.add(foreign)
             self.announce(foreign)
@@ -148,21 +116,10 @@ def imports(policy: Imports) -> Iterator[Imports]:
 
 
 def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
-    """Return what ``module:Class`` or ``./file.py:Class`` names.
+    """Return what ``module:Class`` or ``./file.py:Class`` names; `NotImportable` if it cannot be.
 
-    Parameters
-    ----------
-    name : str
-        One that knows the folder it was written in (`SourcedText`) is looked for there, too.
-    key : str
-        Who names it, for messages.
-    beside : sequence of Path
-        Further folders in which a module may lie, such as that of the scene.
-
-    Raises
-    ------
-    NotImportable
-        If it cannot be imported.
+    A name that knows the folder it was written in (`SourcedText`) is looked for there, too, and in
+    the folders `beside`. The `key` names it, for messages.
     """
     module_name, class_name = source_file.split_name(name)
     path = source_file.path_of(name) if source_file.is_file(module_name) else None
@@ -187,20 +144,10 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
 
 
 def load_point(point: EntryPoint, key: str = "") -> Any:
-    """Return what an entry point names.
+    """Return what an entry point names, which is announced if another package registered it.
 
-    Parameters
-    ----------
-    point : EntryPoint
-    key : str
-        Who names it; those of other packages are announced if any does.
-
-    Raises
-    ------
-    NotImportable
-        If it cannot be imported.
-    UsageError
-        If it is ours and another package hides it.
+    Raises NotImportable if it cannot be imported, and UsageError if it is ours and another package
+    hides it.
     """
     if is_ours(point):
         refuse_hidden(point.module)
@@ -219,10 +166,7 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
 def installed(point: EntryPoint) -> Any:
     """Return what a package registered that no file names: a section, a report, a command.
 
-    Raises
-    ------
-    UsageError
-        If it cannot be imported.
+    UsageError if it cannot be imported.
     """
     try:
         return load_point(point)

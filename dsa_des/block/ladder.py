@@ -105,10 +105,7 @@ class Rung:
     def changes(self, block: Mapping[str, Any]) -> dict[str, Any]:
         """Return the parameters to set in a scene's block.
 
-        Raises
-        ------
-        Unavailable
-            If the block does not say what the rung needs.
+        Unavailable if the block does not say what the rung needs.
         """
         given = self.parameters(block) if callable(self.parameters) else self.parameters
         return {**self.shared, **given}
@@ -174,11 +171,5 @@ class Ladder:
             raise ValueError(f"ladder {self.name!r}: needs at least one quantity")
 
     def rung(self, name: str) -> Rung:
-        """Return a rung by name.
-
-        Raises
-        ------
-        KeyError
-            If there is none.
-        """
+        """Return a rung by name; KeyError if there is none."""
         return {rung.name: rung for rung in self.rungs}[name]

@@ -240,13 +240,7 @@ class Message(_Found):
         return result
 
     def reordered(self, order: IntArray) -> Self:
-        """Return the message with its entries in another order, each still of its row.
-
-        Parameters
-        ----------
-        order : (entries,) of int
-            The entry that comes to each place; rows stay ascending.
-        """
+        """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
         for name in _layout(type(self))[1]:
             setattr(result, name, _pick(getattr(self, name), order))
@@ -322,10 +316,7 @@ class Message(_Found):
 def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
     """Return what a block returned as messages by output name; a lone one goes to the only output.
 
-    Raises
-    ------
-    TypeError
-        If a lone message could go to several outputs.
+    TypeError if a lone message could go to several outputs.
     """
     if result is None:
         return {}

@@ -57,12 +57,8 @@ def largest_of(name: str) -> float:
 def refuse_extremes(name: str, value: Any) -> None:
     """Raise ValueError when a number, or one in a list or table, is too large or too small.
 
-    Parameters
-    ----------
-    name : str
-        Name of the quantity, with its unit at the end.
-    value : object
-        What is no number, list or table of numbers passes.
+    The name of the quantity has its unit at the end; what is no number, list or table of numbers
+    passes.
     """
     if isinstance(value, float | int):
         size = abs(value)
@@ -158,15 +154,7 @@ class Parameters(BaseModel):
         return []
 
     def idle(self, *keys: str, because: str) -> list[str]:
-        """Return one sentence for each of some keys that is not at its default.
-
-        Parameters
-        ----------
-        *keys : str
-            That have no effect.
-        because : str
-            Which value of another key makes them so.
-        """
+        """Say which keys without effect, `because` of another one, are not at their defaults."""
         fields = type(self).model_fields
         return [
             f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"

@@ -183,10 +183,8 @@ def instants_of(message: Any, row: IntArray | None = None) -> Columns:
 class DerivedColumns:
     """What one message class records by its fields; those of its mix-ins come last.
 
-    Raises
-    ------
-    TypeError
-        If a field fills a column of a table that the class does not name, or two fill one column.
+    TypeError if a field fills a column of a table that the class does not name, or two fill one
+    column.
     """
 
     def __init__(self, message_type: Any, base: type) -> None:
@@ -252,10 +250,7 @@ class DerivedColumns:
     def tables(self, message: Any) -> dict[str, Columns]:
         """Return the rows to record of a message.
 
-        Raises
-        ------
-        ValueError
-            If a dict of columns holds one that belongs to another field.
+        ValueError if a dict of columns holds one that belongs to another field.
         """
         tables: dict[str, Columns] = {}
         if self._rows:

@@ -43,20 +43,8 @@ class NotImported(UnknownType):
 def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Component]:
     """Return the class of a registered block type, ``module:Class`` or ``./file.py:Class``.
 
-    Parameters
-    ----------
-    type_name : str
-    key : str
-        Who names it, for those who want to know what is imported.
-    beside : sequence of Path
-        Folders in which a module may lie, such as that of the scene.
-
-    Raises
-    ------
-    NotImported
-        If it may not be imported.
-    UnknownType
-        If it cannot be imported or is not a `Component`.
+    The `key` names it, for messages; modules may lie in the folders `beside`. Raises NotImported if
+    it may not be imported, and UnknownType if it cannot be or is not a `Component`.
     """
     if isinstance(type_name, ClassText):
         return _looked_at(type_name, type_name.cls)

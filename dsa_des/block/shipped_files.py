@@ -21,10 +21,7 @@ GROUP = "dsa_des.examples"
 def folders() -> list[Path]:
     """Return the folders of examples of all installed packages.
 
-    Raises
-    ------
-    UsageError
-        If one of them cannot be asked.
+    UsageError if one of them cannot be asked.
     """
     found = []
     for point in registered(GROUP).values():
@@ -40,16 +37,8 @@ def folders() -> list[Path]:
 def found_or_shipped(path: Path, name: str) -> Path:
     """Return a path that exists, or else the shipped file that a name means, or else the path.
 
-    Parameters
-    ----------
-    path : Path
-    name : str
-        As it was written: ``alerting/do365b.conf``, or ``do365b.conf`` where only one is called so.
-
-    Raises
-    ------
-    UsageError
-        If a package that registered a folder cannot be asked.
+    The name is as it was written: ``alerting/do365b.conf``, or ``do365b.conf`` where only one is
+    called so.
     """
     wanted = PurePosixPath(name)
     if os.path.lexists(path) or wanted.is_absolute() or not wanted.suffix or ".." in wanted.parts:
@@ -68,22 +57,9 @@ def shipped_files() -> Iterator[tuple[PurePosixPath, Path]]:
 
 
 def files_named(name: str) -> list[Path]:
-    """Return the shipped files that a name may mean.
+    """Return the shipped files that a name may mean: the one of that path, or all of that stem.
 
-    Parameters
-    ----------
-    name : str
-        ``first_light``, ``systems/oasys``, with ``.toml`` or without.
-
-    Returns
-    -------
-    list of Path
-        The one of that place, or all of that stem.
-
-    Raises
-    ------
-    UsageError
-        If a package that registered a folder cannot be asked.
+    Names are ``first_light`` or ``systems/oasys``, with ``.toml`` or without.
     """
     wanted = PurePosixPath(name.removesuffix(".toml"))
     if not wanted.name or wanted.is_absolute() or ".." in wanted.parts:

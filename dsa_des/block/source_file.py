@@ -130,10 +130,7 @@ def is_file(name: str) -> bool:
 def absolute(name: str) -> str:
     """Return ``./file.py:Class`` with its file written out; other names as they are.
 
-    Parameters
-    ----------
-    name : str
-        A `dsa_des.block.component.SourcedText` knows the folder of the file that it was written in.
+    A `SourcedText` knows the folder of the file that it was written in.
     """
     file, class_name = split_name(name)
     return f"{path_of(name)}:{class_name}" if is_file(file) else name

@@ -66,11 +66,11 @@ def _of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
     """Return the row of one key and of what is inside it; all rows without a key."""
     if key is None:
         return rows
-    found = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
-    if not found:
+    result = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
+    if not result:
         hint = did_you_mean(key, [row[0].strip() for row in rows])
         raise UsageError(f"{name}: has no key {key!r}{hint}")
-    return found
+    return result
 
 
 def _list(console: Any, names: typing.Sequence[str]) -> None:
@@ -185,12 +185,12 @@ def show_examples(copy: str | None) -> None:
     if copy is not None:
         _copy(named(copy, _OPTION))
         return
-    found = examples()
-    if not found:
+    result = examples()
+    if not result:
         say("no installed package ships scenes or studies")
-    width = max((len(example.name) for example in found), default=0)
+    width = max((len(example.name) for example in result), default=0)
     for kind, heading in _HEADINGS.items():
-        of_kind = [example for example in found if example.kind == kind]
+        of_kind = [example for example in result if example.kind == kind]
         if of_kind:
             say(heading)
         for example in of_kind:
@@ -210,8 +210,8 @@ def _copy(target: Path) -> None:
     try:
         if os.path.lexists(target) and any(target.iterdir()):
             raise UsageError(f"{_OPTION} {target}: is not empty; a new folder is needed")
-        place = location_of(target)
-        with unfinished(place) as folder:
+        path = location_of(target)
+        with unfinished(path) as folder:
             copied = folder / "copy"
             copied.mkdir()
             several = len(sources) > 1
@@ -219,16 +219,16 @@ def _copy(target: Path) -> None:
                 _copy_files(source, copied / source.parent.name if several else copied)
                 for source in sources
             )
-            if place.exists():
-                place.rmdir()
-            copied.rename(place)
+            if path.exists():
+                path.rmdir()
+            copied.rename(path)
     except OSError as error:
         raise OutputError(f"{_OPTION} {target}: cannot be written: {reason_of(error)}") from error
     say(f"{target}: {count} files")
 
 
 def _copy_files(source: Path, into: Path) -> int:
-    """Copy what is in the files, not who may read and write them."""
+    """Copy the content of files, not their permissions."""
     files = [path for path in sorted(source.rglob("*")) if path.is_file()]
     files = [path for path in files if _CODE not in path.parts]
     for path in files:

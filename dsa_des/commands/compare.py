@@ -21,7 +21,7 @@ from dsa_des.commands.study import (
     run_into,
     show_study,
 )
-from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_what_changed
+from dsa_des.commands.what_changed import Pair, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
@@ -75,17 +75,17 @@ class _OfAll:
         scenes = [load_scene(path, sets=self.sets)]
         for block, types in swaps:
             scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
-        found = []
+        result = []
         for name in registered(METRICS):
             try:
                 for scene in scenes:
                     MetricSpec(name).build(scene)
             except ValueError:
                 continue
-            found.append(name)
-        if not found:
+            result.append(name)
+        if not result:
             raise UsageError(f"{path}: no metric can be measured of this scene")
-        return found
+        return result
 
 
 def compare_command(
@@ -106,8 +106,8 @@ def compare_command(
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        found = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
-        report_crashes(found, _ANEW)
+        result = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
+        report_crashes(result, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results, _first(results))
@@ -119,17 +119,16 @@ def compare_command(
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         result_names(record.results, results)
-    by_place: dict[Path, Tables] = {}  # what is named twice is run once
+    by_path: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
-            place = file.resolve()
-            if place not in by_place:
-                by_place[place] = _tables(file, study, workers, home)
-        found = [by_place[file.resolve()] for file in files]
-        for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
-            stem = "scatter" if len(found) == 2 else f"scatter-{number}"
-            _compare(found[0], other, (paths[0], path), results, home / stem)
-    report_crashes(list(by_place.values()), _ANEW)
+            if file.resolve() not in by_path:
+                by_path[file.resolve()] = _tables(file, study, workers, home)
+        result = [by_path[file.resolve()] for file in files]
+        for number, (other, path) in enumerate(zip(result[1:], paths[1:], strict=True), start=2):
+            stem = "scatter" if len(result) == 2 else f"scatter-{number}"
+            _compare(result[0], other, (paths[0], path), results, home / stem)
+    report_crashes(list(by_path.values()), _ANEW)
 
 
 def _compare_swap(
@@ -158,13 +157,12 @@ def _compare_swap(
     study = changes.study(path, chosen)
     result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
-        folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
+        folder = run_into(study, home, workers, resume=False, again=_ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
         for metric in tables.notable_results(results):
-            units = Units(tables, base), Units(tables, rows)
-            _farthest_apart(metric, units, (own, str(value)))
+            _farthest_apart(metric, Pair(tables, base, tables, rows), (own, str(value)))
     return [tables]
 
 
@@ -201,7 +199,7 @@ def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: P
         return Tables(study, StudyFolder(path))
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
-    folder = run_into(study, target, workers, resume=False, again=lambda _: _ANEW)
+    folder = run_into(study, target, workers, resume=False, again=_ANEW)
     return tables_of(study, folder)
 
 
@@ -209,30 +207,26 @@ def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
-def _farthest_apart(
-    metric: str,
-    units: tuple[Units, Units],
-    names: tuple[str, str],
-) -> None:
+def _farthest_apart(metric: str, pair: Pair, names: tuple[str, str]) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
-    first, second = units[0].values(metric), units[1].values(metric)
-    both = [key for key in first if key in second and not np.isnan(first[key] - second[key])]
-    pairs = (np.array([side[key] for key in both]) for side in (first, second))
-    changes = dict(zip(both, changes_of(*pairs).tolist(), strict=True))
-    both.sort(key=lambda key: (-abs(changes[key]), key))
-    both = [key for key in both if changes[key] != 0.0][:_MOST_SHOWN]
-    if not both:
+    first, second = pair.values(metric)
+    known = np.flatnonzero(~np.isnan(first - second))
+    changes = changes_of(first[known], second[known])
+    changed = [
+        (-abs(change), pair.keys[run], run)
+        for change, run in zip(changes.tolist(), known.tolist(), strict=True)
+        if change != 0.0
+    ]
+    if not changed:
         return
     say()
     say(f"{metric}: where {names[1]} differs most from {names[0]}")
-    rows = [dict(zip(side.keys, side.rows.tolist(), strict=True)) for side in units]
-    for key in both:
+    for _, key, run in sorted(changed)[:_MOST_SHOWN]:
         where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
-        change = f"{short(first[key])} -> {short(second[key])}"
+        change = f"{short(float(first[run]))} -> {short(float(second[run]))}"
         say(f"  {where}replica {key[-1]}: {change}")
-        for side, numbers in zip(units, rows, strict=True):
-            row = side.tables.rows.row(numbers[key])
-            say(f"    {side.tables.record.command(row)}")
+        for tables, rows in zip(pair.tables, pair.rows, strict=True):
+            say(f"    {tables.record.command(tables.rows.row(rows[run]))}")
 
 
 def _compare(
@@ -261,19 +255,14 @@ def _compare(
     for at, rows in one.rows.each_place():
         if at not in theirs:
             continue
-        sides = Units(one, rows), Units(other, theirs[at])
+        runs = Pair(one, rows, other, theirs[at])
         where = ", ".join(f"{n} = {short(v)}" for n, v in zip(one.rows.axes, at, strict=True))
-        places.append((where, sides))
+        places.append((where, runs))
+        names_of = [key[:-1] if one.rows.over else key for key in runs.keys]
+        codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
+        units = np.array([codes[name] for name in names_of], dtype=np.int64)
         for metric in metrics:
-            first, second = sides[0].values(metric), sides[1].values(metric)
-            keys = [key for key in first if key in second]
-            names_of = [key[:-1] if one.rows.over else key for key in keys]
-            codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
-            pair = paired_units(
-                np.array([codes[name] for name in names_of], dtype=np.int64),
-                np.array([first[k] for k in keys]),
-                np.array([second[k] for k in keys]),
-            )[1:]
+            pair = paired_units(units, *runs.values(metric))[1:]
             d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             lines.append(
                 [*map(short, at), metric, *rounded(d.paired), str(d.paired.count),
@@ -288,9 +277,9 @@ def _compare(
             say(f"only {shortened(who)} has {shortened(', '.join(alone), 300)}")
     title = f"{names[1]} less {names[0]}, pair by pair"
     print_table(console(160), title, headings, lines, group=len(one.rows.axes))
-    for _, sides in places:
+    for _, runs in places:
         for metric in metrics:
-            _farthest_apart(metric, sides, names)
+            _farthest_apart(metric, runs, names)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():

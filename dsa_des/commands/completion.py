@@ -59,10 +59,10 @@ def keys(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     scene = _scene(ctx)
     if scene is None:
         return []
-    found = {"seed", "duration_s"}
+    result = {"seed", "duration_s"}
     for name, block in scene.blocks.items():
-        found |= {f"blocks.{name}.{key}" for key in _keys(block.cls)}
-    return [CompletionItem(f"{key}=") for key in sorted(found) if key.startswith(incomplete)]
+        result |= {f"blocks.{name}.{key}" for key in _keys(block.cls)}
+    return [CompletionItem(f"{key}=") for key in sorted(result) if key.startswith(incomplete)]
 
 
 def swaps(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -94,8 +94,8 @@ def _scene(ctx: click.Context) -> Scene | None:
 
 
 def _shipped(kind: str, incomplete: str) -> list[CompletionItem]:
-    found = _items((one.name for one in shipped() if one.kind == kind), incomplete)
-    return found or [CompletionItem(incomplete, type="file")]
+    result = _items((one.name for one in shipped() if one.kind == kind), incomplete)
+    return result or [CompletionItem(incomplete, type="file")]
 
 
 def _items(names: Iterable[str], incomplete: str) -> list[CompletionItem]:

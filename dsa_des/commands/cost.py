@@ -76,9 +76,8 @@ def cost_of_accuracy(
             from dsa_des.costs.chain import draw_chain, run_chain
 
             progress.say("whole chain ...")
-            found = run_chain(variants, costs, compare)
-            chain = found.rows
-            notes.append(found.picked)
+            chain, picked = run_chain(variants, costs, compare)
+            notes.append(picked)
             write_table(folder / "chain.parquet", chain)
             label = compare.difference.label
             draw_chain(folder / "chain.png", variants.scene.title, chain, label)
@@ -173,7 +172,7 @@ def _draw_maps(name: str, out: str | None) -> None:
 
 def _map_functions() -> dict[str, str]:
     """Return the map function of each family of block types, ``geometry`` for ``geometry.*``."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for type_name in registered():
         try:
             ladders = find(type_name).ladders
@@ -181,5 +180,5 @@ def _map_functions() -> dict[str, str]:
             continue
         for ladder in ladders:
             if ladder.map_function:
-                found.setdefault(type_name.partition(".")[0], ladder.map_function)
-    return found
+                result.setdefault(type_name.partition(".")[0], ladder.map_function)
+    return result

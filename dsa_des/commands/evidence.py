@@ -1,7 +1,6 @@
 """``dsa-des evidence``: run a case and leave the pack that shows what came of it."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from dsa_des.commands.study import check_workers, report_crashes, run_into, target_of
@@ -36,17 +35,17 @@ def evidence_command(
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
     path = chosen_file(case, "case")
-    found = read_case(path, sets, encounters)
-    place = target_of(_HOME, path.stem, out, resume)
-    if isinstance(place, Path):
-        check_place(place)
-        if place.is_dir() and any(place.iterdir()) and not resume:
-            raise UsageError(f"--out {place}: is not empty; --resume continues a pack")
+    result = read_case(path, sets, encounters)
+    location = target_of(_HOME, path.stem, out, resume)
+    if isinstance(location, Path):
+        check_place(location)
+        if location.is_dir() and any(location.iterdir()) and not resume:
+            raise UsageError(f"--out {location}: is not empty; --resume continues a pack")
     try:
-        inputs = files_of_case(found).copies()
+        inputs = files_of_case(result).copies()
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
-    target = place if isinstance(place, Path) else place()
+    target = location if isinstance(location, Path) else location()
     words = ["dsa-des", "evidence", "--resume", "--out", str(target)]
     words += [word for one in sets for word in ("--set", one)]
     words += ["--encounters", str(encounters)] if encounters else []
@@ -59,12 +58,12 @@ def evidence_command(
         raise UsageError(f"--out {target}: cannot be written: {why}") from error
     folders: dict[str, StudyFolder] = {}
     tables: dict[str, Tables] = {}
-    for name, study in found.studies.items():
+    for name, study in result.studies.items():
         path = target / STUDIES / name
-        folders[name] = run_into(study, path, workers, resume, again=_saying(again))
+        folders[name] = run_into(study, path, workers, resume, again)
         tables[name] = tables_of(study, folders[name])
         tables[name].write()
-    pack = Pack(found, folders, tables, sets, encounters)
+    pack = Pack(result, folders, tables, sets, encounters)
     evidence = pack.evidence()
     settled = draw_convergence(pack.findings, tables[ASSESSED].record.confidence)
     changed = draw_sensitivity(pack.changes) if pack.changes else None
@@ -75,10 +74,6 @@ def evidence_command(
     report_crashes(list(tables.values()), again)
     if pack.passes is None:
         sys.exit(1)
-
-
-def _saying(again: str) -> Callable[[Path], str]:
-    return lambda path: again
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -93,7 +93,7 @@ def _escaped(text: str) -> str:
 def draw_graph(scene: Scene, path: Path) -> None:
     """Draw the graph from left to right by depth."""
     depth = depths(scene.graph)
-    place = _layout(scene.graph, depth)
+    position = _layout(scene.graph, depth)
     columns = max(depth.values()) + 1
     rows = max(list(depth.values()).count(d) for d in set(depth.values()))
     try:
@@ -103,36 +103,36 @@ def draw_graph(scene: Scene, path: Path) -> None:
             axes.set_xlim(-0.6, columns - 0.4)
             axes.set_ylim(-rows / 2 - 0.2, rows / 2 + 0.2)
             figure.suptitle(figure_text(scene.title, 80), fontsize=12)
-            _draw_blocks(axes, scene, place)
+            _draw_blocks(axes, scene, position)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _draw_blocks(axes: Any, scene: Scene, place: Mapping[str, tuple[float, float]]) -> None:
+def _draw_blocks(axes: Any, scene: Scene, position: Mapping[str, tuple[float, float]]) -> None:
     boxes = {}
-    for name, (x, y) in place.items():
+    for name, (x, y) in position.items():
         kind = figure_text(scene.blocks[name].type_name, 24)
         boxes[name] = axes.text(
             x, y, f"{figure_text(name, 24)}\n{kind}", ha="center", va="center", fontsize=8,
             bbox={"boxstyle": "round,pad=0.5", "facecolor": "#eef3f8", "edgecolor": "#33557a"},
         )  # fmt: skip
     for wire in _wires(scene):
-        _draw_wire(axes, wire, place, boxes)
+        _draw_wire(axes, wire, position, boxes)
 
 
 def _layout(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:
-    place = {}
+    position = {}
     for level in sorted(set(depth.values())):
         names = sorted(name for name in graph if depth[name] == level)
         for row, name in enumerate(names):
-            place[name] = (float(level), (len(names) - 1) / 2 - row)
-    return place
+            position[name] = (float(level), (len(names) - 1) / 2 - row)
+    return position
 
 
 def _draw_wire(
-    axes: Any, wire: Wire, place: Mapping[str, tuple[float, float]], boxes: Mapping[str, Any]
+    axes: Any, wire: Wire, position: Mapping[str, tuple[float, float]], boxes: Mapping[str, Any]
 ) -> None:
-    (x0, y0), (x1, y1) = place[wire.source], place[wire.target]
+    (x0, y0), (x1, y1) = position[wire.source], position[wire.target]
     backward = x1 <= x0
     axes.annotate(
         "",

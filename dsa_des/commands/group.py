@@ -22,7 +22,7 @@ from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_lines
 from dsa_des.text.safe_text import printable
 
-# What may end a command; all else is a stranger's code in a place not foreseen.
+# Packages whose code may end a command; an exit from any other is an error.
 _OURS = ("dsa_des", "components", "click", "rich")
 
 
@@ -62,7 +62,7 @@ def plain_output() -> Iterator[None]:
         try:
             yield
         finally:
-            sys.stdout.flush()  # now, where it can be said, and not when Python ends
+            sys.stdout.flush()  # now, where an error can be reported, and not when Python ends
     except OSError as error:
         # What is left in the buffer is written when Python ends, and must not fail again.
         with suppress(OSError, ValueError):
@@ -122,8 +122,8 @@ def completing(what: str) -> Callable[[click.Context, click.Parameter, str], lis
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         from dsa_des.commands import completion
 
-        found: list[Any] = getattr(completion, what)(ctx, incomplete)
-        return found
+        result: list[Any] = getattr(completion, what)(ctx, incomplete)
+        return result
 
     return complete
 
@@ -231,9 +231,9 @@ class PluginGroup(click.Group):
             return own
         from dsa_des.block.foreign import installed
 
-        found: Any = installed(registered(COMMANDS)[cmd_name])
-        if not isinstance(found, click.Command):
+        result: Any = installed(registered(COMMANDS)[cmd_name])
+        if not isinstance(result, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"
             )
-        return found
+        return result

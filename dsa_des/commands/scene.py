@@ -1,4 +1,4 @@
-"""``dsa-des run``, ``check`` and ``explain``: one scene run, checked, and its effects told."""
+"""``dsa-des run``, ``check`` and ``explain``: one scene run, checked, and its effects listed."""
 
 import gc
 import time
@@ -48,7 +48,7 @@ def load(
     duration: str | None,
     noted: bool = False,
 ) -> Scene:
-    """Load and check a scene; notes on that go to standard error, unless they are said later."""
+    """Load and check a scene; notes on that go to standard error, unless they are printed later."""
     path = chosen_file(scene, "scene")
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     if not noted:
@@ -118,7 +118,7 @@ def no_collection() -> Iterator[None]:
 
 
 def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
-    """Load a scene, prepare its blocks (files are read), and say what was found.
+    """Load a scene, prepare its blocks (files are read), and print what it holds.
 
     Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its
     file, before it is imported: one that ends the process (``os._exit``) has the last line. With

@@ -63,7 +63,7 @@ def study_command(
         return _resume_command(name, folder, sets, workers, executor, scheduler)
 
     target = target_of(_HOME, described.path.stem, out, resume)
-    folder = run_into(described, target, workers, resume, executor, scheduler, again)
+    folder = run_into(described, target, workers, resume, again, executor, scheduler)
     try:
         tables = finish(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
@@ -135,11 +135,11 @@ def _stopped(reason: str, again: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def report_crashes(found: Sequence[Tables], again: str) -> None:
+def report_crashes(result: Sequence[Tables], again: str) -> None:
     """Say how many runs crashed, and end with exit code 1 if there are any."""
-    crashed = sum(tables.rows.crashed for tables in found)
+    crashed = sum(tables.rows.crashed for tables in result)
     if crashed:
-        runs = sum(_count(tables) for tables in found)
+        runs = sum(_count(tables) for tables in result)
         say(
             f"{crashed} of {runs} runs crashed: the process that ran them died each time; "
             "try them again with",
@@ -162,14 +162,13 @@ def run_into(
     path: "Path | Callable[[], Path]",
     workers: int | None,
     resume: bool,
+    again: "str | Callable[[Path], str]" = "the same with --resume",
     kind: str = "local",
     scheduler: str | None = None,
-    again: "Callable[[Path], str]" = lambda path: _resume_command("STUDY.toml", path, (), None,
-                                                                  "local", None),
-) -> StudyFolder:  # fmt: skip
+) -> StudyFolder:
     """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
 
-    `path` is the folder, or what makes a new one; `again` returns the command that continues there.
+    `path` is the folder, or what makes a new one; `again` is the command that continues there.
     """
     check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)
@@ -182,11 +181,12 @@ def run_into(
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
-        _stopped(str(stop), again(folder.path), code)
+        _stopped(str(stop), again if isinstance(again, str) else again(folder.path), code)
     except KeyboardInterrupt:
         if folder is None or not (folder.path / STUDY_JSON).exists():
             sys.exit(130)
-        _stopped("interrupted", again(folder.path), 130)
+        command = again if isinstance(again, str) else again(folder.path)
+        _stopped("interrupted", command, 130)
     finally:
         executor.close()
         if folder is not None:

@@ -1,4 +1,4 @@
-"""What changed between two conditions, in sentences: who does what earlier, later or no longer."""
+"""Changes between two conditions in sentences: events earlier, later, or no longer."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.results.labels import short, unit_of
 from dsa_des.results.record import EVENT, Result
 from dsa_des.results.statistics import changes_of
@@ -14,28 +15,36 @@ from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 
-#: Places that are told one by one, and results that a line names.
+#: Combinations of axis values that are listed, and results that a line names.
 _MOST_PLACES, _MOST_NAMED = 12, 8
 
 
-class Units:
-    """Some rows of a study: one value of a result per (encounter, replica)."""
+class Pair:
+    """The runs that two conditions have in common, by (encounter, replica)."""
 
-    def __init__(self, tables: Tables, rows: Any) -> None:
-        self.rows = rows
-        self.tables = tables
-        replicas = tables.rows.column("replica")[rows]
-        over = tables.rows.over
-        labels = [tuple(str(tables.rows.column(n)[r]) for n in over) for r in rows]
-        self.keys = [(*at, int(k)) for at, k in zip(labels, replicas, strict=True)]
+    def __init__(self, one: Tables, rows: IntArray, other: Tables, others: IntArray) -> None:
+        self.tables = one, other
+        first, second = _by_key(one, rows), _by_key(other, others)
+        self.keys = [key for key in first if key in second]
+        #: The rows of both.
+        self.rows = [np.array([side[key] for key in self.keys], dtype=np.int64)
+                     for side in (first, second)]  # fmt: skip
 
-    def values(self, metric: str) -> dict[tuple[Any, ...], float]:
-        """Return unit → value; NaN where it has none."""
-        column = self.tables.rows.column(metric)[self.rows].astype(float)
-        return dict(zip(self.keys, column.tolist(), strict=True))
+    def values(self, metric: str) -> tuple[FloatArray, FloatArray]:
+        """Return a result of both; NaN where a run has none."""
+        first, second = (
+            tables.rows.column(metric)[rows].astype(float)
+            for tables, rows in zip(self.tables, self.rows, strict=True)
+        )
+        return first, second
 
 
-Pair = tuple[Units, Units]
+def _by_key(tables: Tables, rows: IntArray) -> dict[tuple[Any, ...], int]:
+    columns = [
+        [str(label) for label in tables.rows.column(name)[rows]] for name in tables.rows.over
+    ]
+    columns.append(tables.rows.column("replica")[rows].tolist())
+    return dict(zip(zip(*columns, strict=True), rows.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,7 @@ class _Change:
         return bool(self.fell or self.rose or self.gone or self.come)
 
     def clauses(self) -> list[str]:
-        """Return what is to be said of it, in the result's own words."""
+        """Return its clauses in the result's own words."""
         of, told = f" of {self.pairs} runs", self.result.told
         assert told is not None
         parts = [
@@ -139,17 +148,14 @@ def _brief(change: _Change) -> str:
 
 
 def _change(result: Result, pair: Pair) -> _Change:
-    first, second = pair[0].values(result.name), pair[1].values(result.name)
-    keys = [key for key in first if key in second]
-    before = np.array([first[key] for key in keys])
-    after = np.array([second[key] for key in keys])
+    before, after = pair.values(result.name)
     known = ~np.isnan(before) & ~np.isnan(after)
     changes = changes_of(before[known], after[known])
     mean = float(changes.mean()) if known.any() else float("nan")
     fell, rose = changes < 0.0, changes > 0.0
     gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
     counts = [int(which.sum()) for which in (fell, rose, gone, come)]
-    return _Change(result, len(keys), counts[0], counts[1], counts[2], counts[3], mean)
+    return _Change(result, len(pair.keys), counts[0], counts[1], counts[2], counts[3], mean)
 
 
 def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
@@ -158,13 +164,13 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
         return
     axis, baseline = tables.baseline
     names_of = [shortened(name) for name in tables.rows.axes if name != axis]
-    found: dict[Any, list[tuple[str, Pair]]] = {}
+    matches: dict[Any, list[tuple[str, Pair]]] = {}
     for value, others, base, rows in tables.rows.against(axis, baseline):
         where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
-        pair = Units(tables, base), Units(tables, rows)
-        found.setdefault(value, []).append((", ".join(where), pair))
+        pair = Pair(tables, base, tables, rows)
+        matches.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")
-    for value, places in found.items():
+    for value, places in matches.items():
         names = [short(item) if swap else f"{axis} = {short(item)}" for item in (baseline, value)]
         say_what_changed((names[0], names[1]), places, results)

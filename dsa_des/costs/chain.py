@@ -1,14 +1,13 @@
 """Combinations of rungs over all blocks: what the whole chain costs and how much it finds.
 
 All ladders multiplied are too many, and most are pointless: a rung that another one of its own
-ladder beats on both axes has no place in a good chain. So only rungs on their ladder's front are
+ladder beats on both axes does not belong in a good chain. So only rungs on their ladder's front are
 combined, with the scene's own.
 """
 
 import itertools
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +27,10 @@ _REPEATS = 7
 Group = list[RungCost]
 
 
-@dataclass
-class ChainStudy:
-    """Rows of the whole chain, and how its combinations were picked."""
-
-    rows: list[dict[str, Any]]
-    picked: str
-
-
-def run_chain(variants: Variants, costs: Sequence[RungCost], comparison: Comparison) -> ChainStudy:
-    """Run combinations of rungs and compare what they find with the references together.
+def run_chain(
+    variants: Variants, costs: Sequence[RungCost], comparison: Comparison
+) -> tuple[list[dict[str, Any]], str]:
+    """Return rows of combinations of rungs, compared with the references, and how they were picked.
 
     The error is the comparison's `Difference`. Every combination is run seven times,
     interleaved, without recording; its cost is the shortest of them.
@@ -79,7 +72,7 @@ def run_chain(variants: Variants, costs: Sequence[RungCost], comparison: Compari
     )
     if whole > MOST:
         picked += f"; of {whole} such combinations, ladders were thinned to at most {MOST}"
-    return ChainStudy(rows, picked)
+    return rows, picked
 
 
 def _count(groups: Sequence[Sequence[RungCost]]) -> int:
@@ -96,8 +89,8 @@ def _most_expendable(group: Group) -> RungCost:
     ordered = sorted(group, key=lambda c: c.cpu_us_per_target_scan)
 
     def gap(cost: RungCost) -> float:
-        place = ordered.index(cost)
-        beside = [ordered[i] for i in (place - 1, place + 1) if 0 <= i < len(ordered)]
+        index = ordered.index(cost)
+        beside = [ordered[i] for i in (index - 1, index + 1) if 0 <= i < len(ordered)]
         mine = cost.cpu_us_per_target_scan
         return min(abs(other.cpu_us_per_target_scan / mine - 1.0) for other in beside)
 
@@ -117,11 +110,11 @@ def _recorded(scene: Scene) -> dict[str, Any]:
 def _timed(scenes: Sequence[Scene]) -> list[float]:
     best = [float("inf")] * len(scenes)
     for _ in range(_REPEATS):
-        for place, scene in enumerate(scenes):
+        for index, scene in enumerate(scenes):
             simulation = Simulation(scene)
             started = time.process_time()
             simulation.run()
-            best[place] = min(best[place], time.process_time() - started)
+            best[index] = min(best[index], time.process_time() - started)
     return best
 
 

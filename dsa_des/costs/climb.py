@@ -43,7 +43,7 @@ def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
 def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
     """Return largest allowed errors by unit from texts such as ``0.5mrad``."""
     units = sorted({q.unit for ladder in ladders for q in ladder.quantities})
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for text in texts:
         match = _BUDGET.fullmatch(text)
         try:
@@ -58,8 +58,8 @@ def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, 
         unit = {"m2": "m²", "pd": "Pd"}.get(match[2].lower(), match[2])
         if unit not in units:
             raise UsageError(f"--budget {text}: unknown unit {match[2]}{did_you_mean(unit, units)}")
-        found[unit] = value
-    return found
+        result[unit] = value
+    return result
 
 
 def allowed_error(
@@ -94,13 +94,13 @@ class Comparison:
 
     def __call__(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         for report in self._reports:
-            found.update(report.compare(reference, other))
-        return found
+            result.update(report.compare(reference, other))
+        return result
 
     def remarks(self, changes: Mapping[str, Any]) -> list[str]:
-        """Return what is better said in words than in columns."""
+        """Return remarks on changes that no column shows."""
         return [
             remark
             for report in self._reports
@@ -134,7 +134,7 @@ class RungCost:
     #: Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
     unavailable: str = ""
     #: Median over the repeats, and half the distance between the quartiles. Costs closer than 10 %
-    #: are not told apart: they get one value, and `tied_with` names the other rungs.
+    #: count as equal: they get one value, and `tied_with` names the other rungs.
     cpu_us_per_target_scan: float = math.nan
     cpu_spread_us: float = math.nan
     tied_with: list[str] = field(default_factory=list)
@@ -144,7 +144,7 @@ class RungCost:
     errors: dict[str, Spread] = field(default_factory=dict)
     #: Of the reference: how its own error was measured, or why it was not.
     error_note: str = ""
-    #: What changed in what the run found, against the reference's run.
+    #: Changes of the run's results against the reference's.
     effect: dict[str, Any] = field(default_factory=dict)
     #: `inside_budget` is None when there is no budget.
     pareto: bool = False
@@ -221,7 +221,7 @@ def climb(
     """Run the scene with every rung of a block's ladder and return their costs, crude to exact.
 
     `budgets` are largest allowed errors by unit, else the scene's ``[accuracy]``; `against` is
-    another reference than the ladder's own; `compare` says what changed in what the run found.
+    another reference than the ladder's own; `compare` returns the changes of the run's results.
     """
     reference = against or ladder.reference
     best = Choice(block, ladder, ladder.rung(reference))
@@ -295,7 +295,7 @@ def _same_block(run: RungRun, variants: Variants, block: str) -> bool:
 
 
 def _tie(costs: list[RungCost]) -> None:
-    """Give costs that cannot be told apart one value."""
+    """Give costs that count as equal one value."""
     ordered = sorted(costs, key=lambda cost: cost.cpu_us_per_target_scan)
     groups: list[list[RungCost]] = []
     for cost in ordered:

@@ -32,13 +32,13 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, Mapping):
-            found.update(_flattened(value, f"{prefix}{name}_"))
+            result.update(_flattened(value, f"{prefix}{name}_"))
         else:
-            found[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
-    return found
+            result[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
+    return result
 
 
 def print_costs(
@@ -206,8 +206,8 @@ def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
     for y, x, bar, label, at, colour in sorted(places, reverse=True):
         width = wide * len(label)
 
-        def free(place: tuple[float, float], width: float = width) -> bool:
-            left, middle = place
+        def free(corner: tuple[float, float], width: float = width) -> bool:
+            left, middle = corner
             return (
                 edge < left
                 and left + width < end

@@ -32,7 +32,7 @@ _PASSES = 10
 
 @dataclass
 class RungRun:
-    """A run of the scene with one rung in place."""
+    """A run of the scene with one rung."""
 
     scene: Scene
     block: str
@@ -57,7 +57,7 @@ class RungRun:
             self._pristine = self.fresh()
         try:  # a copy is made ten times faster than a scene is set up
             run = copy.deepcopy(self._pristine).run
-        except Exception:  # whatever a stranger's block holds that cannot be copied
+        except Exception:  # a foreign block may hold what cannot be copied
             run = self.fresh().run
         wakes = self.wakes
         collecting = gc.isenabled()
@@ -129,8 +129,8 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
             run.passes_s.append(run.block_cpu_s)
     fast = [run for run in runs if run.block_cpu_s <= _LONGEST_S]
     for round_ in range(repeats * _PASSES):
-        for place in range(len(fast)):
-            run = fast[(place + round_) % len(fast)]
+        for index in range(len(fast)):
+            run = fast[(index + round_) % len(fast)]
             if len(run.passes_s) < run.passes(repeats * _PASSES):
                 run.passes_s.append(run.pass_s())
 
@@ -174,10 +174,10 @@ Values = tuple[IntArray, dict[str, AnyArray]]
 def values_of(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
     """Read a ladder's quantities from a fresh block over all its wakes."""
     block, other = run.fresh(), reference.fresh()
-    found = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
-    ticks = np.concatenate([ticks for ticks, _ in found])
+    result = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
+    ticks = np.concatenate([ticks for ticks, _ in result])
     names = [q.name for q in ladder.quantities]
-    return ticks, {name: np.concatenate([values[name] for _, values in found]) for name in names}
+    return ticks, {name: np.concatenate([values[name] for _, values in result]) for name in names}
 
 
 def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:

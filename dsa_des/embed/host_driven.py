@@ -174,16 +174,9 @@ class HostDriven:
     # -- time ----------------------------------------------------------------------------------
 
     def tick_of(self, time_s: object) -> int:
-        """Return the tick nearest to a time.
+        """Return the tick nearest to a time: a number, or a text such as "1/3".
 
-        Parameters
-        ----------
-        time_s : float, int, Fraction or text such as "1/3"
-
-        Raises
-        ------
-        ValueError
-            If it is not a finite number from 0 on, or too large for 64-bit ticks.
+        ValueError if it is not finite and from 0 on, or too large for 64-bit ticks.
         """
         if isinstance(time_s, float):  # numpy.float64 as well: the usual case, without a Fraction
             ticks = float(time_s) * self.ticks_per_s
@@ -210,10 +203,7 @@ class HostDriven:
     def next_scan_s(self, after_s: object = None) -> float:
         """Return the time of the first scan of any block after a time, s.
 
-        Parameters
-        ----------
-        after_s : time, optional
-            By default the last call's; before the first call, the very first scan.
+        That is by default the last call's; before the first call that is the very first scan.
         """
         return self.scan_after(self.last_tick if after_s is None else self.tick_of(after_s))
 
@@ -228,10 +218,7 @@ class HostDriven:
         as one scan of each, however long ago the last one was. The first call makes the scans of
         its own instant only.
 
-        Raises
-        ------
-        ValueError
-            If `tick` lies before the last call's.
+        ValueError if `tick` lies before the last call's.
         """
         if tick < self.last_tick:
             raise ValueError(
@@ -257,17 +244,8 @@ class HostDriven:
     def run(self, step: Step, message: Message) -> Step:
         """Run every block that is due, and what they trigger, on the source's message.
 
-        Parameters
-        ----------
-        step : Step
-            From `due`; what blocks send is put into it.
-        message : Message
-            One row, of the source's output, at ``step.tick``.
-
-        Raises
-        ------
-        BlockFailure
-            If a block raised an exception.
+        The message is one row at ``step.tick``; what blocks send is put into the step, which is
+        from `due`. BlockFailure if a block raised an exception.
         """
         sent, scans, tick = step.sent, step.scans, step.tick
         sent[self._source_key] = message

@@ -1,4 +1,4 @@
-"""Errors, and how they are said."""
+"""Errors and their messages."""
 
 from dsa_des.errors.problems import (
     MOST_PROBLEMS,

@@ -1,4 +1,4 @@
-"""How much work is ever begun: what cannot end is refused beforehand, what takes long is told.
+"""How much work is ever begun: endless work is refused beforehand, long work is announced.
 
 Every command that can be asked for more than any machine does takes its limit from here.
 """
@@ -15,7 +15,7 @@ MOST_RUNS, MOST_CELLS = 100_000_000, 1_000_000
 MOST_SECONDS, MOST_BYTES = 1e6, 1e12
 #: Samples of flights that are held in memory at once; some ten gigabytes.
 MOST_SAMPLES = 200_000_000
-#: What takes longer, or is larger, is told before it begins.
+#: Longer or larger work is announced before it begins.
 LONG_SECONDS, LARGE_BYTES = 60.0, 1e9
 
 _UNITS = ((86_400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (0.0, "seconds"))

@@ -1,4 +1,4 @@
-"""Problems and errors, each said once and completely.
+"""Problems and errors, each reported once and completely.
 
 Every error of a scene is a `Problem`; a scene with any raises one `SceneError` that lists them
 all. An exception inside a block becomes a `BlockFailure` that says which block, when.
@@ -30,8 +30,8 @@ def nearest(name: str, allowed: Iterable[str]) -> str | None:
     if len(names) > _MOST_NAMES:
         return None
     lower = {candidate.lower(): candidate for candidate in names}
-    found = get_close_matches(name.lower(), list(lower), n=1, cutoff=0.6)
-    return lower[found[0]] if found else None
+    result = get_close_matches(name.lower(), list(lower), n=1, cutoff=0.6)
+    return lower[result[0]] if result else None
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
@@ -63,8 +63,8 @@ class Disagreements(ValueError):
     @classmethod
     def refuse(cls, texts: Iterable[str]) -> None:
         """Raise them, if there are any."""
-        if found := tuple(texts):
-            raise cls(found)
+        if result := tuple(texts):
+            raise cls(result)
 
 
 class Lines(str):

@@ -194,15 +194,15 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     except ValidationError as error:
         raise SceneError(explain(file, (), "a case", CaseTables, error)) from None
     asked = [one.name for one in tables.requirements]
-    for place, name in enumerate(asked):
-        if name in asked[:place]:
+    for index, name in enumerate(asked):
+        if name in asked[:index]:
             raise SceneError(
-                [file.problem(("requirements", place, "name"), "is given twice", name)]
+                [file.problem(("requirements", index, "name"), "is given twice", name)]
             )
     studies = {ASSESSED: _assessed(file, tables, replicas)}
-    for place, one in enumerate(tables.beside):
+    for index, one in enumerate(tables.beside):
         if one.name in {*studies, SENSITIVITY}:
-            raise SceneError([file.problem(("beside", place, "name"), "is given twice", one.name)])
+            raise SceneError([file.problem(("beside", index, "name"), "is given twice", one.name)])
         many = one.replicas or replicas
         changed = [f"replicas={many}"] if many else []
         changed += _set_of_system(tables) if one.of_system else []
@@ -237,17 +237,17 @@ def _sensitivity(
     """Return the changes of one parameter at a time, and the study of them."""
     scene = assessed.scene(0).resolved()
     stated: dict[str, Any] = {}
-    for place, one in enumerate(tables.sensitivity):
-        found: Any = scene
+    for index, one in enumerate(tables.sensitivity):
+        result: Any = scene
         for part in key_in(scene, one.key):
-            inside = isinstance(found, dict) and part in found
-            if not inside and not (isinstance(found, list) and isinstance(part, int)):
-                known = list(found) if isinstance(found, dict) else []
+            inside = isinstance(result, dict) and part in result
+            if not inside and not (isinstance(result, list) and isinstance(part, int)):
+                known = list(result) if isinstance(result, dict) else []
                 message = f"the scene has no such value{did_you_mean(str(part), known)}"
-                at = ("sensitivity", place, "key")
+                at = ("sensitivity", index, "key")
                 raise SceneError([file.problem(at, message, one.key)])
-            found = found[part]
-        stated[one.key] = found
+            result = result[part]
+        stated[one.key] = result
     varied = tuple(
         (one, value, f"{one.key} = {written(value)}")
         for one in tables.sensitivity for value in one.values
@@ -273,29 +273,29 @@ def written(value: Any) -> str:
 
 def _unknown_results(case: EvidenceCase) -> list[Any]:
     """Return a problem for every result that no study gives."""
-    found = []
+    result = []
     named = [
-        (("requirements", place), one.study, one.result)
-        for place, one in enumerate(case.tables.requirements)
+        (("requirements", index), one.study, one.result)
+        for index, one in enumerate(case.tables.requirements)
     ]
-    named += [(("also", place), ASSESSED, name) for place, name in enumerate(case.tables.also)]
+    named += [(("also", index), ASSESSED, name) for index, name in enumerate(case.tables.also)]
     for at, study, name in named:
         inside = at[0] == "requirements"
         if study not in case.studies or study == SENSITIVITY:
             known = [name for name in case.studies if name != SENSITIVITY]
             message = f"the case has no such study{did_you_mean(study, known)}"
-            found.append(case.file.problem((*at, "study"), message, study))
+            result.append(case.file.problem((*at, "study"), message, study))
             continue
         known = [r.name for r in case.results[study].values() if r.summed_up]
         if name not in known:
             message = f"the study gives no such result{did_you_mean(name, known)}"
-            found.append(case.file.problem((*at, "result") if inside else at, message, name))
+            result.append(case.file.problem((*at, "result") if inside else at, message, name))
         elif inside and len(case.studies[study].cells) != 1:
             message = f"has {len(case.studies[study].cells)} cells; a requirement is held to one"
-            found.append(case.file.problem((*at, "study"), message, study))
+            result.append(case.file.problem((*at, "study"), message, study))
         elif inside:
-            found += _limit_beyond(case, at, study, name)
-    return found
+            result += _limit_beyond(case, at, study, name)
+    return result
 
 
 def _limit_beyond(
@@ -314,14 +314,14 @@ def _limit_beyond(
 
 def _without_source(case: EvidenceCase) -> list[Any]:
     """Return a problem for every block whose scene states a value that no source covers."""
-    found = []
+    result = []
     sources, scene = case.tables.sources, case.assessed.scene(0)
     for key in flat(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:
             hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
             message = f"the scene has no block {parts[0]!r}{hint}"
-            found.append(case.file.problem(("sources", key), message))
+            result.append(case.file.problem(("sources", key), message))
     for name, block in scene.blocks.items():
         stated = block.parameters.model_fields_set
         missing = [key for key in sorted(stated) if source_of(sources, name, key) is None]
@@ -329,11 +329,11 @@ def _without_source(case: EvidenceCase) -> list[Any]:
             message = (
                 f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
             )
-            found.append(case.file.problem(("sources", name), message))
+            result.append(case.file.problem(("sources", name), message))
     if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
         message = "is missing: nobody says where delays and losses of wires come from"
-        found.append(case.file.problem(("sources", WIRES), message))
-    return found
+        result.append(case.file.problem(("sources", WIRES), message))
+    return result
 
 
 def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
@@ -343,6 +343,6 @@ def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
 
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
-    """Return where a parameter's value is from: what is said of the key, or else of its block."""
+    """Return where a parameter's value is from: that of the key, or else of its block."""
     known = {name.removeprefix("blocks."): str(text) for name, text in flat(sources).items()}
     return known.get(f"{block}.{key}", known.get(block))

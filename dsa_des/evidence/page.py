@@ -89,7 +89,7 @@ def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     by: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         by.setdefault(row["key"].partition(".")[0], []).append(row)
-    found = []
+    result = []
     for block, mine in by.items():
         ((usual, _),) = Counter(str(row["source"]) for row in mine).most_common(1)
         cells = [
@@ -97,8 +97,8 @@ def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
              "" if str(row["source"]) == usual else str(row["source"]), row["written_in"])
             for row in mine
         ]  # fmt: skip
-        found.append((block, usual, cells))
-    return found
+        result.append((block, usual, cells))
+    return result
 
 
 def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
@@ -107,15 +107,15 @@ def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
     rows = [(e["system"]["name"], own)] + [(one["name"], one["results"]) for one in e["beside"]]
     if len(rows) == 1:
         return []
-    found = []
+    result = []
     for name, results in rows:
         known = {r["result"]: r for r in results}
         if not known.keys() & set(names):
             continue
         cells = [f"{_number(known[n]['value'])} ({_interval(known[n])})" if n in known else "-"
                  for n in names]  # fmt: skip
-        found.append((name, *cells))
-    return found
+        result.append((name, *cells))
+    return result
 
 
 def _number(value: Any) -> str:

@@ -1,7 +1,7 @@
 """Opening what a user named as a file: regular files of a bearable size, and nothing else.
 
 A pipe would wait for ever, a device never ends, and a name may be no name at all; all of it is
-found out before a byte is read.
+checked before a byte is read.
 """
 
 import os

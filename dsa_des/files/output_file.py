@@ -82,7 +82,7 @@ def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> N
 
 
 def _why_no_file(path: Path) -> str | None:
-    """Return why a file must not take this place, if so; devices would be replaced by it."""
+    """Return why no file may be written here, if so; devices would be replaced by it."""
     folder = Path(os.path.realpath(path.parent))
     above = {str(one) for one in (folder, *folder.parents)}
     if above.intersection(_SYSTEM) and not above.intersection(_ORDINARY):
@@ -153,7 +153,7 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
             continue
         try:
             os.write(lock, json.dumps(_about(target)).encode())
-            if _locked(lock) is False or not _is_at(lock, folder / _LOCK):
+            if locked(lock) is False or not _is_at(lock, folder / _LOCK):
                 os.close(lock)
                 continue
         except BaseException:
@@ -172,7 +172,7 @@ def _host() -> str:
     return os.uname().nodename if hasattr(os, "uname") else ""
 
 
-def _locked(file: int) -> bool | None:
+def locked(file: int) -> bool | None:
     """Lock an open file; False if another process has it, None if it cannot be locked at all."""
     if fcntl is None:
         return None
@@ -215,7 +215,7 @@ def _remove_if_left_over(folder: Path) -> None:
         folder.rmdir()  # its maker was killed at once, or makes another one
         return
     try:
-        if not _locked(lock):
+        if not locked(lock):
             return
         content = os.read(lock, 1 << 16)
         if not content and os.listdir(folder) == [_LOCK]:

@@ -26,7 +26,7 @@ from dsa_des.files.output_names import (
 )
 from dsa_des.terminal.interruption import deferred
 
-#: What a folder of results holds beside its tables: who made it, of what, and all its files.
+#: A run folder's own description: its version, its scene, and all its files.
 RUN_JSON = "run.json"
 _FILES = "files"
 _MOST_READ = 1 << 20
@@ -122,25 +122,25 @@ class OutputFolder:
         When the block raises, nothing is left behind.
         """
         self.check()
-        place = location_of(self.path)
-        before = _identity(place)
+        path = location_of(self.path)
+        before = _identity(path)
         ready = False
         try:
-            with unfinished(place) as folder:
+            with unfinished(path) as folder:
                 results = folder / _RESULTS
                 results.mkdir()
                 ready = True
                 yield results
                 with deferred():
                     if self._stem is not None:
-                        self._take_number(results, place.parent)
+                        self._take_number(results, path.parent)
                     else:
-                        self._take_name(results, place, before, folder / EARLIER)
+                        self._take_name(results, path, before, folder / EARLIER)
         except BrokenPipeError:  # that of our output on the terminal
             raise
         except OSError as error:
             if not ready:
-                why = why_not_written(error, place)
+                why = why_not_written(error, path)
                 raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
             raise OutputError(
                 f"{self.path}: the results cannot be written: {reason_of(error)}"
@@ -151,35 +151,35 @@ class OutputFolder:
         assert self._stem is not None
         while True:
             self.path = new_folder_name(self._home, self._stem)
-            place = parent / self.path.name
+            path = parent / self.path.name
             try:
-                results.rename(place)
+                results.rename(path)
             except OSError:
-                if os.path.lexists(place):  # another process was faster
+                if os.path.lexists(path):  # another process was faster
                     continue
                 raise
             return
 
     def _take_name(
-        self, results: Path, place: Path, before: tuple[int, ...] | None, earlier: Path
+        self, results: Path, path: Path, before: tuple[int, ...] | None, earlier: Path
     ) -> None:
         """Replace what was there when we began, and nothing else."""
         reason: str | None = "has come to be there while the results were made"
-        if _identity(place) is None:
+        if _identity(path) is None:
             reason = None
-        elif _identity(place) == before:
-            reason = _move_aside(place, earlier)
+        elif _identity(path) == before:
+            reason = _move_aside(path, earlier)
         if reason is None:
             try:
-                results.rename(place)
+                results.rename(path)
                 return
             except OSError as error:
                 reason = f"cannot be replaced: {reason_of(error)}"
                 if earlier.exists():
                     with suppress(OSError):
-                        earlier.rename(place)
+                        earlier.rename(path)
         # A finished run is not thrown away because its place was taken.
-        saved = new_folder_name(place.parent, place.name)
+        saved = new_folder_name(path.parent, path.name)
         results.rename(saved)
         wanted, self.path = self.path, self.path.with_name(saved.name)
         raise OutputError(f"--out {wanted}: {reason}; the results are in {self.path}")
@@ -221,23 +221,23 @@ def _make(folder: Path) -> bool:
     return new
 
 
-def _move_aside(place: Path, earlier: Path) -> str | None:
+def _move_aside(path: Path, earlier: Path) -> str | None:
     """Move earlier results out of the way, or return why they must stay."""
     try:
-        place.rename(earlier)
+        path.rename(earlier)
     except OSError as error:
         return f"cannot be replaced: {reason_of(error)}"
     if reason := _why_kept(earlier):
-        earlier.rename(place)
+        earlier.rename(path)
     return reason
 
 
-def _why_kept(place: Path) -> str | None:
+def _why_kept(path: Path) -> str | None:
     """Return why a folder must not be replaced, if so."""
-    if not os.path.lexists(place):
+    if not os.path.lexists(path):
         return None
     try:
-        foreign = foreign_in(place)
+        foreign = foreign_in(path)
     except OSError as error:
         return f"cannot be read: {reason_of(error)}"
     if not foreign:
@@ -248,10 +248,10 @@ def _why_kept(place: Path) -> str | None:
     return f"is a folder that holds something other than a run: {shown}"
 
 
-def _identity(place: Path) -> tuple[int, ...] | None:
+def _identity(path: Path) -> tuple[int, ...] | None:
     """Return what tells a folder from another one and from a later state of itself."""
     try:
-        about = place.lstat()
+        about = path.lstat()
     except FileNotFoundError:
         return None
     return about.st_dev, about.st_ino, about.st_mtime_ns

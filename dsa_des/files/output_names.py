@@ -1,7 +1,7 @@
 """Names for results: what the user wrote after ``--out``, or the next free number.
 
 Everything about a name that can be known is found out before a run begins: a run that has taken
-an hour must not fail because there is no place for it.
+an hour must not fail because it cannot be written.
 """
 
 import errno
@@ -52,14 +52,14 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
-def why_not_written(error: OSError, place: Path) -> str:
-    """Return what an error of the system says of a place that was to be made or written into.
+def why_not_written(error: OSError, path: Path) -> str:
+    """Return the reason of a system error at a path that was to be made or written into.
 
     Some file systems (``/proc``) take no folder and call it missing: what is there is named.
     """
-    if error.errno != errno.ENOENT or place.exists():
+    if error.errno != errno.ENOENT or path.exists():
         return reason_of(error)
-    there = next(parent for parent in place.absolute().parents if os.path.lexists(parent))
+    there = next(parent for parent in path.absolute().parents if os.path.lexists(parent))
     return f"no folder can be made in {there}"
 
 
@@ -99,7 +99,7 @@ def location_of(folder: Path) -> Path:
 
 
 def check_place(folder: Path, option: str = "--out") -> None:
-    """Raise UsageError unless a folder can be made at this place, or one is there to be used.
+    """Raise UsageError unless a folder can be made at this path, or one is there to be used.
 
     What is in a folder that is there is not looked at.
     """
@@ -115,33 +115,33 @@ def check_place(folder: Path, option: str = "--out") -> None:
         raise UsageError(f"{option} {folder}: {reason}")
 
 
-def _why_no_place(place: Path) -> str | None:
+def _why_no_place(path: Path) -> str | None:
     try:
-        kind = place.lstat().st_mode
+        kind = path.lstat().st_mode
     except FileNotFoundError:
-        _raise_if_too_long(place)
+        _raise_if_too_long(path)
         return None
     if stat.S_ISLNK(kind):
-        return f"is a symbolic link to {os.readlink(place)}; name a folder"
+        return f"is a symbolic link to {os.readlink(path)}; name a folder"
     if not stat.S_ISDIR(kind):
         return "is a file; a folder name is needed"
     for what, kept in _kept_folders():
-        if place == kept or place in kept.parents:
-            return f"{'is' if place == kept else 'holds'} {what}; name a folder inside it"
-    if os.path.ismount(place) or str(place) in _mount_points():
+        if path == kept or path in kept.parents:
+            return f"{'is' if path == kept else 'holds'} {what}; name a folder inside it"
+    if os.path.ismount(path) or str(path) in _mount_points():
         return "is a mount point; name a folder inside it"
     effective = os.access in os.supports_effective_ids
-    if not os.access(place, os.R_OK | os.W_OK | os.X_OK, effective_ids=effective):
+    if not os.access(path, os.R_OK | os.W_OK | os.X_OK, effective_ids=effective):
         return "cannot be written: Permission denied"
-    _raise_if_too_long(place)
+    _raise_if_too_long(path)
     return None
 
 
-def _raise_if_too_long(place: Path) -> None:
+def _raise_if_too_long(location: Path) -> None:
     """Raise OSError if the system refuses a part of the path, or names inside it."""
-    there = next(parent for parent in (place, *place.parents) if os.path.lexists(parent))
-    parts = place.relative_to(there).parts
-    for path in (*(there / part for part in parts), place / ("x" * _LONGEST_INSIDE)):
+    there = next(parent for parent in (location, *location.parents) if os.path.lexists(parent))
+    parts = location.relative_to(there).parts
+    for path in (*(there / part for part in parts), location / ("x" * _LONGEST_INSIDE)):
         with suppress(FileNotFoundError):
             path.lstat()
 

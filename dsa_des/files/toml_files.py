@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _PLACE = re.compile(r"(.*) \((at (?:line \d+, column \d+|end of document))\)", re.DOTALL)
-# What the parser says with what it found in the text: only the kind of it is told.
+# Messages of the parser that quote the file: only the kind of error is shown.
 _WITH_CONTENT = (
     ("Cannot declare", "a table or key is given twice"),
     ("Cannot mutate", "a table or key is given twice"),
@@ -28,12 +28,12 @@ def toml_reason(error: Exception) -> str:
 
     A file that is no scene may hold secrets, so it is not quoted.
     """
-    found = _PLACE.fullmatch(str(error))
-    what, place = (found[1], f" ({found[2]})") if found else (str(error), "")
+    match = _PLACE.fullmatch(str(error))
+    what, path = (match[1], f" ({match[2]})") if match else (str(error), "")
     for start, meaning in _WITH_CONTENT:
         if what.startswith(start):
-            return meaning + place
-    return (what if _WITHOUT.fullmatch(what) else "something else stands there") + place
+            return meaning + path
+    return (what if _WITHOUT.fullmatch(what) else "something else stands there") + path
 
 
 #: Tables and lists inside each other; scenes need about six.

@@ -102,12 +102,12 @@ def _drawn(
     """Return what reports draw of a run in memory: they read its tables from a folder."""
     import pyarrow.parquet as pq
 
-    with TemporaryDirectory(prefix="dsa_des-") as place:
-        folder = Path(place)
+    with TemporaryDirectory(prefix="dsa_des-") as path:
+        folder = Path(path)
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
-        with kept_figures() as found:
+        with kept_figures() as result:
             notes = draw_all(reports, simulation, folder, summary)
-    if notes and not found:
+    if notes and not result:
         raise UsageError("; ".join(notes))
-    return dict(sorted(found.items()))
+    return dict(sorted(result.items()))

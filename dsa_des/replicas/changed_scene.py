@@ -25,14 +25,10 @@ from dsa_des.time.clock import parse_rational
 
 @dataclass(frozen=True)
 class Replica:
-    """One run: a seed, and what it changes in the scene.
+    """One run: a seed, and what it changes in the scene, by dotted key.
 
-    Parameters
-    ----------
-    seed : int
-    changes : mapping
-        Dotted keys and their values, for example ``{"blocks.radar.offset_s": Fraction(1, 20)}``;
-        blocks, wires and types stay as they are.
+    For example ``{"blocks.radar.offset_s": Fraction(1, 20)}``; blocks, wires and types stay as they
+    are.
     """
 
     seed: int
@@ -42,10 +38,7 @@ class Replica:
 def scene_of(scene: Scene, replica: Replica) -> Scene:
     """Return the scene of one replica.
 
-    Raises
-    ------
-    SceneError
-        If a change names nothing in the scene or its value is not allowed.
+    A `SceneError` says which change names nothing in the scene, or is not allowed.
     """
     if not replica.changes:
         return replace(scene, seed=replica.seed)
@@ -83,10 +76,7 @@ _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
 def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
     """Return blocks, sections and duration with all changes made at once, each table checked once.
 
-    Raises
-    ------
-    ValidationError, ValueError, LookupError, TypeError
-        If anything is wrong with any change.
+    Raises whatever is wrong with any change.
     """
     blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
     of_block: dict[str, dict[tuple[str | int, ...], Any]] = {}

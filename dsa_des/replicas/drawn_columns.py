@@ -36,15 +36,9 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class DrawnColumn:
-    """The values of one drawn key, one for each replica.
+    """The values of one drawn key, one for each replica, as the field holds them.
 
-    Parameters
-    ----------
-    block : str
-    path : tuple
-        Where it stands in the block's parameters: names of fields, and numbers of items.
-    values : sequence
-        As the field holds them.
+    The path is where it stands in the block's parameters: names of fields, and numbers of items.
     """
 
     block: str
@@ -55,12 +49,7 @@ class DrawnColumn:
 class ReplicaScenes(Sequence[Scene]):
     """The scenes of replicas that differ in seeds and columns only; one is made when asked for.
 
-    Parameters
-    ----------
-    scene : Scene
-        A checked one of them; what columns hold counts instead of what it says there.
-    seeds : sequence of int
-    columns : sequence of DrawnColumn
+    What columns hold counts instead of what `scene`, a checked one of them, says there.
     """
 
     def __init__(self, scene: Scene, seeds: Sequence[int], columns: Sequence[DrawnColumn]) -> None:

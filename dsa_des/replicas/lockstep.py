@@ -45,37 +45,18 @@ def lock_step(
 ) -> Simulation:
     """Return replicas of a scene made ready to run together, once.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-        One for each replica: the same graph and block types, other seeds or parameters.
-    recorder : Recorder, optional
-        Every table it writes begins with the column ``replica``.
-    report : callable, optional
-        Called with a replica's number and what its blocks report, for blocks that are split;
-        shared blocks report for none.
-    window : int, optional
-        Most scans in a look-ahead window, as for `Simulation`.
-
-    Raises
-    ------
-    NotInLockStep
-        If these replicas cannot run together, when made or while running.
-    SceneError
-        If a block cannot be set up.
+    The `scenes` have the same graph and block types, and other seeds or parameters. Every table of
+    the recorder begins with the column ``replica``. `report` is called with a replica's number and
+    what its blocks report, for blocks that are split; shared ones report for none. Raised are
+    `NotInLockStep` if these replicas cannot run together, when made or while running, and
+    `SceneError` if a block cannot be set up.
     """
     timeline = Replicas(scenes, report)
     return Simulation(scenes[0], timeline=timeline, recorder=recorder, window=window)
 
 
 class Replicas(Timeline):
-    """Runs of a scene that share blocks.
-
-    Parameters
-    ----------
-    scenes, report
-        As for `lock_step`.
-    """
+    """Runs of a scene that share blocks; as for `lock_step`."""
 
     says_replica = True
 
@@ -196,10 +177,7 @@ class Replicas(Timeline):
     def rehearse(self) -> None:
         """Make what each replica has for itself, and let it go.
 
-        Raises
-        ------
-        NotInLockStep
-            If that shows that the replicas cannot run together.
+        `NotInLockStep` if that shows a reason not to run them together.
         """
         for block in self.split.values():
             for number in range(len(self._scenes)):

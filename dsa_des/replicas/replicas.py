@@ -26,14 +26,7 @@ Wanted = Mapping[str, Collection[str]] | None
 
 @dataclass(frozen=True)
 class Shared:
-    """What runs in lock step recorded together.
-
-    Parameters
-    ----------
-    tables : dict
-        Table name → column name → values, in order of the column ``replica``.
-    replicas : int
-    """
+    """What runs in lock step recorded together: by table, columns in order of ``replica``."""
 
     tables: dict[str, Columns]
     replicas: int
@@ -41,22 +34,11 @@ class Shared:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a run recorded.
+    """What a run recorded: by table, columns as blocks sent them and in recorded order.
 
-    Parameters
-    ----------
-    tables : dict
-        Table name → column name → values, as blocks sent them and in recorded order.
-    ticks_per_s : int
-    duration_s : float
-    report : callable
-        Returns the sections that blocks add to the summary of the run.
-    ended_early : bool
-        Whether a block ended it before its time.
-    shared : Shared, optional
-        The recording of which `tables` are a part.
-    number : int
-        Which replica's.
+    `report` returns the sections that blocks add to the summary; `ended_early` says whether a block
+    ended the run before its time; `shared` is the recording of which the tables of this `number`
+    are a part.
     """
 
     tables: dict[str, Columns]
@@ -84,19 +66,9 @@ def run_replicas(
 ) -> list[Recorded | Failed]:
     """Run replicas of a scene, in lock step where they can; a failing one stops no other.
 
-    Parameters
-    ----------
-    scene : Scene
-    replicas : sequence of Replica
-    wanted : mapping, optional
-        Table name → columns to record; everything by default.
-    runs : int, optional
-        How many runs there are of the scene, where these are some of them.
-
-    Returns
-    -------
-    list of Recorded or Failed
-        In the order of `replicas`; each is identical to a run of its own.
+    `wanted` columns are recorded, by default all; `runs` is how many there are of the scene, where
+    these are some of them. What is returned is in the order of `replicas`, and each is identical to
+    a run of its own.
     """
     failed, scenes = _checked(scene, replicas)
     ran: list[Recorded | Failed] = []

@@ -29,14 +29,8 @@ class SplitBlock:
     Each instance sees only its own replica's rows, as in a run of its own. It is no block and has
     no face of its own: only `run` is called on it.
 
-    Parameters
-    ----------
-    outputs : sequence of str
-        Names of the block's outputs.
-    make : callable
-        Makes the instance of a replica.
-    finished : callable
-        Called with a replica's number and its instance when its last window is over.
+    `make` makes the instance of a replica; `finished` is called with a replica's number and its
+    instance when its last window is over.
     """
 
     def __init__(
@@ -83,17 +77,9 @@ class SplitBlock:
                     held[:] = _after(held, [part] if part else [])
 
     def close(self, replicas: int) -> None:
-        """Let the last instances go, and have those that never ran say their word as well.
+        """Let the last instances go; those of replicas that never ran have their say as well.
 
-        Parameters
-        ----------
-        replicas : int
-            How many there are.
-
-        Raises
-        ------
-        NotInLockStep
-            If an instance that never ran would have told its neighbours something else.
+        `NotInLockStep` if one of these would have told its neighbours something else.
         """
         self._let_go(None)
         for number in sorted(set(range(replicas)) - self._made):

@@ -15,7 +15,7 @@ from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
 
-#: Okabe and Ito's colours and markers, told apart with any kind of colour vision.
+#: Okabe and Ito's colours and markers, distinct with any kind of colour vision.
 STYLES = (
     ("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D"), ("#E69F00", "^"), ("#CC79A7", "v"),
     ("#56B4E9", "P"), ("#000000", "X"),
@@ -23,7 +23,7 @@ STYLES = (
 _MOST_LINES = 12
 #: Letters of a title.
 _TITLE = 80
-#: More texts than this below an axis cannot be told apart.
+#: Most texts below an axis that can be read.
 _MOST_NAMES = 60
 #: With room for the legend beside the axes, and between series at one value.
 _WIDE_IN, _APART_PT = 9.0, 5.0
@@ -42,11 +42,11 @@ def _series_along(
     others = [k for k, name in enumerate(axes) if name != axis]
     if by is not None:  # the named axis first, so that its values share a colour
         others.sort(key=lambda k: axes[k] != by)
-    found: dict[str, list[Line]] = {}
+    result: dict[str, list[Line]] = {}
     for line in lines:
         named = ", ".join(value_label(axes[k], line.at[k]) for k in others)
-        found.setdefault(named, []).append(line)
-    return found
+        result.setdefault(named, []).append(line)
+    return result
 
 
 def draw_axis(
@@ -54,8 +54,8 @@ def draw_axis(
     by: str | None, category: bool, shown: Sequence[Compared], title: str, confidence: float,
 ) -> None:  # fmt: skip
     """Draw a result against an axis, with intervals; below it the paired differences, if any."""
-    place = axes.index(axis)
-    values = list(dict.fromkeys(line.at[place] for line in lines))
+    index = axes.index(axis)
+    values = list(dict.fromkeys(line.at[index] for line in lines))
     where, numeric = _positions(values, category)
     series = list(_series_along(axes, lines, axis, by).items())
     with drawing(_WIDE_IN, 6.4 if shown else 4.2, target) as figure:
@@ -63,7 +63,7 @@ def draw_axis(
         top = grid[0]
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
-            x = np.array([where[line.at[place]] for line in some])
+            x = np.array([where[line.at[index]] for line in some])
             known = any(not np.isnan(line.estimate.half_width) for line in some)
             seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
             drawn = _points(top, x, some, colour, marker, seen, join=numeric)
@@ -201,15 +201,15 @@ def draw_polar(
     confidence: float,
 ) -> None:  # fmt: skip
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
-    place = axes.index(axis)
+    index = axes.index(axis)
     with drawing(6.2, 6.0, target) as figure:
         polar = figure.add_subplot(projection="polar")
         polar.set(theta_zero_location="N", theta_direction=-1)
         series = list(_series_along(axes, lines, axis, None).items())
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
-            some = sorted(some, key=lambda line: line.at[place])
-            angle = np.radians([line.at[place] for line in some])
+            some = sorted(some, key=lambda line: line.at[index])
+            angle = np.radians([line.at[index] for line in some])
             low, value, high = (
                 np.array([getattr(line.estimate, name) for line in some])
                 for name in ("low", "value", "high")
@@ -329,7 +329,7 @@ def draw_series(
     freedom: float | None,
     limits: Sequence[float] = (),
 ) -> None:
-    """Draw the means of a series with their intervals, one line for each place of the axes.
+    """Draw the means of a series with their intervals, one line per combination of axis values.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
     `limits` are one for all, or one for each number of the series.
@@ -338,8 +338,8 @@ def draw_series(
     with _chart(path, title) as axes:
         if freedom is not None and series:
             _bounds(axes, series[0][1], series[0][2], freedom, confidence)
-        for place, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
-            colour, marker = STYLES[place % len(STYLES)]
+        for index, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
+            colour, marker = STYLES[index % len(STYLES)]
             value, low, high = (
                 np.array([getattr(line.estimate, part) for line in lines])
                 for part in ("value", "low", "high")
@@ -350,7 +350,7 @@ def draw_series(
             drawn = axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label,
                               zorder=2)  # fmt: skip
             drawn.append(axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2))
-            _dodge(axes, drawn, place, len(series))
+            _dodge(axes, drawn, index, len(series))
         if limits and series:
             x = series[0][1]
             known = list(limits) if len(limits) == len(x) else [limits[0]] * len(x)
@@ -363,11 +363,11 @@ def _bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
-    found = [
+    result = [
         np.array(chi_square_bounds(freedom * n, confidence)) / n if n else (math.nan, math.nan)
         for n in (line.estimate.count for line in lines)
     ]
-    low, high = np.array(found).T
+    low, high = np.array(result).T
     axes.fill_between(
         x, low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0,
         label=f"{100 * confidence:g} % bounds of χ², {freedom:g} degrees",

@@ -116,13 +116,13 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
     if not result.is_number:
         return False
     axis = next((name for name in rows.axes if figure.axis in (None, name)), None)
-    found: dict[Any, list[FloatArray]] = {}
+    matches: dict[Any, list[FloatArray]] = {}
     for at, chosen in rows.each_place():
         value = None if axis is None else at[rows.axes.index(axis)]
-        found.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
+        matches.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
     series = [
         ("" if axis is None else value_label(axis, value), np.concatenate(values))
-        for value, values in found.items()
+        for value, values in matches.items()
     ]
     draw = draw_histogram if figure.kind == "histogram" else draw_cdf
     draw(target, series, metric, title, result.mark)
@@ -130,7 +130,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
 
 
 def _series_of(tables: Tables, metric: str) -> list[Series]:
-    """Return the results whose names differ in a number, one series per place of the axes."""
+    """Return the results that differ in a number, one series per combination of axis values."""
     known = of_series(metric, [line.result.name for line in tables.lines])
     by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
     for line in tables.lines:
@@ -149,10 +149,10 @@ def _series_of(tables: Tables, metric: str) -> list[Series]:
 
 def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]) -> list[Path]:
     """Draw results of two types in one block against each other."""
-    place = tables.rows.axes.index(axis)
+    index = tables.rows.axes.index(axis)
     paths = []
     for value, others, base, chosen in tables.rows.against(axis, baseline):
-        at = (*others[:place], value, *others[place:])
+        at = (*others[:index], value, *others[index:])
         for metric in tables.notable_results(only):
             _, first, second = paired(tables.rows, metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])

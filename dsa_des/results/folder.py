@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import PREFIX, write_file
+from dsa_des.files.output_file import PREFIX, locked, write_file
 from dsa_des.files.output_names import why_not_written
 from dsa_des.results.record import StudyHead, StudyRecord
 from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
@@ -86,18 +86,12 @@ class StudyFolder:
 
     def _take_lock(self) -> None:
         try:
-            import fcntl
-        except ImportError:  # no such locks on this system
-            return
-        try:
             self._lock = open_lock(self.path / LOCK)
         except OSError as error:
             reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
             raise UsageError(reason) from None
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise UsageError(f"{self.path}: another process is running this study") from None
+        if locked(self._lock) is False:
+            raise UsageError(f"{self.path}: another process is running this study")
 
     def _take_up(self, text: str, *, resume: bool) -> None:
         known = os.path.lexists(self.path / STUDY_JSON)
@@ -173,7 +167,7 @@ class StudyFolder:
     def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
         """Return the rows of a part; None if it is not there, damaged, or of another study.
 
-        Only some `columns` are read of a part that was found good before.
+        Only some `columns` are read of a part that was checked before.
         """
         table = self._sealed(self.parts / f"{name}.parquet", name, columns)
         whole = table is None or columns is not None or _fits(table, self.record)
@@ -219,7 +213,7 @@ class StudyFolder:
     ) -> Iterator["pa.Table"]:
         """Give the rows of each part, in order of their names.
 
-        Only those of rounds before one, and only some columns of parts found good before.
+        Only those of rounds before one, and only some columns of parts checked before.
         """
         names = self.part_names()
         if before_round is not None:

@@ -89,10 +89,10 @@ def signed(value: float, half: float) -> str:
 
 def _split(name: str) -> tuple[str, str]:
     """Return a name without its unit, and the unit as it is written."""
-    found = _PER.search(name)
-    if found:
-        above, below = (_UNITS.get(part, part) for part in found.groups())
-        return name[: found.start()], f"{above}/{below}"
+    match = _PER.search(name)
+    if match:
+        above, below = (_UNITS.get(part, part) for part in match.groups())
+        return name[: match.start()], f"{above}/{below}"
     rest, _, ending = name.rpartition("_")
     if rest.endswith("_m") and ending == "s":
         return rest.removesuffix("_m"), "m/s"
@@ -104,7 +104,7 @@ _ITEM = re.compile(r"(\w+?)s?\[(\d+)\]")
 
 
 def _spaced(name: str) -> str:
-    name = _ITEM.sub(lambda found: f"{found[1]} {int(found[2]) + 1}", name)
+    name = _ITEM.sub(lambda match: f"{match[1]} {int(match[2]) + 1}", name)
     words = name.replace("_", " ").split(" ")
     return " ".join(word.upper() if _short(word) else word for word in words)
 

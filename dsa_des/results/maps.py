@@ -126,19 +126,19 @@ def draw_map(
             figure.colorbar(image, ax=list(grid.flat), label=readable(metric), shrink=0.9)
 
 
-def _axis_values(lines: Sequence[Line], place: int) -> list[Any]:
-    return list(dict.fromkeys(line.at[place] for line in lines))
+def _axis_values(lines: Sequence[Line], index: int) -> list[Any]:
+    return list(dict.fromkeys(line.at[index] for line in lines))
 
 
 def _grids(
     lines: Sequence[Line], across: int, up: int, columns: list[Any], rows: list[Any]
 ) -> dict[str, FloatArray]:
-    found = {part: np.full((len(rows), len(columns)), np.nan) for part in _PARTS}
+    result = {part: np.full((len(rows), len(columns)), np.nan) for part in _PARTS}
     for line in lines:
         at = rows.index(line.at[up]), columns.index(line.at[across])
         for part in _PARTS:
-            found[part][at] = getattr(line.estimate, part)
-    return found
+            result[part][at] = getattr(line.estimate, part)
+    return result
 
 
 def _contours(axes: Any, parts: dict[str, FloatArray], limits: Sequence[float]) -> None:

@@ -63,13 +63,13 @@ class Explained(StrictRecord):
 
 def versions() -> dict[str, str]:
     """Return the versions of this program, of Python and of the packages it computes with."""
-    found = {"dsa_des": __version__, "Python": platform.python_version()}
+    result = {"dsa_des": __version__, "Python": platform.python_version()}
     for name in _PACKAGES:
         try:
-            found[name] = version(name)
+            result[name] = version(name)
         except PackageNotFoundError:
             continue
-    return found
+    return result
 
 
 class ErrorRecord(StrictRecord):

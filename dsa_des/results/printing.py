@@ -105,7 +105,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
 
 
 def _show_answers(console: Any, tables: Tables) -> None:
-    """Print the cheapest value that meets each requirement, at every place of the other axes."""
+    """Print the cheapest value that meets each requirement, by the values of the other axes."""
     rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_SHOWN]]
     sure = f"{100 * one_sided(tables.record.confidence):g} %"
     print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)
@@ -124,9 +124,9 @@ RATIO_HEADS = (
 
 def ratio_cells(line: Line) -> list[str]:
     """Return the cells of a ratio, as `RATIO_HEADS` names them."""
-    found = line.ratio
-    assert found is not None
-    by = {r.method: r for r in (found, line.other) if r is not None}
+    result = line.ratio
+    assert result is not None
+    by = {r.method: r for r in (result, line.other) if r is not None}
 
     def interval(method: str) -> str:
         if method not in by or by[method].interval[0] != by[method].interval[0]:
@@ -135,10 +135,10 @@ def ratio_cells(line: Line) -> list[str]:
         return f"{short(low)} to {short(high)}" + (" *" if by[method].few else "")
 
     return [
-        line.result.name, short(found.unresolved), short(found.induced), interval("gamma"),
-        interval("bootstrap"), f"{found.effective_sample_size:.1f} of {found.encounters}",
-        found.reason
-        or f"{found.nominal_events}, {found.mitigated_events}, {found.induced_events}",
+        line.result.name, short(result.unresolved), short(result.induced), interval("gamma"),
+        interval("bootstrap"), f"{result.effective_sample_size:.1f} of {result.encounters}",
+        result.reason
+        or f"{result.nominal_events}, {result.mitigated_events}, {result.induced_events}",
         str(line.missing) if line.missing else "",
     ]  # fmt: skip
 

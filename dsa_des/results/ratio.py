@@ -205,12 +205,12 @@ def ratios_by_class(
     ratio: Callable[..., PairedRatio] = paired_ratio
     if len(names) != len(n):
         raise ValueError(f"there are {len(names)} classes for {len(n)} encounters")
-    found = {}
+    result = {}
     for name in np.unique(names):
         mine = names == name
         together = None if cluster is None else np.asarray(cluster)[mine]
-        found[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
-    return found
+        result[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
+    return result
 
 
 def influences(
@@ -222,8 +222,8 @@ def influences(
     """
     n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
     w = _weights(weight, len(n))
-    found: FloatArray = w * (m - ratio * n) / math.fsum(w * n)
-    return found
+    result: FloatArray = w * (m - ratio * n) / math.fsum(w * n)
+    return result
 
 
 def unseen_variance(nominal: FloatArray) -> float:
@@ -261,8 +261,8 @@ def _by_gammas(
 
     def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the terms that went and those that stay: their sums and their squares'."""
-        place = int(np.searchsorted(each, limit))
-        went, stay = (part[:, place].tolist() for part in (first, last))
+        index = int(np.searchsorted(each, limit))
+        went, stay = (part[:, index].tolist() for part in (first, last))
         return (
             (limit * went[0] - went[1], limit**2 * went[2] - 2.0 * limit * went[3] + went[4]),
             (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
@@ -322,8 +322,8 @@ def _terms(
     names = np.asarray(cluster)
     if names.shape != weight.shape:
         raise ValueError(f"cluster has the shape {names.shape}: {len(weight)} encounters have one")
-    _, place = np.unique(names, return_inverse=True)
-    one, two, three = (np.bincount(place, weights=values).astype(float) for values in each)
+    _, index = np.unique(names, return_inverse=True)
+    one, two, three = (np.bincount(index, weights=values).astype(float) for values in each)
     return one, two, three
 
 
@@ -357,10 +357,10 @@ def _counts(nominal: FloatArray, mitigated: FloatArray) -> tuple[int, int, int]:
 
 def _refuse(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
     if bad.any():
-        place = int(np.argmax(bad))
-        value = float(values[place])
+        index = int(np.argmax(bad))
+        value = float(values[index])
         shown = "missing" if math.isnan(value) else shown_value(value)
-        raise ValueError(f"{what} of encounter {place} is {shown}: {allowed}")
+        raise ValueError(f"{what} of encounter {index} is {shown}: {allowed}")
 
 
 def _why_none(nominal: FloatArray, total: float) -> str:

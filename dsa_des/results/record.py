@@ -38,7 +38,7 @@ TRIALS = ".trials"
 
 
 class Told(NamedTuple):
-    """How a change of a result is told: ``radar``, ``sees a target earlier``, ``... later``.
+    """The words for a change of a result: ``radar``, ``sees a target earlier``, ``... later``.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Result:
         Name of a further column, a text: where the run's start or end cut this value off (``at the
         start``, ``never``), nothing where it did not. Results may share one.
     told : Told, optional
-        How comparisons tell a change of it.
+        The words of comparisons for a change of it.
     block : str, optional
         The block it is of, if that is not what stands behind the dot of its name.
     mark : (colour, marker), optional
@@ -116,7 +116,7 @@ class Result:
         What no value of a number can lie below or above, such as 0 for a distance; the interval of
         its mean ends there.
     quantile : float, optional
-        Of a number: what is told of it is this quantile over the units, not the mean.
+        Of a number: it is summed up by this quantile over the units, not the mean.
     """
 
     name: str

@@ -1,12 +1,14 @@
 """The rows of a study's parts, read part by part, and how they fall into places and units.
 
-Where a study runs over a sample of encounters (`over`), the encounters are the independent units
-and a place of the summary joins all of them; otherwise the replicas are.
+A *place* is a combination of values of the summary's axes. Where a study runs over a sample of
+encounters (`over`), the encounters are the independent units and a place of the summary joins all
+of them; otherwise the replicas are.
 """
 
 from collections import Counter, OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 
 #: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
 _MOST_HELD_BYTES = 2**27
-#: Of rows without result, the first ones are told.
+#: Rows without result that are listed, the first ones.
 MOST_FAILED = 50
 _PLACE = ("cell", "replica")
 #: Columns that stand in no statistics.
@@ -69,8 +71,8 @@ class StoredRows:
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN, missing texts None."""
         if name not in self._held:
-            place = self.names.index(name)
-            others = [n for n in self.names[place:] if n not in self._held]
+            index = self.names.index(name)
+            others = [n for n in self.names[index:] if n not in self._held]
             self._read(others[: self._at_once], look=False)
         self._held.move_to_end(name)
         return self._held[name]
@@ -86,8 +88,8 @@ class StoredRows:
             if look:
                 self._look(table, good)
             kept = table if good.all() else table.filter(good)
-            for name, found in pieces.items():
-                found.append(_codes(kept[name].combine_chunks()))
+            for name, result in pieces.items():
+                result.append(_codes(kept[name].combine_chunks()))
         if look:
             cell, replica = (_joined(pieces[name]) for name in _PLACE)
             self._count = len(cell)
@@ -148,6 +150,12 @@ class Rows:
         self.places = self._codes(self.axes)
         self.units = self._codes(self.over if self.over else ["replica"])
 
+    @cached_property
+    def runs(self) -> IntArray:
+        """What rows share that are of the same replica of the same unit."""
+        replica: IntArray = self.column("replica")
+        return self.units * (int(replica.max(initial=0)) + 1) + replica
+
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN."""
         return self.stored.column(name)
@@ -190,9 +198,9 @@ class Rows:
         """Return the units in some rows and each one's mean value (over its replicas)."""
         values = self.column(name)[rows].astype(float)
         known = ~np.isnan(values)
-        units, place = np.unique(self.units[rows], return_inverse=True)
-        total = np.bincount(place[known], weights=values[known], minlength=len(units))
-        many = np.bincount(place[known], minlength=len(units))
+        units, index = np.unique(self.units[rows], return_inverse=True)
+        total = np.bincount(index[known], weights=values[known], minlength=len(units))
+        many = np.bincount(index[known], minlength=len(units))
         with np.errstate(invalid="ignore", divide="ignore"):
             return units, np.where(many > 0, total / many, np.nan)
 
@@ -216,9 +224,9 @@ class Rows:
         if result.kind == SHARE:
             trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))
         trials = np.where(np.isnan(values), 0.0, trials)
-        units, place = np.unique(self.units[rows], return_inverse=True)
-        won = np.bincount(place, weights=np.nan_to_num(values) * trials, minlength=len(units))
-        tried = np.bincount(place, weights=trials, minlength=len(units))
+        units, index = np.unique(self.units[rows], return_inverse=True)
+        won = np.bincount(index, weights=np.nan_to_num(values) * trials, minlength=len(units))
+        tried = np.bincount(index, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
     def ratio(
@@ -228,8 +236,8 @@ class Rows:
 
         Runs of the same encounter, and of the same unit, hang together.
         """
-        found, used, missing = self._paired(result, rows)
-        below, above, weight, cluster = found
+        matches, used, missing = self._paired(result, rows)
+        below, above, weight, cluster = matches
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
@@ -275,10 +283,8 @@ class Rows:
         as Bonett and Price do for events without weights (`statistics.difference`), so that runs
         which all agree still leave as much open as so many can.
         """
-        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
-        runs = runs + self.column("replica")
         sides = [self._paired(result, rows) for rows in (first, second)]
-        one, two = (runs[side[1]] for side in sides)
+        one, two = (self.runs[side[1]] for side in sides)
         _, here, there = np.intersect1d(one, two, return_indices=True)
         parts, ratios, cluster = [], [], sides[0][0][3][here]
         for (columns, _, _), common in zip(sides, (here, there), strict=True):
@@ -293,10 +299,10 @@ class Rows:
         if len(parts) < 2:
             none = Estimate(np.nan, np.nan, np.nan, 0, True)
             return EstimatedDifference(none, none, *alone)
-        _, place = np.unique(cluster, return_inverse=True)
-        each = np.array([np.bincount(place, weights=part) for part in parts])
+        _, index = np.unique(cluster, return_inverse=True)
+        each = np.array([np.bincount(index, weights=part) for part in parts])
         value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
-        events = np.bincount(place, weights=weight * below).astype(float)
+        events = np.bincount(index, weights=weight * below).astype(float)
         more = 2.0 * unseen_variance(events)
         joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
         # A ratio whose runs all agree has no such error; its interval tells another.
@@ -320,15 +326,13 @@ class Rows:
         Rows `first` are below the line, `second` above; runs that only one has do not count. The
         result `weight` says how often each unit happens.
         """
-        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
-        runs = runs + self.column("replica")
         sides = []
         for rows in (first, second):
             known = ~np.isnan(self.column(name)[rows].astype(float))
             if weight is not None:
                 known &= ~np.isnan(self.column(weight)[rows].astype(float))
             sides.append(rows[known])
-        one, two = (runs[rows] for rows in sides)
+        one, two = (self.runs[rows] for rows in sides)
         _, here, there = np.intersect1d(one, two, return_indices=True)
         below, above = sides[0][here], sides[1][there]
         weights = None if weight is None else self.column(weight)[below].astype(float)
@@ -358,8 +362,7 @@ def paired(
     rows: Rows, name: str, first: IntArray, second: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the units that both sets of rows have, and the values of each in both."""
-    values, replica = rows.column(name), rows.column("replica")
-    runs = rows.units * (int(replica.max(initial=0)) + 1) + replica
+    values, runs = rows.column(name), rows.runs
     _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
     one, two = first[here], second[there]
     return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
@@ -375,11 +378,11 @@ def paired_units(
 
     A run without a value has NaN.
     """
-    found, place = np.unique(units, return_inverse=True)
+    result, index = np.unique(units, return_inverse=True)
 
     def means(values: FloatArray, used: AnyArray) -> FloatArray:
-        many = np.bincount(place[used], minlength=len(found))
-        total = np.bincount(place[used], weights=values[used], minlength=len(found))
+        many = np.bincount(index[used], minlength=len(result))
+        total = np.bincount(index[used], weights=values[used], minlength=len(result))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(many > 0, total / many, np.nan)
 
@@ -389,4 +392,4 @@ def paired_units(
     alone = np.where(without, means(first, here), np.nan)
     one = np.where(without, alone, one)
     two = np.where(without & np.isnan(alone), means(second, there), two)
-    return found, one, two
+    return result, one, two

@@ -66,31 +66,31 @@ def parquet(table: "pa.Table") -> bytes:
 
 def sealed(content: bytes, owner: str) -> bytes:
     """Return a file of `parquet` with its digest; `owner` says whose it is."""
-    place = _place(content)
-    if place is None:
+    index = _seal_start(content)
+    if index is None:
         raise ValueError("cannot be sealed: it was not written by parquet()")
-    digest = _digest(content, place, owner)
-    return content[:place] + digest + content[place + _DIGITS :]
+    digest = _digest(content, index, owner)
+    return content[:index] + digest + content[index + _DIGITS :]
 
 
 def is_sealed(content: bytes, owner: str) -> bool:
     """Return whether these are the bytes that were sealed for `owner`."""
-    place = _place(content)
-    if place is None:
+    index = _seal_start(content)
+    if index is None:
         return False
-    return content[place : place + _DIGITS] == _digest(content, place, owner)
+    return content[index : index + _DIGITS] == _digest(content, index, owner)
 
 
-def _place(content: bytes) -> int | None:
+def _seal_start(content: bytes) -> int | None:
     # The last one: names of columns and their least values, which stand before, may hold the mark.
     start = content.rfind(_MARK)
     end = start + len(_MARK) + _DIGITS
     return None if start < 0 or end > len(content) else start + len(_MARK)
 
 
-def _digest(content: bytes, place: int, owner: str) -> bytes:
-    found = hashlib.sha256(owner.encode() + b"\0")
-    found.update(memoryview(content)[:place])
-    found.update(_ZEROS)
-    found.update(memoryview(content)[place + _DIGITS :])
-    return found.hexdigest().encode()
+def _digest(content: bytes, index: int, owner: str) -> bytes:
+    result = hashlib.sha256(owner.encode() + b"\0")
+    result.update(memoryview(content)[:index])
+    result.update(_ZEROS)
+    result.update(memoryview(content)[index + _DIGITS :])
+    return result.hexdigest().encode()

@@ -37,12 +37,12 @@ class Estimate:
         return (self.high - self.low) / 2.0
 
 
-def within(found: Estimate, least: float | None, most: float | None) -> Estimate:
+def within(result: Estimate, least: float | None, most: float | None) -> Estimate:
     """Return an estimate whose interval holds nothing that no value can be."""
-    low = found.low if least is None else max(least, found.low)
-    high = found.high if most is None else min(most, found.high)
+    low = result.low if least is None else max(least, result.low)
+    high = result.high if most is None else min(most, result.high)
     # A NaN is kept: the comparison with it is false.
-    return replace(found, low=low, high=high) if found.low <= found.high else found
+    return replace(result, low=low, high=high) if result.low <= result.high else result
 
 
 def changes_of(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -294,9 +294,9 @@ def difference(
     )
 
 
-def _of_shares(found: Estimate) -> Estimate:
+def _of_shares(result: Estimate) -> Estimate:
     """Return a difference of shares whose interval holds nothing that none can be."""
-    return within(found, -1.0, 1.0)
+    return within(result, -1.0, 1.0)
 
 
 def _counted(changes: FloatArray, confidence: float) -> Estimate:
@@ -320,7 +320,7 @@ def _counted(changes: FloatArray, confidence: float) -> Estimate:
 def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
     """Return the difference of two shares, each as if of one unit more of either kind."""
     count = len(first)
-    one, other = ((found.sum() + 1.0) / (count + 2.0) for found in (first, second))
+    one, other = ((result.sum() + 1.0) / (count + 2.0) for result in (first, second))
     error = math.sqrt((one * (1.0 - one) + other * (1.0 - other)) / (count + 2.0))
     half = _z(confidence) * error
     value, middle = float(second.mean() - first.mean()), float(other - one)

@@ -22,14 +22,14 @@ from dsa_des.results.statistics import (
 
 @dataclass(frozen=True)
 class Line:
-    """One result at one place of the summary's axes."""
+    """One result at one combination of the summary's axis values."""
 
     at: tuple[Any, ...]
     result: Result
     estimate: Estimate
     missing: int
     expected: float | None
-    #: Runs of this place, and (where, how many) of those whose value the run cut off.
+    #: Runs of this combination, and (where, how many) of those whose value the run cut off.
     runs: int = 0
     cut_off: tuple[tuple[str, int], ...] = ()
     #: Of a ratio: all its numbers, by the study's own kind of interval and by the other.
@@ -44,7 +44,7 @@ def summarise(
     method: str,
     expected: Mapping[tuple[str, tuple[Any, ...]], float],
 ) -> list[Line]:
-    """Return one line per place and result."""
+    """Return one line per combination of axis values and result."""
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
@@ -92,7 +92,7 @@ def compare_axis(
     Rows are paired that share the unit and the values of all other axes. `weight` names the result
     that weighs units in ratios of events.
     """
-    found = []
+    matches = []
     for value, others, base, chosen in rows.against(axis, baseline):
         for result in results:
             if not result.summed_up or result.quantile is not None:
@@ -105,13 +105,13 @@ def compare_axis(
             ratio = None
             if result.kind == EVENT:
                 ratio = rows.event_ratio(result.name, base, chosen, weight, confidence)
-            found.append(Compared(others, value, baseline, result, change, ratio))
-    return found
+            matches.append(Compared(others, value, baseline, result, change, ratio))
+    return matches
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest value at one place of the other axes."""
+    """The cheapest value at one combination of the other axes' values."""
 
     requirement: Requirement
     #: Values of the other axes.
@@ -127,17 +127,17 @@ class Answer:
 
 
 def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]) -> list[Answer]:
-    """Return the cheapest value at every place of the other axes."""
+    """Return the cheapest value at every combination of the other axes' values."""
     if requirement.axis not in axes:
         return []
-    place = list(axes).index(requirement.axis)
-    found: dict[tuple[Any, ...], list[Line]] = {}
+    index = list(axes).index(requirement.axis)
+    result: dict[tuple[Any, ...], list[Line]] = {}
     for line in lines:
         if line.result.name == requirement.metric:
-            others = (*line.at[:place], *line.at[place + 1 :])
-            found.setdefault(others, []).append(line)
+            others = (*line.at[:index], *line.at[index + 1 :])
+            result.setdefault(others, []).append(line)
     sentences = []
-    for at, some in found.items():
+    for at, some in result.items():
         dearest_first = some if requirement.cheap_last else some[::-1]
         sure = [
             not line.estimate.few and requirement.met(line.estimate.low, line.estimate.high)
@@ -150,8 +150,8 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
         sentences.append(
             Answer(
                 requirement, at,
-                dearest_first[last - 1].at[place] if last else None,
-                dearest_first[guess - 1].at[place] if guess else None,
+                dearest_first[last - 1].at[index] if last else None,
+                dearest_first[guess - 1].at[index] if guess else None,
                 dearest_first[max(last - 1, 0)],
                 any(sure[last:]),
             )
@@ -171,13 +171,13 @@ def one_sided(confidence: float) -> float:
 
 def of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
     """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
-    found = {}
+    result = {}
     for name in names:
         number = name.removeprefix(f"{metric}.")
         if number == name:
             continue
         try:
-            found[name] = float(number)
+            result[name] = float(number)
         except ValueError:
             continue
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    return dict(sorted(result.items(), key=lambda item: item[1]))

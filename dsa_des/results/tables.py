@@ -22,7 +22,7 @@ from dsa_des.text.safe_text import shortened
 _MOST_SCATTERS = 6
 SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
 REQUIREMENTS = "requirements.parquet"
-#: (Result, place) → the analytic answer there.
+#: (Result, axis values) → the analytic answer there.
 Expected = Mapping[tuple[str, tuple[Any, ...]], float]
 
 
@@ -44,11 +44,11 @@ class Tables:
             self.rows, self.results, record.confidence, record.interval,
             self._earlier() if expected is None else expected,
         )  # fmt: skip
-        #: What each requirement comes to, at every place of the other axes.
+        #: Of each requirement, at every combination of the other axes' values.
         self.answers: list[Answer] = [
-            found
+            result
             for requirement in record.requirements
-            for found in answers(requirement, self.rows.axes, self.lines)
+            for result in answers(requirement, self.rows.axes, self.lines)
         ]
         self.compared: list[Compared] = []
         #: The axis along which values are compared, and with which.
@@ -67,12 +67,12 @@ class Tables:
         table = self.folder.table(SUMMARY)
         if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):
             return {}
-        found = {}
+        result = {}
         for row in table.to_pylist():
             if isinstance(row["expected"], float):
                 at = tuple(row[name] for name in self.rows.axes)
-                found[str(row["result"]), at] = row["expected"]
-        return found
+                result[str(row["result"]), at] = row["expected"]
+        return result
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
         """Return the lines of some results; by default those the study draws or waits for."""
@@ -113,10 +113,10 @@ class Tables:
         )  # fmt: skip
         columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):
-            found = [{r.method: r for r in (line.ratio, line.other) if r is not None}.get(method)
+            result = [{r.method: r for r in (line.ratio, line.other) if r is not None}.get(method)
                      for line in lines]  # fmt: skip
             columns |= _columns(
-                found,
+                result,
                 **{f"{method}_error": "standard_error"},
                 **{f"{method}_low": "interval.0", f"{method}_high": "interval.1"},
             )
@@ -141,18 +141,18 @@ class Tables:
         return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
 
     def _answer_columns(self) -> dict[str, list[Any]]:
-        found = self.answers
+        result = self.answers
         return {
-            "requirement": [item.requirement.text() for item in found],
-            "axis": [item.requirement.axis for item in found],
-            "others": [self.other_values(item) for item in found],
-            "cheapest": [None if item.value is None else short(item.value) for item in found],
-            "confidence": [one_sided(self.record.confidence)] * len(found),
+            "requirement": [item.requirement.text() for item in result],
+            "axis": [item.requirement.axis for item in result],
+            "others": [self.other_values(item) for item in result],
+            "cheapest": [None if item.value is None else short(item.value) for item in result],
+            "confidence": [one_sided(self.record.confidence)] * len(result),
             "cheapest_by_estimate": [
-                None if item.estimated is None else short(item.estimated) for item in found
+                None if item.estimated is None else short(item.estimated) for item in result
             ],
             **_columns(
-                found, value="line.estimate.value", low="line.estimate.low",
+                result, value="line.estimate.value", low="line.estimate.low",
                 high="line.estimate.high", few="line.estimate.few", uneven="uneven",
             ),
         }  # fmt: skip

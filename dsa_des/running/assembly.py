@@ -23,18 +23,7 @@ _REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 class Assembly:
     """The blocks of a scene, ready to run.
 
-    Parameters
-    ----------
-    scene : Scene
-    timeline : Timeline
-    recorder : Recorder or None
-    simulate_everything : bool
-    wrap_effect : callable, optional
-
-    Raises
-    ------
-    SceneError
-        If the scene has no length, or a block cannot be built or set up.
+    A `SceneError` says why the scene has no length, or which block cannot be built or set up.
     """
 
     def __init__(

@@ -33,16 +33,8 @@ class Channel:
     Every window takes what arrives in its stretch of time; what each run holds is remembered until
     it has ended.
 
-    Parameters
-    ----------
-    source : str
-        Name of the sending block.
-    delay_ticks : int
-        Time on the wire.
-    faults : WireFaults, optional
-        Loss and lateness of single rows; late rows may be overtaken.
-    runs : Runs, optional
-        What arrives when its run has ended does not; by default there is one, without an end.
+    It takes `delay_ticks`; rows that are late (`faults`) may be overtaken; what arrives when its
+    run has ended (`runs`) does not.
     """
 
     def __init__(
@@ -88,11 +80,8 @@ class Channel:
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
         """Deposit a message and return when its rows arrive, in order.
 
-        Parameters
-        ----------
-        message : Message
-        sent : int or array of int, optional
-            The tick at which it was sent, or each of its rows, when that is later than their own.
+        `sent` is the tick at which it was sent, or each of its rows, when that is later than their
+        own.
         """
         arrivals = message.instants
         if sent is not None:
@@ -189,10 +178,8 @@ class Channel:
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds at each instant (in order, all before `end`).
 
-        Returns
-        -------
-        (message, rows) or None
-            ``rows[i]`` is the row of `message` held at instant i; -1 when none has arrived.
+        With the message comes the row of it that is held at each instant, -1 when none has arrived.
+        None: it holds nothing at all.
         """
         new = self.collect(end)
         if new is not None:
@@ -290,18 +277,7 @@ class WireEnd(Protocol):
 
 
 class Inputs:
-    """The wires into a block, by how it reads them.
-
-    Parameters
-    ----------
-    declared : mapping
-        The block's inputs.
-    wires : mapping
-        The wires into each.
-    ticks_per_s : int
-    runs : Runs, optional
-        By default there is one.
-    """
+    """The wires into a block, by how it reads them."""
 
     def __init__(
         self,
@@ -328,20 +304,9 @@ class Inputs:
     ) -> Wake | None:
         """Return what the block sees at some instants, or None if it cannot run at any.
 
-        Parameters
-        ----------
-        asked : RunTicks
-            The instants.
-        scans : ndarray of int64, shape (rows,)
-            As for `Wake`.
-        end : int
-            First tick that is no longer seen.
-        demand : callable, optional
-            Given the instants of the wake, returns what `Wake.demand` is.
-        clock : callable, optional
-            As for `Wake`.
-        complete : bool
-            Leave out instants at which a required input holds nothing yet.
+        `scans`, `clock` are as for `Wake`; `end` is the first tick that is no longer seen;
+        `demand`, given the instants of the wake, returns what `Wake.demand` is. Where `complete`,
+        instants are left out at which a required input holds nothing yet.
         """
         held: dict[str, tuple[Message, IntArray]] = {}
         missing: np.ndarray | None = None

@@ -14,10 +14,9 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
-from dsa_des.time.clock import ClockSpec, nanosecond_of
+from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
 
 
@@ -25,15 +24,8 @@ from dsa_des.time.randomness import Stream
 class Planned:
     """What became of one effect of one block.
 
-    Parameters
-    ----------
-    block : str
-    effect : Effect
-    verdict : Verdict
-    built : bool
-        Whether it exists in the run.
-    because : str
-        The reason, including that of a tolerance or of ``simulate_everything``.
+    It exists in the run if `built`; `because` is the reason, also that of a tolerance or of
+    ``simulate_everything``.
     """
 
     block: str
@@ -56,14 +48,9 @@ def plan(
 ) -> list[Planned]:
     """Decide which of a block's effects are built.
 
-    Parameters
-    ----------
-    block : Component
-    tolerance : mapping
-        ``[accuracy]`` of the scene: by quantity, how large an error is allowed. Effects are left
-        out, smallest first, as long as the sum of their bounds stays within it.
-    everything : bool
-        Build every effect that can be parametrised neutrally.
+    `tolerance` is ``[accuracy]`` of the scene: by quantity, how large an error is allowed. Effects
+    are left out, smallest first, as long as the sum of their bounds stays within it. With
+    `everything`, all are built that can be parametrised neutrally.
     """
     verdicts = [(effect, effect.verdict(block)) for effect in type(block).effects]
     allowed = {} if everything else _within(verdicts, tolerance)
@@ -133,60 +120,42 @@ def _within(
 
 @dataclass(frozen=True)
 class _OfKey(Effect):
-    """An effect that exists where one number of a wire, a block or a clock is not 0.
+    """An effect that exists where a key of a wire, a block or a clock is given and not 0.
 
-    Parameters
-    ----------
-    name : str
-    key : str
-        The key in the scene file.
-    everywhere : str
-        What stands for all places that have none of it: "every wire".
+    `everywhere` stands for all places that have none of it: "every wire".
     """
 
     name: str  # type: ignore[misc]  # of the object, as there is one object for each
     key: str
     everywhere: str
+    outside_the_proof: str = ""  # type: ignore[misc]
+    neutral: bool = True  # type: ignore[misc]
 
     def verdict(self, block: Any) -> Verdict:
         """Ask a wire, a block's options or a clock for the key."""
         value = getattr(block, self.key)
+        if self.key == "delay_s" and block.delay_scans:
+            return Verdict(True, f"delay is {block.delay_scans} scans")
+        if self.key == "processor":
+            named = "not given" if value is None else repr(value)
+            return Verdict(value is not None, f"{self.key} is {named}")
         return Verdict(bool(value), f"{self.key} is {float(value):g}")
 
 
-class _Delay(_OfKey):
-    def verdict(self, block: Any) -> Verdict:
-        if block.delay_scans:
-            return Verdict(True, f"delay is {block.delay_scans} scans")
-        return super().verdict(block)
-
-
-class SharedProcessor(Effect):
-    """Messages that queue for a processor."""
-
-    name = "shared processor"
-    outside_the_proof = "work on a message takes a tick or more: no processor adds no time"
-    key = "processor"
-    everywhere = "every block"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask a block's options for ``processor``."""
-        if block.processor is None:
-            return Verdict(False, "processor is not given")
-        return Verdict(True, f"processor is {block.processor!r}")
-
-
-LATENCY = _OfKey("latency", "latency_s", "every block")
-DELAY = _Delay("delay", "delay_s", "every wire")
 WIRE_JITTER = _OfKey("wire jitter", "jitter_s", "every wire")
 LOSS = _OfKey("loss", "drop_probability", "every wire")
-CLOCK_DRIFT = _OfKey("clock drift", "rate_error_ppm", "every clock")
-CLOCK_JITTER = _OfKey("clock jitter", "jitter_s", "every clock")
-PROCESSOR = SharedProcessor()
-
-OF_BLOCKS = (LATENCY, PROCESSOR)
-OF_WIRES = (DELAY, WIRE_JITTER, LOSS)
-OF_CLOCKS = (CLOCK_DRIFT, CLOCK_JITTER)
+OF_BLOCKS = (
+    _OfKey("latency", "latency_s", "every block"),
+    _OfKey(
+        "shared processor", "processor", "every block",
+        "work on a message takes a tick or more: no processor adds no time", False,
+    ),
+)  # fmt: skip
+OF_WIRES = (_OfKey("delay", "delay_s", "every wire"), WIRE_JITTER, LOSS)
+OF_CLOCKS = (
+    _OfKey("clock drift", "rate_error_ppm", "every clock"),
+    _OfKey("clock jitter", "jitter_s", "every clock"),
+)
 
 
 def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
@@ -194,16 +163,13 @@ def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
 
     Where a scene calls for an effect nowhere, or only in some places, one entry speaks for all
     the others.
-
-    Parameters
-    ----------
-    scene : Scene
-    everything : bool
-        Whether effects that the scene does not call for are simulated with zeros.
     """
     blocks = [(name, block.options) for name, block in sorted(scene.blocks.items())]
     wires = [(str(wire), wire) for wire in scene.wires]
-    clocks = list(_clocks(scene))
+    specs = [
+        (name, block.cls.clock_of(block.parameters)) for name, block in sorted(scene.blocks.items())
+    ]
+    clocks = [(name, spec) for name, spec in specs if spec is not None]
     planned: list[Planned] = []
     for effects, places in ((OF_BLOCKS, blocks), (OF_WIRES, wires), (OF_CLOCKS, clocks)):
         for effect in effects:
@@ -211,7 +177,7 @@ def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
     return planned
 
 
-def _judged(effect: Any, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:
+def _judged(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:
     verdicts = [(place, effect.verdict(thing)) for place, thing in places]
     for place, verdict in verdicts:
         if verdict.simulated:
@@ -229,19 +195,6 @@ def _judged(effect: Any, places: list[tuple[str, Any]], everything: bool) -> Ite
     yield Planned(place, effect, rest[0], built, because)
 
 
-def _clocks(scene: Scene) -> Iterator[tuple[str, ClockSpec]]:
-    for name, block in sorted(scene.blocks.items()):
-        spec = clock_of(block)
-        if spec is not None:
-            yield name, spec
-
-
-def clock_of(block: Block) -> ClockSpec | None:
-    """Return the clock that a block's parameters describe, or None."""
-    cls: type[Component] = block.cls
-    return cls.clock_of(block.parameters)
-
-
 def may_be_late(wire: Wire, everything: bool) -> bool:
     """Return whether loss and jitter are drawn for the messages of a wire."""
     return everything or LOSS.verdict(wire).simulated or WIRE_JITTER.verdict(wire).simulated
@@ -251,14 +204,7 @@ def may_be_late(wire: Wire, everything: bool) -> bool:
 class WireFaults:
     """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
 
-    Parameters
-    ----------
-    jitter_ticks : float
-        Largest extra delay; each row takes a uniformly drawn part of it.
-    drop_probability : float
-    jitter, drops : Stream
-        Draws named after the wire.
-    ticks_per_s : int
+    Each row is late by a uniformly drawn part of `jitter_ticks`; draws are named after the wire.
     """
 
     jitter_ticks: float

@@ -184,13 +184,8 @@ def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
 def longest_window(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
     """Return the ticks of a window that holds about the wanted number of scans.
 
-    Parameters
-    ----------
-    nodes : mapping
-    runs : Runs
-    window : int, optional
-        Scans of all clocks together; by default, and where blocks run scan by scan anyway, as
-        many as make a window of `CELLS_PER_WINDOW`.
+    `window` are scans of all clocks together; by default, and where blocks run scan by scan anyway,
+    as many as make a window of `CELLS_PER_WINDOW`.
     """
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))

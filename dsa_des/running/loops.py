@@ -1,7 +1,8 @@
 """Where feedback loops are opened: to run in windows, to look ahead, and to tell neighbours."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
+from typing import Any
 
 import networkx as nx
 
@@ -13,35 +14,36 @@ from dsa_des.scene.scene import Scene
 Edge = tuple[str, str]
 
 
-def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
-    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+def _closing(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
+    """Return delayed edges without which a graph has no loop: of each loop one of the highest rank.
 
-    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
-
-    Parameters
-    ----------
-    graph : networkx.DiGraph
-        From `dsa_des.scene.graph.build_graph`.
-    classes : mapping
-        The class of each block.
+    An edge is taken out only if it closes a loop of edges of its rank or lower ones.
     """
     looped = in_cycles(graph)
-    inside = [
-        (source, target)
-        for source, target in sorted(graph.edges)
-        if source in looped and looped.get(target) == looped[source]
-    ]
     kept = nx.DiGraph()
     kept.add_nodes_from(looped)
-    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
-    cut = set()
-    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
-    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
+    delayed = []
+    for edge in sorted(graph.edges):
+        if edge[0] in looped and looped.get(edge[1]) == looped[edge[0]]:
+            if graph.edges[edge]["delayed"]:
+                delayed.append(edge)
+            else:
+                kept.add_edge(*edge)
+    closing = set()
+    for edge in sorted(delayed, key=rank):
         kept.add_edge(*edge)
         if not nx.is_directed_acyclic_graph(kept):
             kept.remove_edge(*edge)
-            cut.add(edge)
-    return cut
+            closing.add(edge)
+    return closing
+
+
+def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[Edge]:
+    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+
+    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
+    """
+    return _closing(graph, lambda edge: _optional(graph, classes, edge))
 
 
 def before_loops(graph: nx.DiGraph) -> set[str]:
@@ -51,9 +53,7 @@ def before_loops(graph: nx.DiGraph) -> set[str]:
     return set(graph) - behind if looped else set()
 
 
-def _optional(
-    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
-) -> bool:
+def _optional(graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: Edge) -> bool:
     """Whether the receiving block can do without what comes over an edge."""
     inputs = classes[edge[1]].inputs
     return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
@@ -62,27 +62,9 @@ def _optional(
 def opened_loops(scene: Scene) -> set[Edge]:
     """Return delayed edges without which the scene has no loop, those of the longest delays.
 
-    An edge is taken out only if it closes a loop of edges that are as short or shorter: so the
-    shortest of those taken out is as long as can be.
+    The shortest of those taken out is as long as can be.
     """
-    looped = in_cycles(scene.graph)
-    inside = [
-        (source, target)
-        for source, target in sorted(scene.graph.edges)
-        if source in looped and looped.get(target) == looped[source]
-    ]
-    lasts = {edge: shortest_s(scene, edge) for edge in inside}
-    kept = nx.DiGraph()
-    kept.add_nodes_from(looped)
-    kept.add_edges_from(edge for edge in inside if not scene.graph.edges[edge]["delayed"])
-    opened = set()
-    delayed = [edge for edge in inside if scene.graph.edges[edge]["delayed"]]
-    for edge in sorted(delayed, key=lambda edge: (lasts[edge], edge)):
-        kept.add_edge(*edge)
-        if not nx.is_directed_acyclic_graph(kept):
-            kept.remove_edge(*edge)
-            opened.add(edge)
-    return opened
+    return _closing(scene.graph, lambda edge: shortest_s(scene, edge))
 
 
 def shortest_s(scene: Scene, edge: Edge) -> Fraction:

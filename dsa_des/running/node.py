@@ -290,13 +290,7 @@ class Node:
     def send(self, result: Any, ran: RunTicks, leaves: int | None = None) -> None:
         """Send what a block returned when it ran: a message, or messages by output.
 
-        Parameters
-        ----------
-        result : Message, mapping or None
-        ran : RunTicks
-            The instants that it ran at.
-        leaves : int, optional
-            When it sets out, where that is later.
+        `ran` are the instants that it ran at; it sets out at `leaves`, where that is later.
         """
         outputs = self.component.outputs
         for port, message in by_output(result, tuple(outputs)).items():

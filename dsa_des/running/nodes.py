@@ -29,20 +29,7 @@ def build_nodes(
     processors: Mapping[str, Processor],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
-    """Return the running blocks, which no wire connects yet.
-
-    Parameters
-    ----------
-    run : RunState
-    timeline : Timeline
-        Knows how long runs are.
-    components : mapping
-    grain : Grain
-    processors : mapping
-        Shared processors by name.
-    shuffle_ties : int, optional
-        See `Simulation`.
-    """
+    """Return the running blocks, which no wire connects yet."""
     scene = timeline.scene
     # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
     ending = [name for name, block in components.items() if ends_its_run(type(block))]
@@ -68,10 +55,7 @@ def build_processors(
 ) -> dict[str, Processor]:
     """Return the shared processors of a scene.
 
-    Raises
-    ------
-    SceneError
-        If the parameters of one make no sense.
+    A `SceneError` says which parameters make no sense.
     """
     streams = Streams(scene.seed)
     order = grain.order(scene)
@@ -96,19 +80,8 @@ def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Cal
 def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
 
-    Parameters
-    ----------
-    scene : Scene
-    nodes : mapping
-        Running blocks by name.
-    timeline : Timeline
-        Makes the channels; knows how long runs are.
-
-    Raises
-    ------
-    SceneError
-        If a wire's delay makes no sense, or a block that runs on demand has no block to demand
-        anything.
+    A `SceneError` says which delay makes no sense, or which block that runs on demand has nobody to
+    demand anything.
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)

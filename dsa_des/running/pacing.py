@@ -22,10 +22,7 @@ _SLOWEST, _FASTEST = 1e-6, 1e12
 def parse_factor(text: str, option: str = "--realtime") -> float:
     """Return the factor of ``--realtime``, or of another option.
 
-    Raises
-    ------
-    UsageError
-        If it is not a finite number above 0.
+    A `UsageError` says so if it is not a finite number above 0.
     """
     try:
         factor = float(text)
@@ -43,12 +40,8 @@ def parse_factor(text: str, option: str = "--realtime") -> float:
 class Pacer:
     """Waits until the wall clock has come as far as the simulation, and notes when it is behind.
 
-    Parameters
-    ----------
-    factor : float
-        Simulated seconds per second.
-    now, sleep : callable
-        The clock, s, and what waits for so many seconds.
+    `factor` are simulated seconds per second; `now` is the clock, s, and `sleep` waits so many
+    seconds.
     """
 
     factor: float

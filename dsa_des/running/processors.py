@@ -66,20 +66,9 @@ class Processing(Message):
 
 
 class Service:
-    """How long a processor works on each message.
+    """How long a processor works on each message: draws are keyed by block and instant.
 
-    Parameters
-    ----------
-    name : str
-    parameters : ProcessorParameters
-    ticks_per_s : int
-    stream : Stream
-        Draws of the extra times, keyed by block and instant.
-
-    Raises
-    ------
-    ValueError
-        If the time is shorter than one tick.
+    A `ValueError` says so if that is shorter than one tick.
     """
 
     def __init__(
@@ -151,17 +140,8 @@ class Processor:
     instant runs. In a window it comes after all of its blocks and before every block that hears of
     them.
 
-    Parameters
-    ----------
-    name : str
-    parameters : ProcessorParameters
-    service : Service
-    env : simpy.Environment
-    ticks_per_s : int
-    record : callable
-        Takes the block's name and a `Processing` message.
-    window_priority : float, optional
-        Its place among the blocks at the start of a window, where it serves whole windows.
+    `record` takes a block's name and a `Processing` message; `window_priority` is its position
+    among the blocks at the start of a window, where it serves whole windows.
     """
 
     def __init__(

@@ -46,36 +46,12 @@ def record_run(
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
-    Parameters
-    ----------
-    loaded : Scene
-    target : Path or OutputFolder
-    simulate_everything : bool
-    silent : bool
-        Whether there is no progress bar.
-    notes_command : str, optional
-        The command that shows what there is to note of the scene; with it one line on standard
-        error says how many notes there are. ``run.json`` lists them.
-    pacer : Pacer, optional
-    say_notes : bool
-        Whether notes are written to standard error.
-    progress : callable, optional
-        Called with the simulated time in s after each window, instead of a bar.
-    draw : bool
-        Whether reports draw their figures.
-    prepare : callable, optional
-        Called with the simulation before it runs: to listen to it, or to hand its blocks what no
-        scene holds.
-    recorded_as : Scene, optional
-        The scene that the folder says it is a run of, where that is another one: which gives the
-        same tables without what `prepare` handed over.
-
-    Raises
-    ------
-    UsageError
-        If the folder holds something other than a run, or there is no place for it.
-    OutputError
-        If the results cannot be written.
+    With `notes_command`, the command that shows what there is to note of the scene, one line on
+    standard error says how many notes there are; ``run.json`` lists them. `progress` is called with
+    the simulated time in s after each window, instead of a bar. `prepare` is called with the
+    simulation before it runs: to listen to it, or to hand its blocks what no scene holds;
+    `recorded_as` is then the scene that gives the same tables without. Raised are `UsageError` if
+    the folder holds something other than a run, and `OutputError` if the results cannot be written.
     """
     if isinstance(target, Path):
         target = OutputFolder(target)

@@ -174,10 +174,7 @@ def draw_all(
 
     A figure that fails takes nothing with it: the run is complete without.
 
-    Raises
-    ------
-    OSError
-        If a figure cannot be written.
+    Raises OSError if one cannot be written.
     """
     notes: list[str] = []
     for report in reports:

@@ -46,16 +46,8 @@ _MOST_SCANS_AGAIN = 20_000
 class Outcome:
     """What a run came to.
 
-    Parameters
-    ----------
-    duration_s : float
-        Simulated time; of runs that share a timeline, the longest it may be.
-    cpu_s : float
-        Processor time of the simulation itself.
-    windowed : list of str
-        Blocks that ran in look-ahead windows.
-    components : mapping
-        The blocks that speak for the whole run, for `report`.
+    Of runs that share a timeline, `duration_s` is the longest it may be. `windowed` are the blocks
+    that ran in look-ahead windows; `components` speak for the whole run.
     """
 
     duration_s: float
@@ -81,27 +73,13 @@ class Outcome:
 class Simulation:
     """A scene made ready to run once.
 
-    Parameters
-    ----------
-    scene : Scene
-    timeline : Timeline, optional
-        Which runs of the scene; by default one.
-    window : int, optional
-        Most scans (of all clocks together) in a look-ahead window; 1 runs every block scan by
-        scan. By default sized by the number of targets.
-    shuffle_ties : int, optional
-        Seed that randomises the order of blocks within one depth, to show that nothing depends
-        on it.
-    recorder : Recorder, optional
-    simulate_everything : bool
-        Build also the effects that the scene does not call for, where they can be neutral.
-    wrap_effect : callable, optional
-        Given each planned effect and what was built of it, returns what is used instead.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no length, or a block cannot be set up.
+    By default there is one run of the scene (`timeline`), and windows are sized by the number of
+    targets: `window` is the most scans of all clocks together in one; 1 runs every block scan by
+    scan. `shuffle_ties` is a seed that randomises the order of blocks within one depth, to show
+    that nothing depends on it. `simulate_everything` builds also the effects that the scene does
+    not call for, where they can be neutral; `wrap_effect`, given each planned effect and what was
+    built of it, returns what is used instead. A `SceneError` says why the scene has no length, or
+    which block cannot be set up.
     """
 
     def __init__(
@@ -173,21 +151,10 @@ class Simulation:
     ) -> Outcome:
         """Run the scene to its end.
 
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with the simulated time in s after each window.
-        pacer : Pacer, optional
-            Waits for the wall clock after each window, which it keeps short, and may stop the run.
-
-        Raises
-        ------
-        RuntimeError
-            If it has run before.
-        SceneError
-            If a block waits for a host program.
-        BlockFailure
-            If a block raised an exception.
+        `progress` is called with the simulated time in s after each window; `pacer` waits for the
+        wall clock after each window, which it keeps short, and may stop the run. Raised are
+        `BlockFailure` for what a block raised, `SceneError` if one waits for a host program, and
+        `RuntimeError` if it has run before.
         """
         self._check_ready()
         started = time.process_time()

@@ -23,25 +23,7 @@ from dsa_des.time.runs import Runs
 
 
 class Timeline:
-    """One run of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    everything : bool
-        Let clocks draw their jitter also where it is 0.
-
-    Attributes
-    ----------
-    streams : Streams
-        The keyed random numbers of blocks.
-    count : int
-        How many runs there are.
-    runs : Runs
-        How they lie in time; known once `set_length` was called.
-    says_replica : bool
-        Whether what is recorded says of which run it is.
-    """
+    """One run of a scene; with `everything`, clocks draw their jitter also where it is 0."""
 
     count = 1
     says_replica = False
@@ -110,15 +92,9 @@ class Timeline:
     ) -> Windows:
         """Return the windows of all runs.
 
-        Parameters
-        ----------
-        longest_ticks : int
-        scans : float
-            How many scans of all clocks together each run has, about.
-        horizon_ticks : int, optional
-            If feedback loops are run in windows: before so long, nothing that is sent comes back.
-        rewinder : Rewinder, optional
-            If windows may be undone.
+        Each run has about so many `scans` of all clocks together. With `horizon_ticks`, feedback
+        loops run in windows: before so long, nothing that is sent comes back; with a `rewinder`
+        they may be undone.
         """
         if rewinder is not None and horizon_ticks is not None:
             return RewindingWindows(self.runs, longest_ticks, horizon_ticks, rewinder)

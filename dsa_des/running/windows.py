@@ -76,20 +76,9 @@ class Windows:
     verification of distributed programs", IEEE Transactions on Software Engineering SE-5, 1979).
     Blocks that no loop leads to have none: they run ahead, in windows of full length.
 
-    Parameters
-    ----------
-    runs : Runs
-        Learn which of them go: as many whole ones as a window may hold, or with a horizon all.
-    longest_ticks : int
-        Of the runs that go together.
-    horizon_ticks : int, optional
-        The least delay around the loops of the scene; none where it has no loop.
-
-    Attributes
-    ----------
-    next_instant : callable, optional
-        Given a tick and that up to which blocks ahead of the loops have run, returns one before
-        which no block runs: windows in which nothing happens are left out.
+    Of runs without a loop as many whole ones go as a window of `longest_ticks` may hold, with a
+    horizon all. `next_instant`, given a tick and that up to which blocks ahead of the loops have
+    run, returns one before which no block runs: windows in which nothing happens are left out.
     """
 
     next_instant: Callable[[int, int], int] | None = None
@@ -138,11 +127,8 @@ class Windows:
     def commit(self, window: Window, failure: Failure | None) -> int | None:
         """Let a window that has run stand, or undo it; `failure` is what a block raised in it.
 
-        Returns
-        -------
-        int or None
-            The tick before which everything is final, also the failure; None if the window does
-            not stand, and what `next` gives is to be run instead.
+        Returned is the tick before which everything is final, also the failure; None if the window
+        does not stand, and what `next` gives is to be run instead.
         """
         self.start = window.end
         if self.start >= self.end_tick and self.runs.going.stop < self.runs.count:
@@ -158,14 +144,7 @@ _CONTAINERS = (list, dict, set, deque, np.ndarray)
 class Rewinder:
     """Takes all blocks, wires and the record of a run back to how they were.
 
-    Parameters
-    ----------
-    nodes : collection of RunningBlock
-    cut_edges : collection of (source, target)
-        Over the wires between these blocks messages come back.
-    recorder : Recorder or None
-    runs : Runs
-        Forget ends that were undone.
+    Over the wires between `cut_edges` messages come back; `runs` forget ends that were undone.
     """
 
     def __init__(
@@ -210,14 +189,7 @@ class Rewinder:
 
 
 class RewindingWindows(Windows):
-    """Windows beyond the horizon of a single run, in which nothing came back unseen.
-
-    Parameters
-    ----------
-    runs, longest_ticks, horizon_ticks
-        As for `Windows`.
-    rewinder : Rewinder
-    """
+    """Windows beyond the horizon of a single run, in which nothing came back unseen."""
 
     def __init__(
         self, runs: Runs, longest_ticks: int, horizon_ticks: int, rewinder: Rewinder

@@ -6,7 +6,7 @@ wires that would hold a message where no block looks for it.
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -147,7 +147,7 @@ def _check_clock(
 
 
 def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]) -> None:
-    """Add effects that nothing would ever call, or of which only one could be told."""
+    """Add effects that no hook calls, and those of one block that share a name."""
     for name, block in blocks.items():
         cls, hooks = block.cls, block.cls.all_hooks()
         said = [
@@ -174,7 +174,7 @@ def check_activity(
     """Add blocks that would never run, and wires that hold a message for a queued input."""
     faults: list[Problem] = []
     clocks = _clocks(scene, blocks, faults)
-    if faults:  # said before
+    if faults:  # reported before
         return
     woken = {
         wire.target
@@ -207,6 +207,7 @@ def check_activity(
 
 
 _MAX_SEED = 2**63
+_Model = TypeVar("_Model", bound=Parameters)
 
 
 def read_text(scene_file: SceneFile, key: str, problems: list[Problem]) -> str:
@@ -245,19 +246,27 @@ def read_duration(scene_file: SceneFile, problems: list[Problem]) -> Fraction | 
 
 def read_sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, Parameters]:
     """Return the tables that belong to no block, also those with their defaults only."""
-    sections: dict[str, Parameters] = {}
-    for name, model in section_models().items():
-        table = scene_file.data.get(name, {})
-        if not isinstance(table, dict):
-            problems.append(scene_file.problem((name,), "must be a table", table))
-            continue
-        try:
-            sections[name] = model.model_validate(table)
-        except ValidationError as error:
-            problems += explain(scene_file, (name,), f"[{name}]", model, error)
-            continue
-        check_lookalikes(scene_file, (name,), table, sections[name], problems)
-    return sections
+    read = {
+        name: _read_table(scene_file, (name,), model, scene_file.data.get(name, {}), problems)
+        for name, model in section_models().items()
+    }
+    return {name: section for name, section in read.items() if section is not None}
+
+
+def _read_table(
+    scene_file: SceneFile, key: Key, model: type[_Model], table: Any, problems: list[Problem]
+) -> _Model | None:
+    """Return a table as its model; None where anything is wrong with it."""
+    if not isinstance(table, dict):
+        problems.append(scene_file.problem(key, "must be a table", table))
+        return None
+    try:
+        read = model.model_validate(table)
+    except ValidationError as error:
+        problems += explain(scene_file, key, f"[{dotted(key)}]", model, error)
+        return None
+    check_lookalikes(scene_file, key, table, read, problems)
+    return read
 
 
 def read_blocks(
@@ -294,12 +303,12 @@ def read_blocks(
             continue
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
-        for place, lost in scene_file.replaced.items():
-            if place[:2] == key:
-                source, gone = scene_file.source_of(place), ", ".join(lost)
+        for index, lost in scene_file.replaced.items():
+            if index[:2] == key:
+                source, gone = scene_file.source_of(index), ", ".join(lost)
                 notes.append(
-                    f"blocks.{name}: {dotted(place[2:])} of {source} takes the place of the whole "
-                    f"list, {gone} too; a table [{dotted(place)}.NAME] changes one item or adds one"
+                    f"blocks.{name}: {dotted(index[2:])} of {source} takes the place of the whole "
+                    f"list, {gone} too; a table [{dotted(index)}.NAME] changes one item or adds one"
                 )
         extra, given = split_options(table, cls.Parameters)
         given = _as_written(scene_file, key, given, cls.Parameters)
@@ -341,21 +350,15 @@ def read_processors(
     if not isinstance(tables, dict):
         problems.append(scene_file.problem(("processors",), "must hold one table per processor"))
         return {}
-    found: dict[str, ProcessorParameters] = {}
-    for name in sorted(tables):
-        key: Key = ("processors", name)
-        if not isinstance(tables[name], dict):
-            problems.append(scene_file.problem(key, "must be a table", tables[name]))
-            continue
-        try:
-            found[name] = ProcessorParameters.model_validate(tables[name])
-        except ValidationError as error:
-            problems += explain(scene_file, key, f"[{dotted(key)}]", ProcessorParameters, error)
-            continue
-        check_lookalikes(scene_file, key, tables[name], found[name], problems)
+    read = {
+        name: _read_table(
+            scene_file, ("processors", name), ProcessorParameters, tables[name], problems
+        )
+        for name in sorted(tables)
+    }
     for name, block in blocks.items():
         wanted = block.options.processor
         if wanted is not None and wanted not in tables:
             message = f"the scene has no such processor{did_you_mean(wanted, tables)}"
             problems.append(scene_file.problem(("blocks", name, "processor"), message, str(wanted)))
-    return found
+    return {name: processor for name, processor in read.items() if processor is not None}

@@ -1,4 +1,4 @@
-"""Scenes, studies and cases that packages ship, found by name: ``first_light``."""
+"""Scenes, studies and cases that packages ship, by name: ``first_light``."""
 
 import os
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     path = Path(asked)
     if not str(asked) or "\0" in str(asked) or os.path.lexists(path):
         return path
-    found = find_example(path.as_posix(), kind)
-    if found is not None:
-        return found
-    # What no file system takes as a name is said by who opens it.
+    result = find_example(path.as_posix(), kind)
+    if result is not None:
+        return result
+    # A name that no file system takes is refused where it is opened.
     if len(path.parts) == 1 and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
         close = nearest(path.name.removesuffix(".toml"), names)
@@ -79,21 +79,21 @@ def examples() -> list[Example]:
     UsageError
         If a package that registered a folder cannot be imported.
     """
-    found = [
-        (place, path, *read)
-        for place, path in shipped_files()
+    result = [
+        (location, path, *read)
+        for location, path in shipped_files()
         if (read := _kind_and_title(path)) is not None
     ]
-    stems = [(place.name, kind) for place, _, kind, _ in found]
+    stems = [(location.name, kind) for location, _, kind, _ in result]
     return sorted(
         (
             Example(
-                place.name if stems.count((place.name, kind)) == 1 else str(place),
+                location.name if stems.count((location.name, kind)) == 1 else str(location),
                 path,
                 kind,
                 title,
             )
-            for place, path, kind, title in found
+            for location, path, kind, title in result
         ),
         key=lambda example: (example.kind, example.name),
     )
@@ -101,11 +101,11 @@ def examples() -> list[Example]:
 
 def find_example(name: str, kind: Kind | None = None) -> Path | None:
     """Return the file of a shipped scene, study or case; None if there is none of that name."""
-    found = files_named(name)
-    if len(found) > 1:
-        kinds = {path: read[0] for path in found if (read := _kind_and_title(path))}
-        found = [path for path, one in kinds.items() if kind in (None, one)]
-    return found[0] if len(found) == 1 else None
+    result = files_named(name)
+    if len(result) > 1:
+        kinds = {path: read[0] for path in result if (read := _kind_and_title(path))}
+        result = [path for path, one in kinds.items() if kind in (None, one)]
+    return result[0] if len(result) == 1 else None
 
 
 @cache

@@ -140,7 +140,7 @@ def _depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:
     mine = set(first).intersection(graph)
     needed = mine.union(*(nx.ancestors(graph, name) for name in mine))
     later = 1 + max((depth[name] for name in mine), default=-1)
-    return {name: place if name in needed else place + later for name, place in depth.items()}
+    return {name: index if name in needed else index + later for name, index in depth.items()}
 
 
 def window_order(

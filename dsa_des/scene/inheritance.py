@@ -107,20 +107,20 @@ class Inheritance:
         for name, value in over.items():
             if isinstance(value, Removals):
                 continue
-            place = place_of(items, name)
-            if place is None and is_new_item(items, name, value):
-                place = len(items)
+            index = place_of(items, name)
+            if index is None and is_new_item(items, name, value):
+                index = len(items)
                 items.append({"name": name})
-            if place is None:
+            if index is None:
                 source = self._sources.get((*at, name), "")
                 message = no_item(items, name)
                 self._problems.append(Problem(source, dotted((*at, name)), message))
                 continue
-            self._move_sources((*at, name), (*at, place))
-            if isinstance(value, dict) and isinstance(items[place], dict):
-                self.merge(items[place], value, (*at, place))
+            self._move_sources((*at, name), (*at, index))
+            if isinstance(value, dict) and isinstance(items[index], dict):
+                self.merge(items[index], value, (*at, index))
             else:
-                items[place] = value
+                items[index] = value
         if isinstance(removals, Removals):
             self._report(removals, at)
 
@@ -128,16 +128,16 @@ class Inheritance:
         rest = unquoted(removal.text)
         removal.known = tuple(map(str, container)) if isinstance(container, dict) else ()
         while isinstance(container, dict | list):
-            place: Any
-            place, _, rest = step(container, rest)
-            if place is None or (isinstance(container, dict) and place not in container):
+            index: Any
+            index, _, rest = step(container, rest)
+            if index is None or (isinstance(container, dict) and index not in container):
                 return
             if not rest:
-                del container[place]
+                del container[index]
                 removal.found = True
-                self._forget(container, (*at, place))
+                self._forget(container, (*at, index))
                 return
-            container, at = container[place], (*at, place)
+            container, at = container[index], (*at, index)
 
     def _forget(self, container: Any, key: Key) -> None:
         """Forget where a key was written; later items of a list move up."""
@@ -145,8 +145,8 @@ class Inheritance:
         for known in [known for known in self._sources if known[: len(key)] == key]:
             del self._sources[known]
         if isinstance(container, list):
-            around, place = key[:-1], int(key[-1])
-            for number in range(place, len(container)):
+            around, index = key[:-1], int(key[-1])
+            for number in range(index, len(container)):
                 self._move_sources((*around, number + 1), (*around, number))
 
     def _move_sources(self, old: Key, new: Key) -> None:

@@ -23,7 +23,7 @@ def dotted(key: Key) -> str:
 
 def unquoted(text: str) -> str:
     """Return a dotted key without the quotes around its parts."""
-    return _QUOTED.sub(lambda found: found[1] if found[2] is None else found[2], text).replace(
+    return _QUOTED.sub(lambda match: match[1] if match[2] is None else match[2], text).replace(
         '"', ""
     )
 
@@ -34,13 +34,13 @@ def flat(
     prefix: str = "",
 ) -> dict[str, Any]:
     """Return dotted key → value of nested tables."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name, value in tables.items():
         if is_value(value):
-            found[f"{prefix}{name}"] = value
+            result[f"{prefix}{name}"] = value
         else:
-            found |= flat(value, is_value, f"{prefix}{name}.")
-    return found
+            result |= flat(value, is_value, f"{prefix}{name}.")
+    return result
 
 
 def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
@@ -144,8 +144,8 @@ def _ends(item: Any) -> list[str]:
 
 
 def _name(item: Any) -> str:
-    found = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
-    return str(found) if isinstance(found, str) else ""
+    result = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
+    return str(result) if isinstance(result, str) else ""
 
 
 def _longest(names: list[str], rest: str) -> str | None:
@@ -158,13 +158,13 @@ def key_in(tables: Any, text: str) -> Key:
 
     What the tables do not hold stays as it was written.
     """
-    found: list[str | int] = []
+    result: list[str | int] = []
     rest = unquoted(text)
     while rest:
-        place, part, rest = step(tables, rest)
-        found.append(part if place is None else place)
-        inside = place is not None if isinstance(tables, list) else place in tables
-        tables = tables[place] if inside else {}
+        index, part, rest = step(tables, rest)
+        result.append(part if index is None else index)
+        inside = index is not None if isinstance(tables, list) else index in tables
+        tables = tables[index] if inside else {}
         if not isinstance(tables, dict | list):
             tables = {}
-    return tuple(found)
+    return tuple(result)

@@ -48,7 +48,7 @@ def parse_value(text: str) -> Any:
 
 def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
     """Return the keys and values of all ``--set``, and what is wrong with how they are written."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     problems: list[Problem] = []
     for assignment in assignments:
         parsed = parse_assignment(assignment, "--set")
@@ -61,10 +61,10 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
         except TomlError as error:
             problems.append(Problem(COMMAND_LINE, text, str(error)))
             continue
-        if text in found:
+        if text in result:
             problems.append(Problem(COMMAND_LINE, text, "--set gives it twice", written))
-        found[text] = value
-    return list(found.items()), problems
+        result[text] = value
+    return list(result.items()), problems
 
 
 def read_changes(
@@ -116,8 +116,8 @@ def apply_changes(
 
 def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
     """Apply all ``--set`` to the scene's tables and return what is wrong with them."""
-    found, problems = read_sets(assignments)
-    for text, value in found:
+    result, problems = read_sets(assignments)
+    for text, value in result:
         problems += set_value(scene, text, value, COMMAND_LINE)
     return problems
 
@@ -136,30 +136,30 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     key: list[str | int] = []
     rest = unquoted(text)
     while True:
-        place, part, rest = step(container, rest)
-        if place is None and not rest and is_new_item(container, part, value):
-            place, value = len(container), {"name": part, **value}
+        index, part, rest = step(container, rest)
+        if index is None and not rest and is_new_item(container, part, value):
+            index, value = len(container), {"name": part, **value}
             container.append(value)
-        if place is None:
+        if index is None:
             return [Problem(source, text, no_item(container, part))]
-        if key == ["blocks"] and place not in container:
-            hint = did_you_mean(str(place), container)
+        if key == ["blocks"] and index not in container:
+            hint = did_you_mean(str(index), container)
             return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
-        key.append(place)
+        key.append(index)
         if len(key) > DEEPEST:
             message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
             return [Problem(source, text, message)]
         if not rest:
-            container[place] = value
+            container[index] = value
             break
-        if isinstance(container, dict) and place not in container:
-            container[place] = {}
+        if isinstance(container, dict) and index not in container:
+            container[index] = {}
             scene.sources[tuple(key)] = source
-        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[place])):
-            container[place] = table
-        elif not isinstance(container[place], dict | list):
+        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[index])):
+            container[index] = table
+        elif not isinstance(container[index], dict | list):
             return [Problem(source, text, f"{dotted(tuple(key))} is no table")]
-        container = container[place]
+        container = container[index]
     for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
         del scene.sources[source_key]
     scene.sources[tuple(key)] = source

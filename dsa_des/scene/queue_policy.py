@@ -17,7 +17,7 @@ class Job(Protocol):
 class QueuePolicy:
     """Every message waits in line (``wait``); a subclass lets some go.
 
-    It remembers nothing: what it says follows from who waits.
+    It has no state: its answers follow from the jobs in line.
     """
 
     def skips(self, busy: bool) -> bool:
@@ -63,11 +63,11 @@ def find_policy(name: Any) -> type[QueuePolicy]:
         hint, allowed = did_you_mean(str(name), POLICIES), ", ".join(map(repr, POLICIES))
         raise ValueError(f"must be one of {allowed}, or module:Class{hint}")
     try:
-        found = load_named(name, "processors")
+        result = load_named(name, "processors")
     except NotAllowed:
         return QueuePolicy
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
-    if not (isinstance(found, type) and issubclass(found, QueuePolicy)):
+    if not (isinstance(result, type) and issubclass(result, QueuePolicy)):
         raise ValueError(f"{name} is not a dsa_des.scene.queue_policy.QueuePolicy")
-    return found
+    return result

@@ -231,7 +231,7 @@ def _similar_file(path: Path, shipped: bool) -> str:
         missing = f" (there is no folder {shortened(str(path.parent), 300)})"
     if close := nearest(path.name, names):
         return f"; did you mean {path.parent / close}?"
-    known = [name for place, _ in shipped_files() for name in (place.name, str(place))]
+    known = [name for index, _ in shipped_files() for name in (index.name, str(index))]
     if shipped and (close := nearest(path.name.removesuffix(".toml"), known)):
         return f"; did you mean the shipped {close!r}?"
     return missing

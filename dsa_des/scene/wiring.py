@@ -105,7 +105,7 @@ def read_wires(
     if not isinstance(entries, list):
         problems.append(scene.problem(("wires",), "must be a list of wires", entries))
         if unsure is not None:
-            unsure.update(classes)  # which ones it meant to feed cannot be told
+            unsure.update(classes)  # its targets are unknown
         return []
     wires: list[Wire] = []
     for position, entry in enumerate(entries):
@@ -115,7 +115,7 @@ def read_wires(
         except _WireError as error:
             problems.append(scene.problem(key, str(error), *error.value))
             if unsure is not None:
-                unsure.update(classes)  # whom it meant to feed cannot be told
+                unsure.update(classes)  # its target is unknown
             continue
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
@@ -246,14 +246,14 @@ def _two_writers(
     writers: dict[tuple[str, str], list[Wire]] = {}
     for wire in wires:
         writers.setdefault((wire.target, wire.input), []).append(wire)
-    for (target, input_name), found in sorted(writers.items()):
-        ends = [f"{w.source}.{w.output}" for w in found]
+    for (target, input_name), result in sorted(writers.items()):
+        ends = [f"{w.source}.{w.output}" for w in result]
         if len(set(ends)) < len(ends):
             twice = sorted(end for end, count in Counter(ends).items() if count > 1)
             message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
             problems.append(scene.problem(("wires",), message))
-        elif len(found) > 1 and not classes[target].inputs[input_name].many:
-            message = f"{target}.{input_name} has {len(found)} writers: {', '.join(sorted(ends))}"
+        elif len(result) > 1 and not classes[target].inputs[input_name].many:
+            message = f"{target}.{input_name} has {len(result)} writers: {', '.join(sorted(ends))}"
             problems.append(scene.problem(("wires",), message))
 
 

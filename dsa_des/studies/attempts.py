@@ -59,10 +59,10 @@ class Attempts:
         self._ended()
         self._again.append(piece)
 
-    def done(self, piece: Piece, found: Done) -> Done | None:
+    def done(self, piece: Piece, result: Done) -> Done | None:
         """Take the result of a piece; return that of its chunk when all of it is there."""
         self._ended()
-        return self._collect(piece, found)
+        return self._collect(piece, result)
 
     def lost(self, piece: Piece) -> Done | None:
         """Take back a piece whose process died; return its chunk's result if that was the last."""
@@ -86,12 +86,12 @@ class Attempts:
         self._running -= 1
         self._only = False
 
-    def _collect(self, piece: Piece, found: Done) -> Done | None:
+    def _collect(self, piece: Piece, result: Done) -> Done | None:
         name = piece.chunk.name
         if name not in self._missing:
-            return found
-        self._there.setdefault(name, []).append(found)
-        self._missing[name] -= found.runs
+            return result
+        self._there.setdefault(name, []).append(result)
+        self._missing[name] -= result.runs
         if self._missing[name]:
             return None
         del self._missing[name]

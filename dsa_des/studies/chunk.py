@@ -7,7 +7,7 @@ the same.
 import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -155,17 +155,22 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
     values: dict[str, AnyArray] = {}
-    done, size = 0, _Size.of(study, cell)
+    done, key = 0, (str(study.path), cell)
+    if len(_bytes_of_a_run) > _MOST_KNOWN:
+        _bytes_of_a_run.clear()
     while done < len(replicas):
-        part = replicas[done : done + size.runs]
+        one_run = _bytes_of_a_run.get(key, _MOST_BYTES / _FIRST_RUNS)
+        part = replicas[done : done + max(1, int(_MOST_BYTES / max(1.0, one_run)))]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
-        size.learn(outcomes)
+        recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
+        if recorded:
+            _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)
         good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
                 rows["error"][done + k] = outcome.error
-        found, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
-        for name, column in found.items():
+        result, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+        for name, column in result.items():
             nothing = _nothing(len(numbers), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
         for k, text in errors.items():
@@ -174,40 +179,12 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
     return _table(study, schema, cell, rows, values)
 
 
-class _Size:
-    """How many runs of a cell are recorded at a time, so that their rows fit in memory.
-
-    That is learnt from those before: it follows from the scene, and changes no result.
-    """
-
-    _known: ClassVar[dict[tuple[str, int], "_Size"]] = {}
-
-    def __init__(self) -> None:
-        self._bytes = _MOST_BYTES / _FIRST_RUNS
-
-    @classmethod
-    def of(cls, study: Study, cell: int) -> "_Size":
-        """Return what is known of a cell."""
-        if len(cls._known) > _MOST_KNOWN:
-            cls._known.clear()
-        return cls._known.setdefault((str(study.path), cell), cls())
-
-    @property
-    def runs(self) -> int:
-        """How many there is room for."""
-        return max(1, int(_MOST_BYTES / max(1.0, self._bytes)))
-
-    def learn(self, outcomes: Sequence[Recorded | Failed]) -> None:
-        """Take note of how much runs have recorded."""
-        recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
-        if recorded:
-            self._bytes = sum(_bytes_of(run) for run in recorded) / len(recorded)
-
-
 #: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
 #: runs of a cell tell how many that is.
 _MOST_BYTES, _FIRST_RUNS = 150e6, 64
 _MOST_KNOWN = 1000
+#: By study and cell, from the runs before: it follows from the scene, and changes no result.
+_bytes_of_a_run: dict[tuple[str, int], float] = {}
 
 
 def _bytes_of(run: Recorded) -> int:
@@ -236,24 +213,24 @@ def _measured(
     group = Group(
         scene, [replica for replica, _ in runs], [run for _, run in runs], wanted_by(metrics)
     )
-    found: dict[str, AnyArray] = {}
+    result: dict[str, AnyArray] = {}
     for metric in metrics:
         try:
-            found.update(metric.measure(group))
+            result.update(metric.measure(group))
         except BaseException as error:
             if must_pass(error):
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
             return _one_by_one(scene, metrics, runs)
-    return found, {}
+    return result, {}
 
 
 def _one_by_one(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
-    found: dict[str, AnyArray] = {}
+    result: dict[str, AnyArray] = {}
     errors: dict[int, str] = {}
     for k, run in enumerate(runs):
         values, wrong = _measured(scene, metrics, [run])
@@ -261,5 +238,5 @@ def _one_by_one(
             errors[k] = wrong[0]
         for name, column in values.items():
             nothing = _nothing(len(runs), text=column.dtype == object)
-            found.setdefault(name, nothing)[k] = column[0]
-    return found, errors
+            result.setdefault(name, nothing)[k] = column[0]
+    return result, errors

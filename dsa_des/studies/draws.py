@@ -57,8 +57,8 @@ class Draw:
             return first + step * replica
         u = _uniform(seed, self.key, replica)
         if self.stratified:
-            block, place = divmod(replica, batch)
-            u = (int(_strata(seed, self.key, block, batch)[place]) + u) / batch
+            block, index = divmod(replica, batch)
+            u = (int(_strata(seed, self.key, block, batch)[index]) + u) / batch
         if self.kind == "choice":
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         low, high = self.values
@@ -182,9 +182,9 @@ def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
 def identity(axis: Axis, index: int) -> tuple[str, ...]:
     """Return what tells one value of an axis from all others.
 
-    A file is told by its name, without its folder, and its content: it keeps its draws wherever
+    A file is known by its name, without its folder, and its content: it keeps its draws wherever
     it lies, copies under other names are other encounters, and so are files of the same name in
-    other folders, unless they hold the same. Other values are told by themselves; 1 and 1.0 are
+    other folders, unless they hold the same. Other values identify themselves; 1 and 1.0 are
     the same.
     """
     if not axis.files:

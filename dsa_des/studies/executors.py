@@ -1,7 +1,7 @@
 """Executors of a study's chunks: this process, a pool of processes, or a Dask cluster.
 
-An executor gives results as they come, in any order. What a chunk gives does not depend on who ran
-it, so neither do the results. What is run again when a process dies is said in `attempts.py`.
+An executor gives results as they come, in any order. A chunk's rows do not depend on
+its worker, so neither do the results. Pieces whose process dies: see `attempts.py`.
 """
 
 import multiprocessing
@@ -141,13 +141,13 @@ def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
     while (first := worker.pop()) is not None:
         future, piece = first
         try:
-            found = attempts.done(piece, future.result())
+            result = attempts.done(piece, future.result())
         except BrokenProcessPool:
             for other in worker.renew():
                 attempts.give_back(other)
-            found = attempts.lost(piece)
-        if found is not None:
-            yield found
+            result = attempts.lost(piece)
+        if result is not None:
+            yield result
 
 
 @contextmanager
@@ -183,7 +183,7 @@ def _script_folder_last(path: list[str]) -> list[str]:
     if sys.flags.safe_path or path[:1] == [_HOME]:
         return path
     theirs = {"", os.getcwd()} - {_HOME}
-    return [place for place in [*path[1:], *path[:1]] if place not in theirs]
+    return [index for index in [*path[1:], *path[:1]] if index not in theirs]
 
 
 def _new_pool(study: Study) -> ProcessPoolExecutor:
@@ -272,12 +272,12 @@ class Dask:
         for future in running:
             piece = given.pop(future.key)
             try:
-                found = attempts.done(piece, future.result())
+                result = attempts.done(piece, future.result())
             except KilledWorker:
-                found = attempts.lost(piece)
+                result = attempts.lost(piece)
             submit()
-            if found is not None:
-                yield found
+            if result is not None:
+                yield result
             if not given:
                 return
 

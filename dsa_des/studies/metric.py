@@ -1,4 +1,4 @@
-"""Metrics, which a study measures, found by the entry-point group ``dsa_des.metrics``.
+"""Metrics, which a study measures, registered in the entry-point group ``dsa_des.metrics``.
 
 A metric reads the recorded tables of a *group* of replicas at once: every table has one more
 column, ``replica``, with the number of the replica each row belongs to. It is written over arrays,
@@ -88,8 +88,8 @@ class Group:
         """Return what `make` returns, made once per group and key: metrics may share work."""
         if key not in self._known:
             self._known[key] = make()
-        found: _T = self._known[key]
-        return found
+        result: _T = self._known[key]
+        return result
 
     @cached_property
     def scenes(self) -> Sequence[Scene]:
@@ -207,18 +207,18 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
         hint = did_you_mean(name, registered(METRICS))
         raise ValueError(f"unknown metric{hint} (or module:Class)")
     try:
-        found = (
+        result = (
             load_named(name, "metrics", beside) if point is None else load_point(point, "metrics")
         )
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
-    return _metric(name, found)
+    return _metric(name, result)
 
 
-def _metric(name: str, found: Any) -> type[Metric]:
-    if not (isinstance(found, type) and issubclass(found, Metric)):
+def _metric(name: str, result: Any) -> type[Metric]:
+    if not (isinstance(result, type) and issubclass(result, Metric)):
         raise ValueError(f"{name} is not a dsa_des.studies.metric.Metric")
-    return found
+    return result
 
 
 def recorded_by(scene: Scene, table: str) -> list[str]:

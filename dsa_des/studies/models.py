@@ -44,11 +44,11 @@ def explained(study: Study) -> Explained:
         where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
         try:
             scene = scene_of(study.scene(cell), study.replica(0, cell))
-            found = _of_scene(where, scene)
+            result = _of_scene(where, scene)
             text = text or to_toml(scene.resolved())
         except (SceneError, BlockFailure, ValueError):
             continue  # its rows say why
-        scenes.append(_less(found, scenes[0]) if scenes else found)
+        scenes.append(_less(result, scenes[0]) if scenes else result)
     scenes = [one for one in scenes if one.models or one.effects or one.spared]
     return Explained(versions=versions(), scene=text, scenes=scenes)
 
@@ -99,11 +99,11 @@ def _rung(scene: Scene, name: str, ladder: Ladder) -> str:
     return best
 
 
-def _less(found: SceneRecord, first: SceneRecord) -> SceneRecord:
+def _less(result: SceneRecord, first: SceneRecord) -> SceneRecord:
     """Return what is not so in the first scene."""
     lists = ("models", "effects", "spared")
-    new = {n: [one for one in getattr(found, n) if one not in getattr(first, n)] for n in lists}
-    return found.model_copy(update=new)
+    new = {n: [one for one in getattr(result, n) if one not in getattr(first, n)] for n in lists}
+    return result.model_copy(update=new)
 
 
 def keep_explained(study: Study, folder: StudyFolder) -> None:

@@ -163,12 +163,12 @@ def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:
     result = next(item for item in results_of(study) if item.name == stop.metric)
     # What a killed attempt left of later rounds must not decide: it would not have been there.
     rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
-    found = set()
+    matches = set()
     for (cell,), chosen in rows.each_place():
         estimate, _ = rows.estimate(result, chosen, study.confidence, study.interval)
         if not np.isnan(estimate.half_width) and estimate.half_width <= stop.half_width:
-            found.add(int(cell))
-    return found
+            matches.add(int(cell))
+    return matches
 
 
 #: Replicas whose random draws an analytic answer is averaged over.
@@ -181,7 +181,7 @@ def tables_of(study: Study, folder: StudyFolder) -> Tables:
 
 
 def _expected(study: Study) -> Expected:
-    """Return the analytic answers at every place, averaged over draws and encounters."""
+    """Return the analytic answers by axis values, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
     for cell in study.cells:

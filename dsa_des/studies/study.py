@@ -2,7 +2,7 @@
 
 A *cell* is one combination of axis values; its replicas differ by seed and random draws. Runs are
 numbered cell by cell and cut into chunks whose size knows nothing of workers, so that what a chunk
-gives never depends on who ran it.
+gives never depends on the worker.
 """
 
 import math
@@ -32,8 +32,8 @@ class MetricSpec:
 
     name: str
     keys: Mapping[str, Any] = field(default_factory=dict)
-    #: Its place in the study's list, for messages.
-    place: int = 0
+    #: Its position in the study's list, for messages.
+    index: int = 0
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene."""
@@ -180,7 +180,7 @@ class Study:
 
 
 def set_text(value: Any) -> str:
-    """Return a value the way ``--set`` takes it; a path of the study's own as it was found."""
+    """Return a value the way ``--set`` takes it; a path as it is found from the study's folder."""
     folder = getattr(value, "folder", None)
     if folder is not None and (path := existing_file(value, folder)) is not None:
         return str(path)

@@ -28,7 +28,7 @@ _MOST_SCENES = 64
 def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    What is wrong is said of `file`, the study's, and of the `scene` without axes where no cell has
+    Problems name `file`, the study's, and the `scene` without axes is checked where no cell has
     one that fits. Names of results are checked only where the `whole` study could be read.
     """
     problems: list[Problem] = []
@@ -127,44 +127,44 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
         refused: dict[int, str] = {}
         for spec in study.metrics:
             try:
-                if wrong is None or spec.place in wrong:
+                if wrong is None or spec.index in wrong:
                     metric = spec.build(scene)
                     check_recorded(metric, blocks)
                     metric.check(blocks)
             except ValueError as error:
-                refused[spec.place] = str(error)
+                refused[spec.index] = str(error)
         wrong = refused
         if not wrong:
             break
     if wrong is None:
         return broken
-    names = {spec.place: spec.name for spec in study.metrics}
+    names = {spec.index: spec.name for spec in study.metrics}
     return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
 
 
 def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
     names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.summed_up]
+
+    def missing(key: Key, name: str) -> None:
+        add(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
+
     if study.stop_when and study.stop_when.metric not in names:
-        message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
-        add(("stop_when", "metric"), message, study.stop_when.metric)
+        missing(("stop_when", "metric"), study.stop_when.metric)
     weight = study.compare_weight
     if weight is not None and (weight not in results or results[weight].kind != NUMBER):
         message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
         add(("compare", "weight"), message, weight)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
-            message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
-            add(("requirements", number, "metric"), message, wanted.metric)
+            missing(("requirements", number, "metric"), wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure.kind == "series":
             if not of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
                 add(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
-            message = "no metric of the study gives it"
-            message += did_you_mean(str(figure.metric), names)
-            add(("figures", number, "metric"), message, str(figure.metric))
+            missing(("figures", number, "metric"), str(figure.metric))
         elif figure.kind in ("histogram", "cdf") and (
             results[str(figure.metric)].kind not in (NUMBER, FRACTION, SHARE)
         ):
@@ -234,34 +234,34 @@ def _build_metrics(
         try:
             built.append(spec.build(scene))
         except ValueError as error:
-            add(("metrics", spec.place), f"{error}{where}", spec.name)
+            add(("metrics", spec.index), f"{error}{where}", spec.name)
     return built
 
 
 def _tables_read(study: Study, scene: Scene) -> set[str]:
-    """Return the tables that the metrics read; what is wrong with one is said elsewhere."""
-    found: set[str] = set()
+    """Return the tables that the metrics read; problems of metrics are reported elsewhere."""
+    result: set[str] = set()
     for spec in study.metrics:
         with contextlib.suppress(ValueError):
-            found.update(spec.build(scene).tables)
-    return found
+            result.update(spec.build(scene).tables)
+    return result
 
 
 def one_per_value(study: Study) -> list[int]:
     """Return cells that together hold every value of every axis; the first cell comes first."""
     wanted = [(0,) * len(study.axes)]
-    for place, axis in enumerate(study.axes):
+    for position, axis in enumerate(study.axes):
         for index in range(1, len(axis.labels)):
-            wanted.append(tuple(index if k == place else 0 for k in range(len(study.axes))))
+            wanted.append(tuple(index if k == position else 0 for k in range(len(study.axes))))
     return [study.cell_at(indices) for indices in wanted]
 
 
 def _different(scenes: list[Scene]) -> list[Scene]:
     """Return one scene for every set of block types."""
-    found: dict[tuple[Any, ...], Scene] = {}
+    result: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:
-        found.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
-    return list(found.values())
+        result.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
+    return list(result.values())
 
 
 def _types(scene: Scene, other: Scene) -> str:

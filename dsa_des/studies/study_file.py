@@ -131,7 +131,7 @@ class _StudyReader:
         specs = self.metric_specs()
         stop_when = self.stop_when(replicas)
         base, scene = self.scene()
-        if base is None or scene is None:  # all else is said of this scene
+        if base is None or scene is None:  # all else is checked against this scene
             raise SceneError(self.problems)
         axes = self.axes(scene, swaps)
         cells = math.prod(len(axis.labels) for axis in axes)
@@ -237,7 +237,7 @@ class _StudyReader:
         for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
-            except SceneError as error:  # what else is wrong is then said of the scene as it is
+            except SceneError as error:  # all else is then checked against the scene as it is
                 known = {str(problem) for problem in self.problems}
                 self.problems += [one for one in error.problems if str(one) not in known]
         return None, None
@@ -245,24 +245,24 @@ class _StudyReader:
     # -- axes and draws --------------------------------------------------------------------
 
     def axes(self, scene: Scene, swaps: Iterable[tuple[str, list[str]]]) -> tuple[Axis, ...]:
-        found: list[Axis] = []
+        result: list[Axis] = []
         specs = flatten_axes(self.table("axes")) | {f"swap.{b}": types for b, types in swaps}
         for key, spec in specs.items():
             try:
-                found.append(parse_axis(key, spec, scene))
+                result.append(parse_axis(key, spec, scene))
             except ValueError as error:
                 self.add(("axes", key), str(error))
                 self.unread.append(key.removeprefix("blocks."))
-        return tuple(found)
+        return tuple(result)
 
     def draws(self) -> tuple[Draw, ...]:
-        found = []
+        result = []
         for key, spec in flatten_draws(self.table("draws")).items():
             try:
-                found.append(parse_draw(key, spec))
+                result.append(parse_draw(key, spec))
             except ValueError as error:
                 self.add(("draws", key), str(error))
-        return tuple(found)
+        return tuple(result)
 
     def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
         """Return the column of the axis that `name` means."""
@@ -326,7 +326,7 @@ class _StudyReader:
             shown = ", ".join(registered(METRICS))
             self.add(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
-        found: list[MetricSpec] = []
+        result: list[MetricSpec] = []
         for number, item in enumerate(items):
             key: Key = ("metrics", number)
             table = {"metric": item} if isinstance(item, str) else item
@@ -344,8 +344,8 @@ class _StudyReader:
             except ValueError as error:
                 self.add(key, str(error), name)
                 continue
-            found.append(MetricSpec(name, keys, number))
-        return tuple(found)
+            result.append(MetricSpec(name, keys, number))
+        return tuple(result)
 
     def stop_when(self, replicas: int) -> StopWhen | None:
         table = self.data.get("stop_when")

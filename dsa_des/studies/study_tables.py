@@ -103,7 +103,7 @@ def read_figures(
         add(("figures",), "must be a list of tables ([[figures]])")
         return ()
     most = {"cell": math.prod(len(axis.labels) for axis in axes), "replica": replicas}
-    found: list[FigureRecord] = []
+    result: list[FigureRecord] = []
     for number, item in enumerate(items):
         key: Key = ("figures", number)
         if not isinstance(item, dict):
@@ -149,15 +149,15 @@ def read_figures(
         if kind == "polar" and chosen and not chosen[0].numeric:
             add(key, f"a polar figure needs an axis in degrees; {chosen[0].column} is no number")
         # What is wrong with it is reported, and then no study is made.
-        found.append(FigureRecord.model_construct(**figure))
-    return tuple(found)
+        result.append(FigureRecord.model_construct(**figure))
+    return tuple(result)
 
 
 def _limits(value: Any) -> list[float]:
     """Return the limits that a figure draws contours of; none where one is no finite number."""
     numbers = [number_of(item) for item in (value if isinstance(value, list) else [value])]
-    found = [number for number in numbers if number is not None]
-    return found if len(found) == len(numbers) else []
+    result = [number for number in numbers if number is not None]
+    return result if len(result) == len(numbers) else []
 
 
 _KEYS = ("metric", "axis", "most", "least", "cheaper")
@@ -176,7 +176,7 @@ def read_requirements(
     if not isinstance(items, list):
         add(("requirements",), "must be a list of tables ([[requirements]])")
         return ()
-    found = []
+    result = []
     for number, item in enumerate(items):
         key: Key = ("requirements", number)
         if not isinstance(item, dict):
@@ -207,8 +207,8 @@ def read_requirements(
         along = column((*key, "axis"), item["axis"], axes)
         if along is not None and limit is not None:
             below, last = limits[0] == "most", cheaper == "last"
-            found.append(Requirement(str(item["metric"]), along, limit, below, last))
-    return tuple(found)
+            result.append(Requirement(str(item["metric"]), along, limit, below, last))
+    return tuple(result)
 
 
 def number_of(value: Any) -> float | None:

@@ -7,7 +7,6 @@ and where not even that is enough, each row is a list of ``heading: value``.
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
@@ -20,6 +19,7 @@ _LEAST = 8
 _PIECES = re.compile(r"(?:\.\d|-\d| \*|[^\s_./\]-])*(?:(?!\.\d|-\d| \*)[\s_./\]-])*")
 
 Row = Sequence[str]
+_Layout = tuple[list[int], int]
 
 
 def print_table(
@@ -78,7 +78,7 @@ def _print_rows(
     below: Sequence[str] = (),
 ) -> None:
     layout = _layout(names, cells, console.width)
-    if not layout.widths:
+    if not layout[0]:
         _print_lists(console, names, cells)
         return
     _print_line(console, names, layout, right, "bold")
@@ -89,16 +89,16 @@ def _print_rows(
 
 
 def _print_line(
-    console: Any, texts: Sequence[str], layout: "_Layout", right: Collection[int], style: str = ""
+    console: Any, texts: Sequence[str], layout: _Layout, right: Collection[int], style: str = ""
 ) -> None:
-    widths = layout.widths
+    widths, gap = layout
     folded = [fold(text, width) for text, width in zip(texts, widths, strict=True)]
     for number in range(max(map(len, folded), default=0)):
         parts = [
             _padded(lines[number] if number < len(lines) else "", width, k in right)
             for k, (lines, width) in enumerate(zip(folded, widths, strict=True))
         ]
-        _put(console, (" " * layout.gap).join(parts).rstrip(), style)
+        _put(console, (" " * gap).join(parts).rstrip(), style)
 
 
 def _print_lists(console: Any, names: list[str], cells: list[list[str]]) -> None:
@@ -163,15 +163,8 @@ def _natural(names: list[str], cells: list[list[str]]) -> list[int]:
     return [max(_length(row[k]) for row in every) for k in range(len(names))]
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """The width of each column and of what is between them; no widths where nothing fits."""
-
-    widths: list[int]
-    gap: int
-
-
 def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
+    """Return the width of each column and of the gaps; no widths where nothing fits."""
     widths = _natural(names, cells)
     of_cells = [max((_length(row[k]) for row in cells), default=0) for k in range(len(names))]
     of_words = [
@@ -192,5 +185,5 @@ def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
             at = max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))
             widths[at] -= 1
         if _total(widths, gap) <= most:
-            return _Layout(widths, gap)
-    return _Layout([], 1)
+            return widths, gap
+    return [], 1

@@ -45,9 +45,9 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     """
     from dsa_des.terminal.safe_console import SafeConsole
 
-    found = SafeConsole(stderr=err)
-    known = width is None or found.is_terminal or os.environ.get("COLUMNS", "").isdecimal()
-    return found if known else SafeConsole(stderr=err, width=width)
+    result = SafeConsole(stderr=err)
+    known = width is None or result.is_terminal or os.environ.get("COLUMNS", "").isdecimal()
+    return result if known else SafeConsole(stderr=err, width=width)
 
 
 def text_of(show: Callable[[Any], None], width: int = 110) -> str:

@@ -32,14 +32,7 @@ def parse_rational(value: object) -> Fraction:
     A float is read the way it is written (29.97 becomes 2997/100): the binary value behind it
     would never coincide with any other clock.
 
-    Parameters
-    ----------
-    value : int, float, str or Fraction
-
-    Raises
-    ------
-    ValueError
-        If the value is not a finite number, or one of too many digits.
+    A `ValueError` says so if the value is not a finite number, or one of too many digits.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str | Fraction):
         raise ValueError('must be a number or a text such as "30000/1001"')
@@ -113,14 +106,8 @@ class ScanClock:
     cut at 0.45 period so that scans keep their order, and rounded once; a jittered first scan
     never falls before tick 0.
 
-    Parameters
-    ----------
-    spec : ClockSpec
-    ticks_per_s : int
-    jitter_draw : callable, optional
-        Standard normal draws keyed by the scan numbers given to it.
-    always_draws : bool
-        Draw also where the jitter is 0.
+    `jitter_draw` gives standard normal draws keyed by the scan numbers given to it; with
+    `always_draws` also where the jitter is 0.
     """
 
     def __init__(
@@ -223,12 +210,7 @@ class ScanClock:
 
 
 class ScanCursor:
-    """Which scans of a clock have fallen due between one call and the next.
-
-    Parameters
-    ----------
-    clock : ScanClock
-    """
+    """Which scans of a clock have fallen due between one call and the next."""
 
     def __init__(self, clock: ScanClock) -> None:
         self.clock = clock

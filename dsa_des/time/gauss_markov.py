@@ -120,13 +120,7 @@ class GaussMarkov:
 
 
 def _bridge(length: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return weight of the ends and spread half-way, of an interval and of its half.
-
-    Parameters
-    ----------
-    length : float
-        In correlation times.
-    """
+    """Return weight of the ends and spread half-way, of an interval in correlation times."""
     halves = length / 2.0, length / 4.0
     first, second = ((0.5 / math.cosh(s), math.sqrt(math.tanh(s))) for s in halves)
     return first, second

@@ -90,18 +90,9 @@ def target_keys(names: tuple[str, ...]) -> UInt64Array:
 class Stream:
     """The draws of one block for one purpose; use one purpose for one distribution only.
 
-    Parameters
-    ----------
-    seed : int or sequence of int
-        That of the run, or of each of several runs, which `of_runs` tells apart.
-    block, purpose : str
-
-    Attributes
-    ----------
-    drew_for_all : bool
-        Whether something was drawn for all of several runs, with the seed of the first.
-    shared : bool
-        Whether that is refused: who serves all runs draws for each.
+    Of several runs, each with its own seed, `of_runs` tells the draws apart. `drew_for_all` says
+    whether something was drawn for all of them, with the seed of the first, and `shared` that this
+    is refused: who serves all runs draws for each.
     """
 
     def __init__(self, seed: int | Sequence[int], block: str, purpose: str) -> None:
@@ -218,13 +209,7 @@ def _radius(word: UInt64Array) -> FloatArray:
 
 
 class Streams:
-    """All draws of a run, or of several runs, by block and purpose.
-
-    Parameters
-    ----------
-    seed : int or sequence of int
-        As for `Stream`.
-    """
+    """All draws of a run, or of several runs with a seed each, by block and purpose."""
 
     def __init__(self, seed: int | Sequence[int]) -> None:
         self.seed = seed if isinstance(seed, int) else seed[0]

@@ -19,18 +19,10 @@ _NOTHING = (0, 0, _NONE, _NONE, _NONE)
 
 
 class RunClock:
-    """One block's scans in every run.
+    """One block's scans in every run, each of which has its own `specs`.
 
-    Parameters
-    ----------
-    specs : sequence of ClockSpec
-        One for each run.
-    ticks_per_s : int
-    runs : Runs
-    jitter : callable
-        Given a run's number, returns the draws of its clock's jitter.
-    always_draws : bool
-        Draw also where the jitter is 0.
+    Given a run's number, `jitter` returns the draws of its clock's jitter; with `always_draws` it
+    draws also where that is 0.
     """
 
     def __init__(

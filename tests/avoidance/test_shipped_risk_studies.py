@@ -2,6 +2,8 @@
 
 import dsa_des
 
+TOGETHER = ("figures=[]", "runs_per_chunk=100")
+
 
 def ratios(result, metric, *axes):
     rows = [row for row in result.summary.to_pylist() if row["result"] == metric]
@@ -13,7 +15,7 @@ def test_a_camera_leads_out_of_what_it_sees_early_enough():
     result = dsa_des.study(
         "configs/studies/field_and_range.toml",
         sets=[
-            "replicas=6", "draws.blocks.traffic.encounter={sequence=[32, 1]}", "figures=[]",
+            "replicas=6", "draws.blocks.traffic.encounter={sequence=[32, 1]}", *TOGETHER,
             "axes.blocks.camera.range_km=[0.4, 1.2]", "axes.field_of_view_deg.values=[14, 120]",
             'axes.field_of_view_deg.set."blocks.camera.azimuth_deg"=[[-7, 7], [-60, 60]]',
         ],
@@ -29,7 +31,7 @@ def test_a_camera_leads_out_of_what_it_sees_early_enough():
 
 def test_two_pilots_leave_no_more_than_one_who_looks_out_seldom():
     result = dsa_des.study(
-        "configs/studies/see_and_avoid_risk.toml", sets=["replicas=6", "figures=[]"], workers=1
+        "configs/studies/see_and_avoid_risk.toml", sets=["replicas=12", *TOGETHER], workers=1
     )
     lost = ratios(result, "well_clear_lost_mitigated", "pilots")
     before = set(ratios(result, "well_clear_lost_nominal", "pilots").values())

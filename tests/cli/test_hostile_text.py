@@ -89,9 +89,10 @@ def places() -> list[str]:
 def test_hostile_values_anywhere_in_a_scene(start: int) -> None:
     keys = places()
     assert len(keys) > 150  # the models were found
-    for key in keys[start::8]:
+    for number, key in enumerate(keys[start::8]):
         decent(call("check", SCENE, "--set", f"{key}={json.dumps(SHORT)}"))
-        decent(call("check", SCENE, "--set", f"{key}.{SHORT}=1"))
+        if number % 3 == 0:  # a name in a table of each model
+            decent(call("check", SCENE, "--set", f"{key}.{SHORT}=1"))
 
 
 def scene_of(folder: Path, text: str) -> Path:

@@ -41,7 +41,10 @@ _INSTALL = re.compile(r"^python3 -m venv \S+ && \S+/pip install -e \S+ && (?:\.v
 
 #: What is added to a command so that it takes a second: pattern, and options behind the line.
 SHORTER = (
-    (re.compile(r"^dsa-des study (?!show |report |.*--replicas)"), "--workers 1 --no-figures"),
+    (
+        re.compile(r"^dsa-des study (?!show |report |.*--replicas)"),
+        "--workers 1 --no-figures --set runs_per_chunk=99",
+    ),
     (
         re.compile(r"^dsa-des study (?!show |report |operators|flown_intercepts|.*--replicas)"),
         "--replicas 2",

@@ -41,7 +41,8 @@ def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():
     rates = {"1/10": 0.1, "1/2": 0.5, "5": 5.0}
     result = dsa_des.study(
         page.STUDY, workers=1, sets=[
-            "replicas=40", "figures=[]", 'metrics=[{metric="declaration",m=3,n=5,'
+            "replicas=40", "runs_per_chunk=40", "figures=[]",
+            'metrics=[{metric="declaration",m=3,n=5,'
             'sensors=["radar"],target="head_on"}]',
             'axes={"blocks.radar.budget"=["free","dwell"],'
             '"blocks.radar.scan_rate_hz"=["1/10","1/2",5]}',

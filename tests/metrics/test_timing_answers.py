@@ -44,7 +44,7 @@ class Finished:
 
 
 def lines_of(name: str, *sets: str) -> dict[tuple[str, tuple[object, ...]], object]:
-    study = read_study(READY / name, sets=sets)
+    study = read_study(READY / name, sets=("runs_per_chunk=100", *sets))
     tables = tables_of(study, Finished(study))  # type: ignore[arg-type]
     assert tables.rows.failed == 0
     return {(line.result.name, line.at): line for line in tables.lines}
@@ -199,7 +199,7 @@ def test_a_changed_encounter_file_is_another_study(tmp_path: Path) -> None:
 
 
 def test_pairs_narrow_the_swap_of_fusion_three_times() -> None:
-    study = read_study(READY / "fusion_gate.toml", sets=["replicas=12"])
+    study = read_study(READY / "fusion_gate.toml", sets=["replicas=12", "runs_per_chunk=100"])
     tables = tables_of(study, Finished(study))  # type: ignore[arg-type]
     drawn = {str(figure.metric) for figure in study.figures}
     narrower = {c.result.name: c.difference.narrower for c in tables.compared}

@@ -30,6 +30,7 @@ class ByChance(Sensor):
     """Detects with the same chance at every look."""
 
     Parameters = ByChanceParameters
+    lockstep = True
     measures_range = True
 
     def look(self, cells):

@@ -51,7 +51,7 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     assert recorded == [16] and 0 < whole.failed < 16
     monkeypatch.setattr(chunks, "_MOST_BYTES", 15e3)
     monkeypatch.setattr(chunks, "_FIRST_RUNS", 5)
-    chunks._Size._known.clear()
+    chunks._bytes_of_a_run.clear()
     del recorded[:]
     parts = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert parts.content == whole.content

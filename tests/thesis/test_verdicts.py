@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from components.thesis import cameras, table
+from components.thesis import cameras, systems, table
 from components.thesis.rows import (
     VERDICTS,
     Printed,
@@ -186,6 +186,7 @@ def test_the_page_says_which_predictions_agree(results) -> None:
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_prediction_stays_when_the_printed_number_is_changed(results, monkeypatch, asked) -> None:
     """All printed numbers, but Pd of the large class, which two rows ask where it is; then that."""
+    monkeypatch.setattr(systems, "REPLICAS", 3)  # of which nothing is predicted
     for item, names in PRINTED.items():
         for name, number in list(names.items()):
             if ((item, name) == ("sec-4.1.3", "pd_large")) == asked:
@@ -248,6 +249,7 @@ def test_the_list_of_what_moves_is_whole(results) -> None:
 def test_calibrated_and_configured_numbers_move_with_their_inputs(
     results, monkeypatch, item, inputs
 ) -> None:
+    monkeypatch.setattr(systems, "REPLICAS", 3)
     known = [row for _, row in kinds({item: results[item]}, "calibrated", "configured")]
     if not inputs:
         inputs = tuple({name for row in known for name in row.basis.inputs})

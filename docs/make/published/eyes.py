@@ -109,7 +109,8 @@ def course(speed_kt: float, looking: float, size_ft: float = SIZE_FT) -> dict[st
 def flown(speed_kt: float, looking: float, runs: int = RUNS) -> tuple[float, float, float]:
     """Return the share of runs in which the aircraft is seen in time, with its interval."""
     scene = course(speed_kt, looking)
-    found = dsa_des.study(scene, metrics=["first_detection"], replicas=runs, seed=11, workers=1)
+    found = dsa_des.study(scene, metrics=["first_detection"], replicas=runs, seed=11, workers=1,
+                          runs_per_chunk=200)  # fmt: skip
     (row,) = [r for r in found.summary.to_pylist() if r["result"] == "detected.pilot"]
     return row["value"], row["low"], row["high"]
 
@@ -178,7 +179,7 @@ def flags_of(
     scene = dsa_des.load_scene(SCENE, swaps=swaps, sets=sets)
     metrics: list[Any] = [{"metric": "mitigated"}, "encounter_weight"]
     found = dsa_des.study(
-        scene, metrics=metrics, replicas=count, seed=seed, workers=workers,
+        scene, metrics=metrics, replicas=count, seed=seed, workers=workers, runs_per_chunk=count,
         draws={"blocks.traffic.encounter": {"sequence": [0, 1]}},
     )  # fmt: skip
     runs = found.runs.sort_by("encounter")

@@ -38,6 +38,7 @@ avoidance = { type = "avoidance.turn_away", range_km = 2, turn_deg = 60 }
 STUDY = """\
 scene = "scene.toml"
 replicas = 8
+runs_per_chunk = 8
 metrics = ["encounter_weight", "mitigated"]
 [axes]
 blocks.radar.range_km = [0.3, 5]

@@ -17,6 +17,7 @@ from tests.encounters.scenes.test_closed_loop_risk import SCENE
 STUDY = """\
 scene = "scene.toml"
 replicas = 6
+runs_per_chunk = 6
 metrics = [{ metric = "risk_ratio", horizontal_m = 300, vertical_m = 90 }]
 [draws]
 blocks.traffic.encounter = { sequence = [0, 1] }

@@ -101,7 +101,8 @@ def test_the_quantile_is_that_of_the_runs():
     metric = {"metric": "track_errors_by_range", "ranges_nmi": [here_nmi()], "from_s": 2,
               "step_s": 0.25, "quantile": 0.75}  # fmt: skip
     noisy = scene((crooked.ROLLING,), azimuth_error_deg=1.0)
-    result = dsa_des.study(noisy, metrics=[metric], replicas=24, seed=3, workers=1)
+    result = dsa_des.study(noisy, metrics=[metric], replicas=24, seed=3, workers=1,
+                           runs_per_chunk=24)  # fmt: skip
     name = f"error_across_m.{here_nmi():g}"
     values = np.sort(result.runs.column(name).to_numpy())
     (line,) = [row for row in result.summary.to_pylist() if row["result"] == name]

@@ -63,9 +63,9 @@ def test_all_nmacs_are_flown_and_some_of_the_others_weigh_as_much(few):
 
 
 def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path, few):
-    pairs = few[0].take(np.arange(3))
+    pairs = few[0].take(np.arange(5))
     files = eyes.sets_of_both(tmp_path, pairs)
-    either = [eyes.flags_of(file, 3, 3, 1) for file in files]
+    either = [eyes.flags_of(file, 5, 3, 1) for file in files]
     for name in ("nmac_nominal", "well_clear_lost_nominal", "encounter_weight"):
         assert either[0][name].tolist() == either[1][name].tolist(), name
     own, other = (read_set(file) for file in files)
@@ -76,7 +76,7 @@ def test_either_aircraft_of_an_encounter_may_be_the_one_that_is_steered(tmp_path
 def test_other_assumptions_reach_the_flights(few, monkeypatch):
     # Who never looks out prevents nothing; one who takes half a minute to turn, less than one who
     # turns in half a second; and another block may decide.
-    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:1])
+    pairs = few[0].take(np.flatnonzero(violates(VOLUMES["nmac"], few[0]))[:3])
     changes = {
         "blind": ("blocks.pilot.left_looking=0",),
         "quick": ("wires[4].delay_s=0.5",),
