@@ -296,10 +296,14 @@ class Roster:
         """Which models there are, ascending, 5 written as 0."""
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
+    @property
+    def shared(self) -> bool:
+        """Whether all replicas have the same aircraft."""
+        return len(self.aircraft) == len(self.names)
+
     def craft(self, target: IntArray, replica: IntArray) -> IntArray:
         """Return which of the aircraft some targets of replicas are."""
-        shared = len(self.aircraft) == len(self.names)
-        return target if shared else replica * len(self.names) + target
+        return target if self.shared else replica * len(self.names) + target
 
     def column(self, path: str) -> FloatArray:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""

@@ -23,10 +23,6 @@ POSITION_RADIUS_M = np.array(
     [np.nan, *(_NMI_M * nmi for nmi in (10.0, 4.0, 2.0, 1.0, 0.5, 0.3, 0.1, 0.05)), 30.0, 10.0, 3.0]
 )
 VELOCITY_RADIUS_M_S = np.array([np.nan, 10.0, 3.0, 1.0, 0.3])
-#: Containment radius by navigation integrity category, NIC 1 to 11, m (table 2-70).
-CONTAINMENT_M = np.array(
-    [np.nan, *(_NMI_M * nmi for nmi in (20.0, 8.0, 4.0, 2.0, 1.0, 0.6, 0.2, 0.1)), 75.0, 25.0, 7.5]
-)
 #: Standard deviations of each of two axes in the 95 % radius of both, 2.448.
 RADIUS_IN_DEVIATIONS = math.sqrt(-2.0 * math.log(0.05))
 

@@ -70,7 +70,6 @@ def attitude_from_path(
     *,
     velocity_enu_mps: Vector | None = None,
     wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
-    window_s: float = WINDOW_S,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return yaw, pitch and roll (rad) at each sample of a path (n,) or of several (n, aircraft).
 
@@ -79,10 +78,10 @@ def attitude_from_path(
     and roll are 0.
     """
     if velocity_enu_mps is None:
-        velocity, acceleration = fit_path(time_s, lat_deg, lon_deg, alt_m, window_s=window_s)
+        velocity, acceleration = fit_path(time_s, lat_deg, lon_deg, alt_m)
     else:
         velocity = velocity_enu_mps
-        acceleration = _slope_of_velocity(time_s, lat_deg, lon_deg, velocity, window_s)
+        acceleration = _slope_of_velocity(time_s, lat_deg, lon_deg, velocity)
     v_east, v_north, v_up = velocity
     if wind_east_north_mps != (0.0, 0.0):
         v_east, v_north = v_east - wind_east_north_mps[0], v_north - wind_east_north_mps[1]
@@ -97,7 +96,7 @@ def attitude_from_path(
 
 
 def _slope_of_velocity(
-    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector, window_s: float
+    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector
 ) -> Vector:
     """Fit a straight line to velocities, each turned into the sample's own frame; its slope."""
     east, north, _ = local_axes(lat_deg, lon_deg)
@@ -111,7 +110,7 @@ def _slope_of_velocity(
             v_up[j] - v_up[i],
         )
 
-    return _fit(time_s, change, lat_deg.shape, degree=1, window_s=window_s)[0]
+    return _fit(time_s, change, lat_deg.shape, degree=1)[0]
 
 
 def _fit(
@@ -119,7 +118,7 @@ def _fit(
     difference: Callable[[slice, slice], Vector],
     shape: tuple[int, ...],
     degree: int,
-    window_s: float,
+    window_s: float = WINDOW_S,
 ) -> tuple[Vector, Vector]:
     """Fit a polynomial around each sample; returns first and second derivatives there.
 

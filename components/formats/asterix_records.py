@@ -7,6 +7,7 @@ heights in m, as everywhere here; the time of day is that since the last midnigh
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -156,88 +157,88 @@ def _categories() -> dict[int, Any]:
     return {number: generated.manifest["CATS"][number][-1] for number in FIELDS}
 
 
+_SOURCE = {"010": (("SAC", "=sac"), ("SIC", "=sic"))}
+_POSITION = (("LAT", "=lat_deg"), ("LON", "=lon_deg"))
+#: The items of a record as the library makes them; "=name" stands for a quantity, and an item
+#: whose quantities are not all given is left out.
+_ITEMS: Mapping[int, Mapping[str, Any]] = {
+    SERVICE: _SOURCE | {
+        "000": "=message", "030": "=time_of_day_s", "120": (("HGT", "=alt_m"), *_POSITION),
+    },
+    PLOTS: _SOURCE | {
+        "140": "=time_of_day_s",
+        # A single detection by primary radar.
+        "020": ((("TYP", 1), ("SIM", "=simulated"), ("RDP", 0), ("SPI", 0), ("RAB", 0), None),),
+        "040": (("RHO", "=range_m"), ("THETA", "=azimuth_deg")),
+        "110": (0, ("3DH", "=alt_m")),
+        "120": {"CAL": (("D", 0), 0, ("CAL", "=range_rate_m_s"))},
+    },
+    SYSTEM_TRACKS: _SOURCE | {
+        "070": "=time_of_day_s",
+        "105": _POSITION,
+        "185": (("VX", "=velocity_east_m_s"), ("VY", "=velocity_north_m_s")),
+        "220": "=velocity_up_m_s",
+        "040": "=number",
+        "080": (
+            (("MON", 1), ("SPI", 0), ("MRH", 1), ("SRC", 1), ("CNF", "=tentative"), None),
+            (("SIM", "=simulated"), ("TSE", "=last"), ("TSB", 0), ("FPC", 0), ("AFF", 0),
+             ("STP", 0), ("KOS", 0), None),
+            (("AMA", 0), ("MD4", 0), ("ME", 0), ("MI", 0), ("MD5", 0), None),
+            (("CST", "=coasted"), ("PSR", 0), ("SSR", 0), ("MDS", 0), ("ADS", 0), ("SUC", 0),
+             ("AAC", 0), None),
+        ),
+        "245": (("STI", 1), 0, ("CHR", "=name")),
+        "130": "=alt_m",
+        "500": {
+            "APC": (("X", "=east_error_m"), ("Y", "=north_error_m")),
+            "AGA": "=alt_error_m",
+            "ATV": (("X", "=velocity_east_error_m_s"), ("Y", "=velocity_north_error_m_s")),
+            "ARC": "=velocity_up_error_m_s",
+        },
+    },
+    ADS_B: _SOURCE | {
+        "073": "=time_of_day_s",
+        "040": (
+            (("ATP", 0), ("ARC", 0), ("RC", 0), ("RAB", 0), None),
+            (("DCR", 0), ("GBS", 0), ("SIM", "=simulated"), ("TST", 0), ("SAA", 0), ("CL", 0), 0,
+             None),
+        ),
+        "080": "=number",
+        "131": _POSITION,
+        "140": "=alt_m",
+        "145": "=flight_level_m",
+        "155": (("RE", 0), ("BVR", "=barometric_climb_m_s")),
+        "160": (("RE", 0), ("GS", "=speed_m_s"), ("TA", "=track_deg")),
+        "157": (("RE", 0), ("GVR", "=velocity_up_m_s")),
+        "170": "=name",
+        # Version 2 of the link, Mode S extended squitter (DO-260B).
+        "210": (0, ("VNS", 0), ("VN", 2), ("LTT", 2)),
+    },
+}  # fmt: skip
+
+
 def _items(record: AsterixRecord) -> dict[str, Any]:
-    """Return a record's items as the library makes them; those without a quantity are left out."""
+    """Return a record's items as the library makes them."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
-        name: _raw(record, name, field, values[name])
+        f"={name}": _raw(record, name, field, values[name])
         for name, field in FIELDS[record.category].items()
         if values.get(name) is not None
     }
+    items = {}
+    for item, pattern in _ITEMS[record.category].items():
+        with suppress(KeyError):
+            items[item] = _filled(pattern, raw)
+    return items
 
-    def group(*parts: tuple[str, str]) -> Any:
-        return tuple((part, raw[name]) for part, name in parts) if parts[0][1] in raw else None
 
-    common = {"010": group(("SAC", "sac"), ("SIC", "sic"))}
-    position = (("LAT", "lat_deg"), ("LON", "lon_deg"))
-    if record.category == SERVICE:
-        return common | {
-            "000": raw["message"],
-            "030": raw["time_of_day_s"],
-            "120": group(("HGT", "alt_m"), *position),
-        }
-    if record.category == PLOTS:
-        height = (0, ("3DH", raw["alt_m"])) if "alt_m" in raw else None
-        return common | {
-            "140": raw["time_of_day_s"],
-            # A single detection by primary radar.
-            "020": ((("TYP", 1), ("SIM", raw["simulated"]), ("RDP", 0), ("SPI", 0), ("RAB", 0),
-                     None),),
-            "040": group(("RHO", "range_m"), ("THETA", "azimuth_deg")),
-            "110": height,
-            "120": {"CAL": (("D", 0), 0, ("CAL", raw["range_rate_m_s"]))}
-            if "range_rate_m_s" in raw
-            else None,
-        }  # fmt: skip
-    if record.category == SYSTEM_TRACKS:
-        first = (("MON", 1), ("SPI", 0), ("MRH", 1), ("SRC", 1), ("CNF", raw["tentative"]), None)
-        second = (("SIM", raw["simulated"]), ("TSE", raw["last"]), ("TSB", 0), ("FPC", 0),
-                  ("AFF", 0), ("STP", 0), ("KOS", 0), None)  # fmt: skip
-        third = (("AMA", 0), ("MD4", 0), ("ME", 0), ("MI", 0), ("MD5", 0), None)
-        fourth = (("CST", raw["coasted"]), ("PSR", 0), ("SSR", 0), ("MDS", 0), ("ADS", 0),
-                  ("SUC", 0), ("AAC", 0), None)  # fmt: skip
-        return common | {
-            "070": raw["time_of_day_s"],
-            "105": group(*position),
-            "185": group(("VX", "velocity_east_m_s"), ("VY", "velocity_north_m_s")),
-            "220": raw.get("velocity_up_m_s"),
-            "040": raw["number"],
-            "080": (first, second, third, fourth),
-            "245": (("STI", 1), 0, ("CHR", raw["name"])) if "name" in raw else None,
-            "130": raw["alt_m"],
-            "500": {
-                "APC": (("X", raw["east_error_m"]), ("Y", raw["north_error_m"])),
-                "AGA": raw["alt_error_m"],
-                "ATV": (
-                    ("X", raw["velocity_east_error_m_s"]), ("Y", raw["velocity_north_error_m_s"])
-                ),
-                "ARC": raw["velocity_up_error_m_s"],
-            }
-            if "velocity_up_error_m_s" in raw
-            else None,
-        }  # fmt: skip
-    return common | {
-        "073": raw["time_of_day_s"],
-        "040": (
-            (("ATP", 0), ("ARC", 0), ("RC", 0), ("RAB", 0), None),
-            (("DCR", 0), ("GBS", 0), ("SIM", raw["simulated"]), ("TST", 0), ("SAA", 0), ("CL", 0),
-             0, None),
-        ),
-        "080": raw["number"],
-        "131": group(*position),
-        "140": raw.get("alt_m"),
-        "145": raw.get("flight_level_m"),
-        "155": (("RE", 0), ("BVR", raw["barometric_climb_m_s"]))
-        if "barometric_climb_m_s" in raw
-        else None,
-        "160": (("RE", 0), *group(("GS", "speed_m_s"), ("TA", "track_deg")))
-        if "speed_m_s" in raw
-        else None,
-        "157": (("RE", 0), ("GVR", raw["velocity_up_m_s"])) if "velocity_up_m_s" in raw else None,
-        "170": raw.get("name"),
-        # Version 2 of the link, Mode S extended squitter (DO-260B).
-        "210": (0, ("VNS", 0), ("VN", 2), ("LTT", 2)),
-    }  # fmt: skip
+def _filled(pattern: Any, raw: Mapping[str, Any]) -> Any:
+    """Return a pattern of `_ITEMS` with quantities in it; KeyError where one is not given."""
+    if isinstance(pattern, tuple):
+        return tuple(_filled(part, raw) for part in pattern)
+    if isinstance(pattern, dict):
+        return {name: _filled(part, raw) for name, part in pattern.items()}
+    return raw[pattern] if isinstance(pattern, str) and pattern.startswith("=") else pattern
 
 
 def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:

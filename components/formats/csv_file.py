@@ -23,15 +23,12 @@ from components.formats.text_rows import (
     ALL_TOKENS,
     Problems,
     TrafficFile,
-    TrafficFileError,
     clean_token,
     did_you_mean,
     read_lines,
     shown_columns,
 )
 from dsa_des.arrays.types import FloatArray
-
-__all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
 
 _ALTITUDES = ("alt", "altitude", "geoaltitude", "altgeom", "height", "baroaltitude", "altbaro")
 _CLIMBS = ("vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate")

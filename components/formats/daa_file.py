@@ -24,7 +24,6 @@ from components.formats.text_rows import (
     ALL_TOKENS,
     Problems,
     TrafficFile,
-    TrafficFileError,
     cells,
     clean_token,
     did_you_mean,
@@ -34,8 +33,6 @@ from components.formats.text_rows import (
 )
 from components.geometry import Vector, enu_to_geodetic, local_axes
 from dsa_des.arrays.types import FloatArray
-
-__all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
 
 # Units are what DAIDALUS itself assumes where a file has no row of units.
 COLUMNS = {

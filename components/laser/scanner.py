@@ -84,9 +84,9 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _field_ahead_of_its_edges(self) -> Self:
+    def _edges_not_swapped(self) -> Self:
         low, high = self.azimuth_deg
-        if math.pi < sector_width_rad(math.radians(low), math.radians(high)) and low > high:
+        if low > 0.0 > high and high - low + 360.0 > 180.0:
             raise ValueError(
                 f"azimuth_deg is [{low:g}, {high:g}]: clockwise from the first to the second that "
                 f"is {high - low + 360.0:g} deg wide; allowed: [{high:g}, {low:g}], or "

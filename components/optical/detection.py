@@ -127,30 +127,6 @@ _HOW_MANY, _AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST = range(5)
 _NO_TARGET = np.uint64(0)
 
 
-class FrameFalseAlarms(Effect[Reporting]):
-    """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
-
-    lockstep = True
-    name = "false alarms"
-    acts_on = REPORT
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms`` and ``false_alarms_per_frame``."""
-        p = block.p
-        if not p.enabled:
-            return Verdict(False, "enabled is false")
-        if p.false_alarms is not None:
-            return Verdict.of_flag(p, "false_alarms")
-        if p.false_alarms_per_frame is None:
-            return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")
-        rate = p.false_alarms_per_frame
-        return Verdict(rate > 0, f"false_alarms_per_frame is {rate:g}")
-
-    def build(self, block: Any) -> Reporting:
-        """Return what adds the false alarms to the report."""
-        return AddedFalseAlarms(block)
-
-
 class AddedFalseAlarms:
     """Draws the false alarms of a camera, keyed by its scans.
 
@@ -226,3 +202,24 @@ class AddedFalseAlarms:
             extras={} if marked else {"pixels": signal["pixels"]},
             measured=measured,
         )
+
+
+class FrameFalseAlarms(Effect[Reporting]):
+    """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
+
+    lockstep = True
+    name = "false alarms"
+    acts_on = REPORT
+    builds = AddedFalseAlarms
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms`` and ``false_alarms_per_frame``."""
+        p = block.p
+        if not p.enabled:
+            return Verdict(False, "enabled is false")
+        if p.false_alarms is not None:
+            return Verdict.of_flag(p, "false_alarms")
+        if p.false_alarms_per_frame is None:
+            return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")
+        rate = p.false_alarms_per_frame
+        return Verdict(rate > 0, f"false_alarms_per_frame is {rate:g}")

@@ -23,13 +23,11 @@ from components.optical.picture import (
 )
 from components.optical.sensors import ElectroOptical, ElectroOpticalParameters
 from components.optical.silhouette import union_area
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Column, columns
-from dsa_des.block.wake import Wake
 
 PICTURE = {
     "column_px": Column("pixels", "frame", "measured column, from the left edge of the frame"),
@@ -113,14 +111,9 @@ class _View(NamedTuple):
     attitude: tuple[FloatArray, FloatArray, FloatArray]  # of the ownship
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return how far every target stands above the threshold in a look, in the threshold's unit."""
-    camera: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {"confidence": camera.look(cells).confidence}
-
-    return dict(over_cells(camera, wake, values))
+def _confidence(camera: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return how far each target stands above the threshold, in the threshold's unit."""
+    return {"confidence": camera.look(cells).confidence}
 
 
 _LADDER = Ladder(
@@ -134,7 +127,7 @@ _LADDER = Ladder(
              {"silhouette": "convex_hull"}),
         Rung("image", "rendered, searched, its flow measured", "optical.image"),
     ),
-    "image", (Quantity("confidence", "signature"),), measure, clears=("model",),
+    "image", (Quantity("confidence", "signature"),), measure_cells(_confidence), clears=("model",),
 )  # fmt: skip
 
 

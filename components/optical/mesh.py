@@ -35,20 +35,9 @@ class TriangleMesh:
 
     Closed means that every edge is shared by two triangles (any even number of them, so bodies
     that touch along an edge pass). Several closed bodies that cut into each other, a wing box
-    stuck through a fuselage, are fine: a silhouette is that of their union.
-
-    Parameters
-    ----------
-    vertices_m : (n, 3) array, m
-    faces : (m, 3) integer array
-        Vertex numbers of each triangle; the winding does not matter.
-    rows : int
-        Scan lines across the silhouette of a mesh that is not convex.
-
-    Raises
-    ------
-    ValueError
-        If the mesh is not closed, or the arrays have the wrong shape or bad numbers.
+    stuck through a fuselage, are fine: a silhouette is that of their union. Each of the `faces`
+    (m, 3) holds numbers of `vertices_m` (n, 3), the winding does not matter; `rows` are scan lines
+    across the silhouette of a mesh that is not convex. ValueError if the mesh is not closed.
     """
 
     vertices_m: FloatArray
@@ -86,7 +75,7 @@ class TriangleMesh:
         object.__setattr__(self, "is_convex", bool(one_shell) and _is_convex(vertices, faces))
 
     def projected_area(self, u_x: ArrayLike, u_y: ArrayLike, u_z: ArrayLike) -> Any:
-        """Give the silhouette's area for lines of sight u in body axes.
+        """Return the silhouette's area for lines of sight u (unit vectors) in body axes, m².
 
         A convex mesh: half the sum of |normal · u| times area over its triangles (Cauchy), exact
         to rounding. Any other mesh: the union of the projected triangles, integrated along `rows`
@@ -95,15 +84,6 @@ class TriangleMesh:
         8e-4 (3e-5 on average) for an ellipsoid with box wings. About 6 µs per direction for a
         convex mesh of 1,500 triangles and 3-8 ms for another one: use `tabulate` before
         simulating.
-
-        Parameters
-        ----------
-        u_x, u_y, u_z : array_like
-            Components of the unit vectors, one shape.
-
-        Returns
-        -------
-        array of that shape, m²
         """
         u = np.stack(np.broadcast_arrays(finite("u_x", u_x), u_y, u_z), axis=-1)
         shape = u.shape[:-1]

@@ -30,17 +30,9 @@ WIDEST_RAD = math.radians(170.0)
 class Pinhole:
     """A plane picture: straight lines stay straight, and pixels off the axis see less.
 
-    Parameters
-    ----------
-    width_rad : float
-        Field of view across; its middle is the optical axis.
-    elevation_rad : (low, high)
-        Of the picture's lower and upper edge, at its middle column.
-    columns, rows : int
-    azimuth_rad : float
-        Of the optical axis in the sensor's axes.
-    axis_column : float or None
-        Column of the optical axis; the middle of the frame if None.
+    The field of view is `width_rad` across, and from the lower to the upper `elevation_rad` at its
+    middle column. The optical axis lies at `azimuth_rad` in the sensor's axes and in `axis_column`,
+    by default the middle of the frame.
     """
 
     width_rad: float
@@ -196,17 +188,8 @@ def coverage(corners: FloatArray, rows: int, columns: int) -> FloatArray:
 
     Each edge's part of a row hides what lies to the right of it: the mean, over that part, of the
     share of the pixel right of the edge is that of a clipped line, in closed form (Green's theorem,
-    pixel by pixel).
-
-    Parameters
-    ----------
-    corners : (n, 2) array
-        x to the right and y down, in pixels; any simple polygon, in either sense.
-    rows, columns : int
-
-    Returns
-    -------
-    (rows, columns) array, from 0 to 1
+    pixel by pixel). The corners (n, 2), x to the right and y down in pixels, are those of any
+    simple polygon, in either sense.
     """
     picture: FloatArray = np.zeros((rows, columns))
     corners = np.asarray(finite("corners", corners))

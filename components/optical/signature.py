@@ -233,15 +233,7 @@ class DynamicSignature(Effect[CellValues]):
 
 
 class MovingTargets:
-    """Remembers where each target was at the last scan, and weighs how fast it moves.
-
-    Parameters
-    ----------
-    weight_s : float
-        b of eq. 18, s/rad.
-    model : {"exact", "thesis"}
-    ticks_per_s : int
-    """
+    """Remembers where each target was at the last scan, and weighs how fast it moves (eq. 18)."""
 
     def __init__(self, weight_s: float, model: str, ticks_per_s: int) -> None:
         self.weight_s = weight_s

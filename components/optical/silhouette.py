@@ -40,22 +40,10 @@ def line_of_sight_in_target_axes(
     sin(pitch - elevation) - 2 sin(pitch) cos(elevation) sin²(yaw/2), or with the sum and the
     cosine when the target comes towards us. The sine of the angle off the nose, sqrt(m² + n²), then
     keeps full relative accuracy down to 0. The yaw's own sine and cosine are those of twice its
-    half; of a flight that holds its pitch and roll these are taken once.
-
-    Parameters
-    ----------
-    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : flat arrays of one shape, rad
-
-    Returns
-    -------
-    u_x, u_y, u_z : flat arrays
-        Unit vector components; u_x = 1 when the target flies straight away from us.
-    sin_off_nose : flat array
-        |x_body × u|, the sine of the angle between the long axis and the line of sight.
-
-    Notes
-    -----
-    Replaces the small-angle subtraction of thesis eq. 6 (errata 4 and 9).
+    half; of a flight that holds its pitch and roll these are taken once. Returned are the unit
+    vector's components (u_x = 1 when the target flies straight away from us) and |x_body × u|, the
+    sine of the angle off the nose. Replaces the small-angle subtraction of thesis eq. 6 (errata 4
+    and 9).
     """
     half_yaw = 0.5 * relative_heading_rad
     sin_half, cos_half = np.sin(half_yaw), np.cos(half_yaw)

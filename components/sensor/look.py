@@ -7,7 +7,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.aircraft.aircraft import Roster
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.column_values import of_one_value, picked
 from dsa_des.arrays.entries import cells_of
@@ -212,9 +211,8 @@ class Cells:
     @cached_property
     def craft(self) -> IntArray:
         """Which of the roster's aircraft each cell's target is."""
-        if type(self.roster) is Roster:
-            return self.target
-        return self.roster.craft(self.target, self.run)
+        roster = self.roster
+        return self.target if roster.shared else roster.craft(self.target, self.run)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""

@@ -17,7 +17,7 @@ from components.geometry import FieldOfView
 from components.messages.reach import Reach
 from components.optical.area_of_cells import area_of_cells
 from components.optical.weather_effects import DARKNESS, Night, scene_visibility_m
-from components.sensor.ladder_values import over_cells
+from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.marks import EYES
 from components.sensor.parameters import (
@@ -36,10 +36,8 @@ from components.visual.acquisition import (
     integral_where_shown,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS
 from dsa_des.time.randomness import Stream
 
@@ -149,15 +147,9 @@ class LookoutParameters(SensorParameters):
         return said
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the probability of acquisition since the last scan at every (scan, target)."""
-    observer: Any = block
-
-    def values(cells: Cells) -> dict[str, FloatArray]:
-        return {_PROBABILITY.name: observer.acquisition_probability(cells)}
-
-    result: dict[str, AnyArray] = dict(over_cells(observer, wake, values, out_of_range=0.0))
-    return result
+def _acquisition(observer: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return the probability that each cell's target was acquired since the last scan."""
+    return {_PROBABILITY.name: observer.acquisition_probability(cells)}
 
 
 BETWEEN_SCANS = Ladder(
@@ -170,7 +162,7 @@ BETWEEN_SCANS = Ladder(
     ),
     "integral",
     (_PROBABILITY,),
-    measure,
+    measure_cells(_acquisition, out_of_range=0.0),
 )  # fmt: skip
 
 
