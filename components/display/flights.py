@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from components.display.symbols import by_target, evenly
 from components.geometry import line_of_sight, line_of_sight_ned
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
-
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 MOST_POINTS = 30_000
 """Points of all tracks together."""
@@ -80,7 +78,7 @@ class Flights:
         self.targets = [self._track(target, count) for target in chosen]
 
     @classmethod
-    def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
+    def of(cls, simulation: Simulation, summary: dict[str, Any]) -> "Flights | None":
         """Return the flights of a run, or None if it has no `TrafficSource`."""
         met = {
             name: entry["closest_approach"]

@@ -5,7 +5,7 @@ They take the recorded rows as `components.display.summary` does.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,9 +19,7 @@ from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.record.sinks import Observer
-
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 #: Table of the tracks.
 TABLE = "state_tracks"
@@ -35,7 +33,7 @@ TRUTH = "the truth"
 _MOST_AT_ONCE = 200_000
 
 
-def outcome_observers(simulation: "Simulation") -> list[Observer]:
+def outcome_observers(simulation: Simulation) -> list[Observer]:
     """Return running summaries for the kinds of blocks that a scene has."""
     result: list[Observer] = []
     if names := senders(simulation, StateTracks):
@@ -227,7 +225,7 @@ def _first_result(first: tuple[float, float]) -> dict[str, float | None]:
     return {"time_s": first[0], "range_m": first[1] if math.isfinite(first[1]) else None}
 
 
-def _recorded_targets(simulation: "Simulation") -> Any:
+def _recorded_targets(simulation: Simulation) -> Any:
     """Return what makes `TargetsInFrame` of an origin, where the truth is recorded."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     if not sources or not all(source.says_truth for source in sources):
@@ -242,7 +240,7 @@ def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
 
 
-def _sources(simulation: "Simulation", names: Iterable[str]) -> dict[str, list[str]]:
+def _sources(simulation: Simulation, names: Iterable[str]) -> dict[str, list[str]]:
     """Return which blocks tell each of some blocks of targets; `TRUTH` where only traffic does."""
     traffic = set(senders(simulation, TrafficStates))
     result = {}
@@ -252,7 +250,7 @@ def _sources(simulation: "Simulation", names: Iterable[str]) -> dict[str, list[s
     return result
 
 
-def senders(simulation: "Simulation", message: type) -> list[str]:
+def senders(simulation: Simulation, message: type) -> list[str]:
     """Return the names of all blocks that send a kind of message, sorted."""
     return sorted(
         name

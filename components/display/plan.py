@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -37,9 +37,7 @@ from components.sensor.mounting import SensorAxes
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
-
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
@@ -52,7 +50,7 @@ _LEAST_SPAN_M = 40.0
 
 def draw_plan(
     path: Path,
-    simulation: "Simulation",
+    simulation: Simulation,
     flights: Flights,
     detected: Detected,
     summary: dict[str, Any],

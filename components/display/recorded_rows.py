@@ -4,6 +4,7 @@ Detections are thinned where they are many; of scans each sensor's count, times 
 kept, and single scans of a part of the run.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,15 +21,17 @@ MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
 
 #: Columns that are read as codes and names.
-TEXT = ("block", "target", "sensors")
+TEXT = ("block", "target", "sensors", "track_status")
 _SCANS = ("block", "time_s", "detected")
 _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 
 
-def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
+def each_row_group(
+    path: Path, columns: Sequence[str], most: float = math.inf
+) -> Iterator[dict[str, Any]]:
     """Give columns of each row group that has rows, in order; a table that is not there has none.
 
-    They are arrays, texts a `Text`.
+    They are arrays, texts a `Text`. Of a table of more rows than `most`, groups spread over it.
     """
     if not path.is_file():
         return
@@ -36,7 +39,8 @@ def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any
 
     text = [name for name in columns if name in TEXT]
     with pq.ParquetFile(path, read_dictionary=text) as file:
-        for number in range(file.num_row_groups):
+        step = max(1, math.ceil(file.metadata.num_rows / most))
+        for number in range(0, file.num_row_groups, step):
             table = file.read_row_group(number, columns=list(columns))
             if table.num_rows:
                 yield {name: _array(table[name], name in TEXT) for name in columns}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +11,7 @@ from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.sinks import Observer
 from dsa_des.running.reports import Change, Difference
-
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 
 def share_that_differs(changes: Mapping[str, Any]) -> float:
@@ -36,7 +34,7 @@ class DetectAndSenseReport:
         "detections that differ", "share of detections gained or lost", share_that_differs
     )
 
-    def observers(self, simulation: "Simulation") -> list[Observer]:
+    def observers(self, simulation: Simulation) -> list[Observer]:
         """Return running summaries with the sections ``sensors`` and ``fused``, and of outcomes.
 
         Every block that sends `Detections` is a sensor, ours or not.
@@ -60,7 +58,7 @@ class DetectAndSenseReport:
         missed = changes.get("never_detected")
         return [f"never sees {', '.join(missed)}"] if missed else []
 
-    def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
+    def draw(self, simulation: Simulation, folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw the figures of a run into its folder, the same bytes on every drawing.
 
         ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
@@ -89,7 +87,7 @@ class DetectAndSenseReport:
         return paths
 
 
-def sensor_names(simulation: "Simulation") -> list[str]:
+def sensor_names(simulation: Simulation) -> list[str]:
     """Return the names of all blocks that send `Detections`, sorted."""
     return senders(simulation, Detections)
 

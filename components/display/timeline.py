@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -31,9 +31,7 @@ from components.display.symbols import (
 )
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
-
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]
 
@@ -56,7 +54,7 @@ class CloseUp:
 
 def draw_timeline(
     path: Path,
-    simulation: "Simulation",
+    simulation: Simulation,
     flights: Flights | None,
     detected: Detected,
     folder: Path,

@@ -5,24 +5,23 @@ Tracks are those that were confirmed and have a range.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from components.display.outcomes import NEAR_M, TABLE, distances
+from components.display.recorded_rows import each_row_group
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, HELD
+from components.messages.state_tracks import COVARIANCE, held
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import PALETTE, drawing, figure_text, tight
+from dsa_des.running.simulation import Simulation
 
-if TYPE_CHECKING:
-    from dsa_des.running.simulation import Simulation
-
-#: Okabe and Ito's colours, as in all figures, in turn.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+#: Of trackers and tracks, in turn; black is the truth.
+COLOURS = PALETTE[:-1]
 _FALSE, _TRUTH, _OWN = "#999999", "#000000", "#666666"
 _COLUMNS = (
     "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
@@ -56,7 +55,7 @@ class DrawnTrack:
 class DrawnTracks:
     """Tracks of a table, with the true flights in their frame."""
 
-    def __init__(self, simulation: "Simulation", columns: dict[str, Any]) -> None:
+    def __init__(self, simulation: Simulation, columns: dict[str, Any]) -> None:
         self.origin = tuple(float(columns[name][0]) for name in ORIGIN)
         self.time_s = float(columns["state_s"].min()), float(columns["state_s"].max())
         sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
@@ -71,7 +70,7 @@ class DrawnTracks:
             mine = columns["block"] == block
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
-                one = {name: columns[name][rows] for name in _COLUMNS}
+                one = {name: columns[name][rows] for name in columns}
                 near = distances(one, slice(None), self.targets.at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
@@ -80,29 +79,15 @@ class DrawnTracks:
                 self.tracks.append(DrawnTrack(block, number, one, false, colour))
 
     @classmethod
-    def read(cls, simulation: "Simulation", folder: Path) -> "DrawnTracks | None":
+    def read(cls, simulation: Simulation, folder: Path) -> "DrawnTracks | None":
         """Read the tracks of a run's folder; None where none was confirmed."""
-        source = folder / f"{TABLE}.parquet"
-        columns = _read(source) if source.exists() else None
-        return None if columns is None else cls(simulation, columns)
-
-
-def _read(source: Path) -> dict[str, Any] | None:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-
-    file = pq.ParquetFile(source)
-    groups = file.metadata.num_row_groups
-    step = -(-file.metadata.num_rows // _MOST_ROWS)
-    table = file.read_row_groups(list(range(0, groups, max(step, 1))), columns=list(_COLUMNS))
-    status = table["track_status"]
-    if pa.types.is_dictionary(status.type):
-        status = status.cast(status.type.value_type)
-    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, pa.array(HELD))))
-    if table.num_rows == 0:
-        return None
-    return {name: np.asarray(table[name].to_numpy(zero_copy_only=False)) for name in _COLUMNS}
+        rows = []
+        for group in each_row_group(folder / f"{TABLE}.parquet", _COLUMNS, _MOST_ROWS):
+            kept = np.flatnonzero(held(group["track_status"]) & group["has_range"])
+            group["block"] = np.array(group["block"].names, dtype=object)[group["block"].codes]
+            rows.append({n: group[n][kept] for n in _COLUMNS if n != "track_status"})
+        columns = {n: np.concatenate([part[n] for part in rows]) for n in (rows[0] if rows else ())}
+        return cls(simulation, columns) if rows and len(columns["block"]) else None
 
 
 def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:

@@ -174,7 +174,7 @@ class Fusion(Component):
             values |= {name: every.taken(attrgetter(name), of_rate) for name in _RATES}
             moves = every.taken(velocities, of_rate) if self._with_pose else None
         message = FusedWithPose if self._navigation_errs else FusedDetections
-        return message(
+        fused = message(
             tick=instants.tick,
             run=instants.run,
             offsets=offsets_of(row, len(instants)),
@@ -191,6 +191,8 @@ class Fusion(Component):
             told_by_target=None if told is None else dict(zip(TOLD, told, strict=True)),
             **values,
         )
+        fused.row_of_entries = row
+        return fused
 
 
 def how_late_s(sensor: Producer) -> Fraction:

@@ -244,11 +244,13 @@ class Transform(Component):
         if rows <= step:
             seen = self._seen(own, other, present)
         else:
-            parts = []
+            seen = {}
             for first in range(0, rows, step):
                 block = slice(first, first + step)
-                parts.append(self._seen(_block(own, block), _block(other, block), present[block]))
-            seen = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+                part = self._seen(_block(own, block), _block(other, block), present[block])
+                seen = seen or {n: np.empty(present.shape, v.dtype) for n, v in part.items()}
+                for name, values in part.items():
+                    seen[name][block] = values
         return {
             **seen,
             "target_pitch_rad": other.pitch_rad,

@@ -13,7 +13,7 @@ from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import TRIALS, Group, Metric, recorded_by
+from dsa_des.studies.metric import NUMBER, TRIALS, Group, Metric, Result, recorded_by
 
 FUSED = "fused"
 #: Columns of the sensors' scans that `scan_time_s` needs.
@@ -46,6 +46,11 @@ class TargetMetric(Metric):
         target = getattr(self.p, "target", None)
         if sources and target is not None and target not in names:
             raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")
+
+
+def numbers(meanings: Mapping[str, str]) -> list[Result]:
+    """Return results that are numbers of 0 or more, by name with what they mean."""
+    return [Result(name, NUMBER, meaning, least=0.0) for name, meaning in meanings.items()]
 
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:

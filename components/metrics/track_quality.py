@@ -16,12 +16,13 @@ from components.metrics.rows import (
     TargetParameters,
     chosen,
     name_ranks,
+    numbers,
     of_target,
 )
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, Group, Result, recorded_by
 from dsa_des.time.clock import ClockSpec
 
 
@@ -89,17 +90,10 @@ class AgeOfInformation(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return mean and 95th percentile."""
-        return [
-            Result(
-                "age_of_information_mean_s",
-                NUMBER,
-                "mean age of what the fusion holds, s",
-                least=0.0,
-            ),
-            Result(
-                "age_of_information_p95_s", NUMBER, "age exceeded 5 % of the time, s", least=0.0
-            ),
-        ]
+        return numbers({
+            "age_of_information_mean_s": "mean age of what the fusion holds, s",
+            "age_of_information_p95_s": "age exceeded 5 % of the time, s",
+        })  # fmt: skip
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return mean and percentile of every replica."""
@@ -206,17 +200,13 @@ class TrackUpdates(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return interval, continuity and breaks."""
-        return [
-            Result(
-                "track_update_interval_s",
-                NUMBER,
-                "mean time between updates of a track, s",
-                least=0.0,
-            ),
-            Result("track_update_interval_p95_s", NUMBER, "95th percentile of it, s", least=0.0),
-            Result("track_continuity", FRACTION, "share of a track's time that it is not broken"),
-            Result("track_breaks", NUMBER, "number of breaks", least=0.0),
-        ]
+        said = "share of a track's time that it is not broken"
+        interval, p95, breaks = numbers({
+            "track_update_interval_s": "mean time between updates of a track, s",
+            "track_update_interval_p95_s": "95th percentile of it, s",
+            "track_breaks": "number of breaks",
+        })  # fmt: skip
+        return [interval, p95, Result("track_continuity", FRACTION, said), breaks]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all four of every replica."""
@@ -259,14 +249,10 @@ class PositionError(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return the error of positions (where there is a range) and of directions."""
-        return [
-            Result(
-                "fused_position_error_m", NUMBER, "distance to the true position, rms, m", least=0.0
-            ),
-            Result(
-                "fused_angle_error_deg", NUMBER, "angle to the true direction, rms, deg", least=0.0
-            ),
-        ]
+        return numbers({
+            "fused_position_error_m": "distance to the true position, rms, m",
+            "fused_angle_error_deg": "angle to the true direction, rms, deg",
+        })  # fmt: skip
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return both errors of every replica."""

@@ -167,9 +167,11 @@ class Strength:
         # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
         # noise takes it for signal.
         mean = look.signal["snr"][detected]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][detected]) / mean, 1.0)
-        floor = floor if block.p.clutter_threshold == "noise" else np.ones(len(detected))
+        floor = np.ones(len(detected))
+        if block.p.clutter_threshold == "noise":
+            with np.errstate(divide="ignore", invalid="ignore"):
+                over_noise = 10.0 ** (0.1 * extras["snr_db"][detected]) / mean
+            floor = np.where(mean > 0.0, over_noise, floor)
         snr = np.empty(len(detected))
         for crossing, part in block.crossings_of(cells, detected):
             for model, chosen in block.models_in_use(cells):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import TWO_PI, past, rising_sector, wrap_pi
-from dsa_des.arrays.column_values import nothing_in
+from dsa_des.arrays.column_values import constant, nothing_in
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -79,7 +79,7 @@ class Grid:
             # NaN, and what cannot be counted in steps, take the general way.
             simple = size.size and float(size.max()) < self._countable
             result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
-            np.copysign(result, values, out=result)
+            result = np.copysign(result, values)
         if self._highest is not None:
             result = np.minimum(result, self._highest)
         if self._lowest is not None:
@@ -165,22 +165,6 @@ def _outermost(limit: Any, steps: Any) -> Any:
     return np.where(counts, np.minimum(inside * steps, limit), limit)
 
 
-_SMALLEST = 64
-
-
-def constant_column(value: float, count: int) -> FloatArray:
-    """Return a read-only column that holds one value; others hold it too."""
-    size = _SMALLEST if count <= _SMALLEST else 1 << (count - 1).bit_length()
-    return _whole(value, size)[:count]
-
-
-@lru_cache(maxsize=256)
-def _whole(value: float, size: int) -> FloatArray:
-    column = np.full(size, value)
-    column.flags.writeable = False
-    return column
-
-
 #: Columns of `Detections` that hold variances, by measured quantity.
 VARIANCE_OF = {
     "azimuth": "azimuth_variance_rad2",
@@ -238,7 +222,7 @@ class SensorGrid:
         if "range_rate" in where:
             values["range_rate"] = self._rate_grid.round(where["range_rate"])
         count = len(values["azimuth"])
-        return values, {name: constant_column(v, count) for name, v in self.variances.items()}
+        return values, {name: constant(v, count, np.float64) for name, v in self.variances.items()}
 
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray

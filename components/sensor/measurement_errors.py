@@ -16,11 +16,10 @@ from components.sensor.grid import (
     Grid,
     Measured,
     Values,
-    constant_column,
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import nothing_in
+from dsa_des.arrays.column_values import constant, nothing_in
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -170,11 +169,11 @@ class ErrorModel:
             }
         values = self._valid(where)
         count, columns = len(values["azimuth"]), {}
-        for name, constant in self._variances.items():
+        for name, value in self._variances.items():
             if name in of_signal:
-                variance = constant + of_signal[name]
+                variance = value + of_signal[name]
             else:
-                variance = constant_column(constant, count)
+                variance = constant(value, count, np.float64)
             if name in self._shares:
                 variance = variance + self._shares[name] * values[name] ** 2
             columns[VARIANCE_OF[name]] = variance

@@ -271,10 +271,11 @@ class Sensor(Measuring):
         evaluated, skipped = counted(
             reason, len(targets.roster), culled, targets.hidden is not None
         )
+        row = cells.row[detected]
         if len(wake) == 1:
             offsets = np.array([0, len(detected)], dtype=np.int64)
         else:
-            offsets = offsets_of(cells.row[detected], len(wake))
+            offsets = offsets_of(row, len(wake))
         measured: dict[str, Any] = {}
         p, q, r = (cells.body_azimuth_rad[detected], cells.body_elevation_rad[detected],
                    cells.range_m[detected])  # fmt: skip
@@ -302,6 +303,7 @@ class Sensor(Measuring):
             **believed_pose(targets, rows),
             looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,
         )
+        detections.row_of_entries = row
         for report in self._reporting:
             detections = report(detections, targets, rows)
         if self._cueing is not None:

@@ -11,10 +11,11 @@ from components.optical.camera import Camera
 from components.optical.infrared_area import infrared_area
 from components.optical.signature import detection_range
 from components.optical.silhouette import visible_area
-from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, SKY, panels
+from components.thesis.drawing import GREY, panels
 from components.thesis.rows import Cells, Made, Row, calibrated, configured, predicted
 from components.thesis.scenes import aircraft, areas, eo_camera, ir_camera
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE, SKY
 
 # Not printed; 9.5 km for the ascending Convair follows from it by the thesis's equations
 # (errata 23), and the King Air is taken to climb alike.

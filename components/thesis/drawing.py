@@ -20,10 +20,7 @@ WIDTH_IN, HEIGHT_IN = 6.6, 3.9
 
 #: By kind, as in every other figure.
 RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
-#: For whatever is no kind of sensor.
-BLUE, ORANGE, RED, GREEN, PINK, SKY = (
-    "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#56B4E9",
-)  # fmt: skip
+#: For whatever is no kind of sensor, beside those of `dsa_des.record.drawing`.
 GREY = "#777777"
 
 

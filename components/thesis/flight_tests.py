@@ -11,7 +11,7 @@ from components.aircraft.aspect_tables import dbsm_to_m2
 from components.radar.detection import required_snr
 from components.radar.link_budget import LinkBudget, with_bandwidth
 from components.radar.swerling import SwerlingParameters
-from components.thesis.drawing import BLUE, GREY, ORANGE, legend_below, panels
+from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Basis, Cells, Made, Row, calibrated, configured, predicted
 from components.thesis.scenes import (
@@ -23,6 +23,7 @@ from components.thesis.scenes import (
     scene,
 )
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import BLUE, ORANGE
 
 #: Aircraft file → name and class.
 TABLE_4_1 = {

@@ -8,12 +8,10 @@ import numpy as np
 
 from components.display.symbols import styles_of
 from components.thesis.drawing import (
-    BLUE,
     EO,
     FUSION,
     GREY,
     IR,
-    ORANGE,
     RADAR,
     draw_map,
     legend_below,
@@ -27,6 +25,7 @@ from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Cells, Columns, Made, Row, configured, predicted
 from components.thesis.scenes import radar_parameters, run, scene
 from dsa_des.arrays.types import AnyArray
+from dsa_des.record.drawing import BLUE, ORANGE
 
 
 def _joined(

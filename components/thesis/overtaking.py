@@ -4,14 +4,16 @@ The thesis prints the range at which the EO camera joins, 5.1 km, but neither th
 far to the left and how high it passes.
 """
 
-from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from components.thesis.drawing import BLUE, FUSION, GREEN, GREY, ORANGE, RADAR, legend_below, panels
-from components.thesis.rows import Cells, Columns, Made, Picture, Printed, Row, calibrated
+from components.thesis.drawing import FUSION, GREY, RADAR, legend_below, panels
+from components.thesis.rows import Cells, Made, Picture, Printed, Row, calibrated
 from components.thesis.scenes import areas, run, scene
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 
 #: Aircraft of Table 3.1, by file.
 AIRCRAFT = {"king_air": "King Air", "f_16": "F-16", "boeing_787": "Boeing 787"}
@@ -21,34 +23,25 @@ ABOVE_M = (200, 400, 800)
 _DURATION_S = 260
 
 
-@dataclass(frozen=True)
-class Overtaking:
-    """One overtaking flight and the range within which the EO camera joins."""
+def flown() -> dict[str, Any]:
+    """Run the scene fig_4_14 with every aircraft, to every side and at every height.
 
-    file: str
-    left_m: int
-    above_m: int
-    joins_km: float
-
-
-def flown() -> list[Overtaking]:
-    """Run the scene fig_4_14 with every aircraft, to every side and at every height."""
-    return [
-        Overtaking(file, left, above, _joins_km(file, left, above))
-        for file in AIRCRAFT
-        for above in ABOVE_M
-        for left in LEFT_M
-    ]
+    By column: the range within which the EO camera joins, and the flight.
+    """
+    flights = [(file, left, above) for file, above, left in product(AIRCRAFT, ABOVE_M, LEFT_M)]
+    file, left_m, above_m = map(np.array, zip(*flights, strict=True))
+    joins_km = np.array([_joins_km(*flight) for flight in flights])
+    return {"aircraft": file, "left_m": left_m, "above_m": above_m, "joins_km": joins_km}
 
 
-def spread(flights: list[Overtaking], printed: Printed) -> tuple[list[Row], Picture, Columns]:
-    """Return nearest and farthest range of each aircraft, the figure and its data."""
+def spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
+    """Return nearest and farthest range of each aircraft, and the figure."""
     where = (
         f"Passing {LEFT_M[0]} to {LEFT_M[-1]} m to the left, {ABOVE_M[0]} to {ABOVE_M[-1]} m above."
     )
     rows = []
     for file, name in AIRCRAFT.items():
-        ranges = sorted(one.joins_km for one in flights if one.file == file)
+        ranges = np.sort(flights["joins_km"][flights["aircraft"] == file]).tolist()
         inside = ranges[0] <= printed.value <= ranges[-1]
         side = "within" if inside else "outside"
         says = f"{where} The printed {printed.text} km is {side} this spread."
@@ -61,8 +54,8 @@ def spread(flights: list[Overtaking], printed: Printed) -> tuple[list[Row], Pict
         with panels(path) as (axes,):
             for (file, name), colour in zip(AIRCRAFT.items(), (BLUE, ORANGE, GREEN), strict=True):
                 for above, style in zip(ABOVE_M, ("o:", "s--", "^-"), strict=True):
-                    shown = [f for f in flights if f.file == file and f.above_m == above]
-                    axes.plot([f.left_m for f in shown], [f.joins_km for f in shown], style,
+                    shown = (flights["aircraft"] == file) & (flights["above_m"] == above)
+                    axes.plot(flights["left_m"][shown], flights["joins_km"][shown], style,
                               color=colour, markersize=4, linewidth=1.0,
                               label=f"{name}, {above} m above")  # fmt: skip
             axes.axhline(printed.value, color=GREY, linewidth=1.2,
@@ -72,17 +65,11 @@ def spread(flights: list[Overtaking], printed: Printed) -> tuple[list[Row], Pict
             axes.set(xlim=(0, 3500), ylim=(0, 14))
             legend_below(axes, 3)
 
-    data = {
-        "aircraft": [one.file for one in flights],
-        "left_m": [one.left_m for one in flights],
-        "above_m": [one.above_m for one in flights],
-        "joins_km": [one.joins_km for one in flights],
-    }
     caption = (
         "The range within which the EO camera joins, by aircraft and by the flight, none of which "
         "the thesis prints: what it prints is one line across all of them."
     )
-    return rows, Picture("fig_4_14_flights", caption, draw), data
+    return rows, Picture("fig_4_14_flights", caption, draw)
 
 
 def _joins_km(file: str, left_m: int, above_m: int) -> float:
@@ -115,7 +102,8 @@ def overtaking(printed: Cells) -> Made:
     alone = ~with_eo
     why = "The scene fig_4_14; sensors as in sensors/oasys.toml and sensors/afrl_eo.toml."
     grid = "Rounding to the grid errs by half a step at most."
-    others, flights, flights_data = spread(flown(), printed["joins_km"])
+    flights = flown()
+    others, figure = spread(flights, printed["joins_km"])
     rows = [
         printed["joins_km"].beside(
             "range within which the EO camera joins, in the flight drawn", joins_km, "km",
@@ -183,6 +171,6 @@ def overtaking(printed: Cells) -> Made:
     )
     return Made(
         rows,
-        [Picture("fig_4_14", caption, draw), flights],
-        {"fig_4_14": data, "fig_4_14_flights": flights_data},
+        [Picture("fig_4_14", caption, draw), figure],
+        {"fig_4_14": data, "fig_4_14_flights": flights},
     )

@@ -10,10 +10,11 @@ from components.radar.detection import detection_probability, required_snr
 from components.radar.detection.approximations import detection_table
 from components.radar.link_budget import LinkBudget, detection_range
 from components.radar.swerling import SwerlingParameters
-from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, legend_below, panels
+from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.rows import Cells, Made, Printed, Row, calibrated, predicted
 from components.thesis.scenes import radar_parameters, run, scene
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 
 NAUTICAL_MILE_KM = 1.852
 RCS_DBSM = 10.0 * float(np.log10(5.0))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.optical.silhouette import front_and_back_area, visible_area
-from components.thesis.drawing import BLUE, GREEN, ORANGE, panels
+from components.thesis.drawing import panels
 from components.thesis.rows import Cells, Made, Row, configured, predicted
 from components.thesis.scenes import areas
 from components.thesis.silhouette_comparison import (
@@ -17,6 +17,7 @@ from components.thesis.silhouette_comparison import (
     compare_silhouettes,
     draw_comparison,
 )
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 
 # §3.5.3: "the parameters a and b are set to 1 and 1.5 for the plot and represent the size of the
 # back and front sphere respectively".

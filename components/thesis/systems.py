@@ -12,18 +12,7 @@ from components.geometry import line_of_sight_ned, wrap_by_sines
 from components.messages.state_tracks import full_covariance
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
-from components.thesis.drawing import (
-    BLUE,
-    EO,
-    GREEN,
-    GREY,
-    ORANGE,
-    PINK,
-    RADAR,
-    SKY,
-    legend_below,
-    panels,
-)
+from components.thesis.drawing import EO, GREY, RADAR, legend_below, panels
 from components.thesis.radar import NAUTICAL_MILE_KM, range_of_pd_km
 from components.thesis.rows import Basis, Cells, Columns, Made, Picture, Row, configured, predicted
 from components.thesis.scenes import (
@@ -37,6 +26,7 @@ from components.thesis.scenes import (
     table,
 )
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE, PINK, SKY
 from dsa_des.running.simulation import Simulation
 
 _PLACE = ("own_lat_deg", "own_lon_deg", "own_alt_m")

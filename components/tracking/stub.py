@@ -77,10 +77,10 @@ class TrackerStub(Component):
         counts = counts.take(updated)
         rows = np.repeat(np.arange(len(updated)), counts)
         replica = wake.run.take(updated)
-        before = self._held.of(replica)
+        begins = np.concatenate(([True], replica[1:] != replica[:-1]))
+        before = self._held.of(replica[begins])
         targets, column = _present(before.target, fused.target, len(fused.roster))
         pool, held, new = _pool(before, fused, replica.take(rows))
-        begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
             first_row = begins.nonzero()[0][np.searchsorted(replica[begins], before.replica)]
@@ -99,7 +99,7 @@ class TrackerStub(Component):
         entry = last[ends][row, at]
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
-        self._held = self._held.after(replica, table, wake.first_run)
+        self._held = self._held.after(replica[begins], table, wake.first_run)
         return self._tracks(fused, wake.instants.part(updated), targets, last, pool, first)
 
     def _tracks(
@@ -145,7 +145,7 @@ class TrackerStub(Component):
             updated=entry >= first.take(row),
             **({"own_of_entries": pose} if pose else {}),
         )
-        tracks.instants = instants
+        tracks.instants, tracks.row_of_entries = instants, row
         return tracks
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.thesis.drawing import BLUE, GREY, PINK, RADAR, legend_below, panels
+from components.thesis.drawing import GREY, RADAR, legend_below, panels
 from docs.make.declaration_ranges import (
     HeadOn,
     certain_range_m,
@@ -21,6 +21,7 @@ from docs.make.declaration_ranges import (
 )
 from dsa_des.files.output_file import write_file
 from dsa_des.library.study import StudyResult, study
+from dsa_des.record.drawing import BLUE, PINK
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.study import changed_scene

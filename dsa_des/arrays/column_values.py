@@ -87,6 +87,17 @@ def same_bits(some: AnyArray, others: AnyArray) -> bool:
     return not (some.strides[0] or others.strides[0]) or bool((some == others).all())
 
 
+def repeats(values: AnyArray, one: AnyArray) -> bool:
+    """Return whether all rows hold what `one` (1,) does, NaN and the sign of 0 too."""
+    if values.dtype != one.dtype:
+        return False
+    bits = f"u{one.itemsize}"
+    values, value = values.view(bits), one.view(bits)[0]
+    if values[-1] != value or values[0] != value:
+        return False
+    return not values.strides[0] or bool((values == value).all())
+
+
 def constant(value: Any, rows: int, kind: Any) -> AnyArray:
     """Return a column that holds the same in all rows: one value, seen `rows` times."""
     one = np.array(value, dtype=kind)
@@ -109,8 +120,8 @@ def seen_once(values: AnyArray) -> AnyArray:
     """Return a column that holds the same in all of many rows as `constant`; others as they are."""
     if len(values) < _MANY:
         return values
-    once = constant(values[0], len(values), values.dtype)
-    return once if same_bits(values, once) else values
+    same = repeats(values, values[:1])
+    return constant(values[0], len(values), values.dtype) if same else values
 
 
 def picked(values: AnyArray, rows: IntArray) -> AnyArray:

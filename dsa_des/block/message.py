@@ -178,6 +178,11 @@ class Message(_Found):
             known = self._found_rows = offsets, row_of_entries(offsets)
         return known[1]
 
+    @row_of_entries.setter
+    def row_of_entries(self, row: IntArray) -> None:
+        """Take the rows that `offsets` were made of."""
+        self._found_rows = self.offsets, row  # type: ignore[attr-defined]
+
     def _copy(self) -> Self:
         """Return a message of the same fields; several times faster than `copy.copy`."""
         result = object.__new__(type(self))

@@ -66,11 +66,11 @@ def _of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
     """Return the row of one key and of what is inside it; all rows without a key."""
     if key is None:
         return rows
-    result = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
-    if not result:
+    matches = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
+    if not matches:
         hint = did_you_mean(key, [row[0].strip() for row in rows])
         raise UsageError(f"{name}: has no key {key!r}{hint}")
-    return result
+    return matches
 
 
 def _list(console: Any, names: typing.Sequence[str]) -> None:
@@ -185,12 +185,12 @@ def show_examples(copy: str | None) -> None:
     if copy is not None:
         _copy(named(copy, _OPTION))
         return
-    result = examples()
-    if not result:
+    shipped = examples()
+    if not shipped:
         say("no installed package ships scenes or studies")
-    width = max((len(example.name) for example in result), default=0)
+    width = max((len(example.name) for example in shipped), default=0)
     for kind, heading in _HEADINGS.items():
-        of_kind = [example for example in result if example.kind == kind]
+        of_kind = [example for example in shipped if example.kind == kind]
         if of_kind:
             say(heading)
         for example in of_kind:

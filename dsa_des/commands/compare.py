@@ -75,17 +75,17 @@ class _OfAll:
         scenes = [load_scene(path, sets=self.sets)]
         for block, types in swaps:
             scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
-        result = []
+        metrics = []
         for name in registered(METRICS):
             try:
                 for scene in scenes:
                     MetricSpec(name).build(scene)
             except ValueError:
                 continue
-            result.append(name)
-        if not result:
+            metrics.append(name)
+        if not metrics:
             raise UsageError(f"{path}: no metric can be measured of this scene")
-        return result
+        return metrics
 
 
 def compare_command(
@@ -106,8 +106,8 @@ def compare_command(
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        result = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
-        report_crashes(result, _ANEW)
+        tables = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
+        report_crashes(tables, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results, _first(results))
@@ -124,10 +124,10 @@ def compare_command(
         for file, study in zip(files, studies, strict=True):
             if file.resolve() not in by_path:
                 by_path[file.resolve()] = _tables(file, study, workers, home)
-        result = [by_path[file.resolve()] for file in files]
-        for number, (other, path) in enumerate(zip(result[1:], paths[1:], strict=True), start=2):
-            stem = "scatter" if len(result) == 2 else f"scatter-{number}"
-            _compare(result[0], other, (paths[0], path), results, home / stem)
+        tables = [by_path[file.resolve()] for file in files]
+        for number, (other, path) in enumerate(zip(tables[1:], paths[1:], strict=True), start=2):
+            stem = "scatter" if len(tables) == 2 else f"scatter-{number}"
+            _compare(tables[0], other, (paths[0], path), results, home / stem)
     report_crashes(list(by_path.values()), _ANEW)
 
 

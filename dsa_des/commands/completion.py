@@ -59,10 +59,10 @@ def keys(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     scene = _scene(ctx)
     if scene is None:
         return []
-    result = {"seed", "duration_s"}
+    names = {"seed", "duration_s"}
     for name, block in scene.blocks.items():
-        result |= {f"blocks.{name}.{key}" for key in _keys(block.cls)}
-    return [CompletionItem(f"{key}=") for key in sorted(result) if key.startswith(incomplete)]
+        names |= {f"blocks.{name}.{key}" for key in _keys(block.cls)}
+    return [CompletionItem(f"{key}=") for key in sorted(names) if key.startswith(incomplete)]
 
 
 def swaps(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -94,8 +94,8 @@ def _scene(ctx: click.Context) -> Scene | None:
 
 
 def _shipped(kind: str, incomplete: str) -> list[CompletionItem]:
-    result = _items((one.name for one in shipped() if one.kind == kind), incomplete)
-    return result or [CompletionItem(incomplete, type="file")]
+    items = _items((one.name for one in shipped() if one.kind == kind), incomplete)
+    return items or [CompletionItem(incomplete, type="file")]
 
 
 def _items(names: Iterable[str], incomplete: str) -> list[CompletionItem]:

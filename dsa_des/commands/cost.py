@@ -172,7 +172,7 @@ def _draw_maps(name: str, out: str | None) -> None:
 
 def _map_functions() -> dict[str, str]:
     """Return the map function of each family of block types, ``geometry`` for ``geometry.*``."""
-    result: dict[str, str] = {}
+    functions: dict[str, str] = {}
     for type_name in registered():
         try:
             ladders = find(type_name).ladders
@@ -180,5 +180,5 @@ def _map_functions() -> dict[str, str]:
             continue
         for ladder in ladders:
             if ladder.map_function:
-                result.setdefault(type_name.partition(".")[0], ladder.map_function)
-    return result
+                functions.setdefault(type_name.partition(".")[0], ladder.map_function)
+    return functions

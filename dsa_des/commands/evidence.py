@@ -35,14 +35,14 @@ def evidence_command(
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
     path = chosen_file(case, "case")
-    result = read_case(path, sets, encounters)
+    checked = read_case(path, sets, encounters)
     location = target_of(_HOME, path.stem, out, resume)
     if isinstance(location, Path):
         check_place(location)
         if location.is_dir() and any(location.iterdir()) and not resume:
             raise UsageError(f"--out {location}: is not empty; --resume continues a pack")
     try:
-        inputs = files_of_case(result).copies()
+        inputs = files_of_case(checked).copies()
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
     target = location if isinstance(location, Path) else location()
@@ -58,12 +58,12 @@ def evidence_command(
         raise UsageError(f"--out {target}: cannot be written: {why}") from error
     folders: dict[str, StudyFolder] = {}
     tables: dict[str, Tables] = {}
-    for name, study in result.studies.items():
+    for name, study in checked.studies.items():
         path = target / STUDIES / name
         folders[name] = run_into(study, path, workers, resume, again)
         tables[name] = tables_of(study, folders[name])
         tables[name].write()
-    pack = Pack(result, folders, tables, sets, encounters)
+    pack = Pack(checked, folders, tables, sets, encounters)
     evidence = pack.evidence()
     settled = draw_convergence(pack.findings, tables[ASSESSED].record.confidence)
     changed = draw_sensitivity(pack.changes) if pack.changes else None

@@ -122,8 +122,8 @@ def completing(what: str) -> Callable[[click.Context, click.Parameter, str], lis
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         from dsa_des.commands import completion
 
-        result: list[Any] = getattr(completion, what)(ctx, incomplete)
-        return result
+        items: list[Any] = getattr(completion, what)(ctx, incomplete)
+        return items
 
     return complete
 
@@ -231,9 +231,9 @@ class PluginGroup(click.Group):
             return own
         from dsa_des.block.foreign import installed
 
-        result: Any = installed(registered(COMMANDS)[cmd_name])
-        if not isinstance(result, click.Command):
+        command: Any = installed(registered(COMMANDS)[cmd_name])
+        if not isinstance(command, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"
             )
-        return result
+        return command

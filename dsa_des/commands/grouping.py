@@ -39,19 +39,19 @@ def check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
         return
     length = _SCANS_TO_GROUP / min(rates)
     whole = again(duration=str(min(length, loaded.duration_s or length)))
-    result = []
+    recorded = []
     try:
         with _deadline(_DEADLINE_S):
             for window in (1, None):
                 tables = MemorySink()
                 Simulation(whole, window=window, recorder=Recorder([tables])).run()
                 # As text: a value that is no number is equal to itself.
-                result.append({name: str(t.to_pydict()) for name, t in tables.tables().items()})
+                recorded.append({name: str(t.to_pydict()) for name, t in tables.tables().items()})
     except _NotBack as error:  # in between two blocks
         raise SceneError(
             [loaded.problem(f"blocks.{n}.type", str(error)) for n in strangers]
         ) from None
-    one, many = result
+    one, many = recorded
     differ = [name for name in one if one[name] != many[name]]
     if differ:
         message = "gives other results where scans are worked on one by one and together (table "

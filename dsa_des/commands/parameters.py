@@ -51,10 +51,10 @@ def parameter_rows(
 def _nested(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    result: list[type[BaseModel]] = []
+    models: list[type[BaseModel]] = []
     for argument in typing.get_args(annotation):
-        result += [model for model in _nested(argument) if model not in result]
-    return result
+        models += [model for model in _nested(argument) if model not in models]
+    return models
 
 
 def _type_name(annotation: Any) -> str:
@@ -77,13 +77,13 @@ def _type_name(annotation: Any) -> str:
 
 def _bounds(info: FieldInfo) -> str:
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-    result = [
+    bounds = [
         f"{sign} {getattr(item, attribute):g}"
         for item in info.metadata
         for attribute, sign in signs.items()
         if isinstance(getattr(item, attribute, None), int | float)
     ]
-    return ", ".join(result)
+    return ", ".join(bounds)
 
 
 def _default(info: FieldInfo) -> str:

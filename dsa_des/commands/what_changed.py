@@ -164,13 +164,13 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
         return
     axis, baseline = tables.baseline
     names_of = [shortened(name) for name in tables.rows.axes if name != axis]
-    matches: dict[Any, list[tuple[str, Pair]]] = {}
+    by_value: dict[Any, list[tuple[str, Pair]]] = {}
     for value, others, base, rows in tables.rows.against(axis, baseline):
         where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
         pair = Pair(tables, base, tables, rows)
-        matches.setdefault(value, []).append((", ".join(where), pair))
+        by_value.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")
-    for value, places in matches.items():
+    for value, places in by_value.items():
         names = [short(item) if swap else f"{axis} = {short(item)}" for item in (baseline, value)]
         say_what_changed((names[0], names[1]), places, results)

@@ -43,7 +43,7 @@ def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
 def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
     """Return largest allowed errors by unit from texts such as ``0.5mrad``."""
     units = sorted({q.unit for ladder in ladders for q in ladder.quantities})
-    result: dict[str, float] = {}
+    budgets: dict[str, float] = {}
     for text in texts:
         match = _BUDGET.fullmatch(text)
         try:
@@ -58,8 +58,8 @@ def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, 
         unit = {"m2": "m²", "pd": "Pd"}.get(match[2].lower(), match[2])
         if unit not in units:
             raise UsageError(f"--budget {text}: unknown unit {match[2]}{did_you_mean(unit, units)}")
-        result[unit] = value
-    return result
+        budgets[unit] = value
+    return budgets
 
 
 def allowed_error(
@@ -94,10 +94,10 @@ class Comparison:
 
     def __call__(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
-        result: dict[str, Any] = {}
+        changes: dict[str, Any] = {}
         for report in self._reports:
-            result.update(report.compare(reference, other))
-        return result
+            changes.update(report.compare(reference, other))
+        return changes
 
     def remarks(self, changes: Mapping[str, Any]) -> list[str]:
         """Return remarks on changes that no column shows."""

@@ -32,13 +32,13 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    result: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, Mapping):
-            result.update(_flattened(value, f"{prefix}{name}_"))
+            flat.update(_flattened(value, f"{prefix}{name}_"))
         else:
-            result[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
-    return result
+            flat[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
+    return flat
 
 
 def print_costs(

@@ -174,10 +174,10 @@ Values = tuple[IntArray, dict[str, AnyArray]]
 def values_of(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
     """Read a ladder's quantities from a fresh block over all its wakes."""
     block, other = run.fresh(), reference.fresh()
-    result = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
-    ticks = np.concatenate([ticks for ticks, _ in result])
+    parts = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
+    ticks = np.concatenate([ticks for ticks, _ in parts])
     names = [q.name for q in ladder.quantities]
-    return ticks, {name: np.concatenate([values[name] for _, values in result]) for name in names}
+    return ticks, {name: np.concatenate([values[name] for _, values in parts]) for name in names}
 
 
 def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:

@@ -273,7 +273,7 @@ def written(value: Any) -> str:
 
 def _unknown_results(case: EvidenceCase) -> list[Any]:
     """Return a problem for every result that no study gives."""
-    result = []
+    problems = []
     named = [
         (("requirements", index), one.study, one.result)
         for index, one in enumerate(case.tables.requirements)
@@ -284,18 +284,18 @@ def _unknown_results(case: EvidenceCase) -> list[Any]:
         if study not in case.studies or study == SENSITIVITY:
             known = [name for name in case.studies if name != SENSITIVITY]
             message = f"the case has no such study{did_you_mean(study, known)}"
-            result.append(case.file.problem((*at, "study"), message, study))
+            problems.append(case.file.problem((*at, "study"), message, study))
             continue
         known = [r.name for r in case.results[study].values() if r.summed_up]
         if name not in known:
             message = f"the study gives no such result{did_you_mean(name, known)}"
-            result.append(case.file.problem((*at, "result") if inside else at, message, name))
+            problems.append(case.file.problem((*at, "result") if inside else at, message, name))
         elif inside and len(case.studies[study].cells) != 1:
             message = f"has {len(case.studies[study].cells)} cells; a requirement is held to one"
-            result.append(case.file.problem((*at, "study"), message, study))
+            problems.append(case.file.problem((*at, "study"), message, study))
         elif inside:
-            result += _limit_beyond(case, at, study, name)
-    return result
+            problems += _limit_beyond(case, at, study, name)
+    return problems
 
 
 def _limit_beyond(
@@ -314,14 +314,14 @@ def _limit_beyond(
 
 def _without_source(case: EvidenceCase) -> list[Any]:
     """Return a problem for every block whose scene states a value that no source covers."""
-    result = []
+    problems = []
     sources, scene = case.tables.sources, case.assessed.scene(0)
     for key in flat(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:
             hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
             message = f"the scene has no block {parts[0]!r}{hint}"
-            result.append(case.file.problem(("sources", key), message))
+            problems.append(case.file.problem(("sources", key), message))
     for name, block in scene.blocks.items():
         stated = block.parameters.model_fields_set
         missing = [key for key in sorted(stated) if source_of(sources, name, key) is None]
@@ -329,11 +329,11 @@ def _without_source(case: EvidenceCase) -> list[Any]:
             message = (
                 f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
             )
-            result.append(case.file.problem(("sources", name), message))
+            problems.append(case.file.problem(("sources", name), message))
     if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
         message = "is missing: nobody says where delays and losses of wires come from"
-        result.append(case.file.problem(("sources", WIRES), message))
-    return result
+        problems.append(case.file.problem(("sources", WIRES), message))
+    return problems
 
 
 def wires_with_options(scene: Scene) -> list[dict[str, Any]]:

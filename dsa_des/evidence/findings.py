@@ -83,13 +83,13 @@ class ParameterChange:
 
 def findings_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Finding]:
     """Return what every requirement comes to."""
-    matches = []
+    findings = []
     for one in case.tables.requirements:
         mine = tables[one.study]
         (line,) = [line for line in mine.lines if line.result.name == one.result]
         result = case.results[one.study][one.result]
-        matches.append(Finding(one, line, convergence_of(case, mine, result, one)))
-    return matches
+        findings.append(Finding(one, line, convergence_of(case, mine, result, one)))
+    return findings
 
 
 def convergence_of(
@@ -133,13 +133,13 @@ def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Paramet
     asked = {one.result: one for one in case.tables.requirements if one.study == ASSESSED}
     labels = {label: (key, value) for key, value, label in case.sensitivity}
     stated = _stated(case)
-    result = []
+    changes = []
     for item in mine.compared:
         if item.result.name not in asked or item.value not in labels:
             continue
         key, _ = labels[item.value]
         difference = item.difference.paired
-        result.append(
+        changes.append(
             ParameterChange(
                 key.key, key.unit, stated[key.key], str(item.value).partition(" = ")[2],
                 item.result.name, difference,
@@ -147,10 +147,10 @@ def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Paramet
             )
         )  # fmt: skip
     largest: dict[str, float] = {}
-    for one in result:
+    for one in changes:
         size = 0.0 if math.isnan(one.in_limits) else one.in_limits
         largest[one.key] = max(largest.get(one.key, 0.0), size)
-    return sorted(result, key=lambda one: -largest[one.key])
+    return sorted(changes, key=lambda one: -largest[one.key])
 
 
 def _stated(case: EvidenceCase) -> dict[str, str]:
@@ -200,17 +200,17 @@ def _unknown(one: Finding) -> str:
 def numbers_of(line: Line) -> dict[str, Any]:
     """Return all numbers of a line as the machine-readable evidence holds them."""
     e = line.estimate
-    result: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "result": line.result.name, "meaning": line.result.meaning, "value": e.value, "low": e.low,
         "high": e.high, "count": e.count, "without_value": line.missing, "few": e.few,
     }  # fmt: skip
     if (ratio := line.ratio) is not None:
-        result |= {
+        numbers |= {
             "unresolved": ratio.unresolved, "induced": ratio.induced,
             "encounters": ratio.encounters, "nominal_events": ratio.nominal_events,
             "mitigated_events": ratio.mitigated_events, "induced_events": ratio.induced_events,
             "effective_sample_size": ratio.effective_sample_size, "interval": ratio.method,
         }  # fmt: skip
         if line.other is not None:
-            result["other_interval"] = [line.other.method, *line.other.interval]
-    return result
+            numbers["other_interval"] = [line.other.method, *line.other.interval]
+    return numbers

@@ -55,16 +55,16 @@ class CaseFiles:
 def files_of_case(case: EvidenceCase) -> CaseFiles:
     """Return the files that a case and its studies read."""
     own = Path(os.path.abspath(case.file.path))
-    result = {own, *_paths(case.file.sources.values())}
+    paths = {own, *_paths(case.file.sources.values())}
     for study in case.studies.values():
-        result |= {Path(os.path.abspath(study.path)), *_paths(study.base.sources.values())}
-        result |= set(_paths(read_scene_file(study.path).sources.values()))
-        result |= {Path(os.path.abspath(path)) for path in files_of(study)}
+        paths |= {Path(os.path.abspath(study.path)), *_paths(study.base.sources.values())}
+        paths |= set(_paths(read_scene_file(study.path).sources.values()))
+        paths |= {Path(os.path.abspath(path)) for path in files_of(study)}
     shipped = [Path(os.path.abspath(folder)) for folder in folders()]
     home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
-    mine = [p for p in result if not any(p.is_relative_to(folder) for folder in shipped)]
+    mine = [p for p in paths if not any(p.is_relative_to(folder) for folder in shipped)]
     root = home or Path(os.path.commonpath([path.parent for path in mine]))
-    names = {path: _below(path, [root, *shipped]) for path in sorted(result)}
+    names = {path: _below(path, [root, *shipped]) for path in sorted(paths)}
     return CaseFiles(root, names, names[own])
 
 

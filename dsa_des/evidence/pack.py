@@ -52,8 +52,8 @@ class Pack:
     @property
     def passes(self) -> bool | None:
         """Whether all requirements are met; None where no verdict can be given."""
-        result = {one.verdict for one in self.findings}
-        return None if NOT_KNOWN in result else result == {MET}
+        verdicts = {one.verdict for one in self.findings}
+        return None if NOT_KNOWN in verdicts else verdicts == {MET}
 
     def evidence(self) -> dict[str, Any]:
         """Return all of it as one table of plain values: no path, no time, nothing of this run."""
@@ -99,11 +99,11 @@ class Pack:
 
     def _requirement(self, one: Finding) -> dict[str, Any]:
         asked = one.requirement
-        result = numbers_of(one.line)
+        numbers = numbers_of(one.line)
         return {
             "name": asked.name, "text": asked.text, "source": asked.source,
             "limit": asked.limit, "sense": "most" if asked.most is not None else "least",
-            "unit": asked.unit, "study": asked.study, **result,
+            "unit": asked.unit, "study": asked.study, **numbers,
             "confidence": self.tables[asked.study].record.confidence,
             "moved": one.convergence.moved, "may_move": one.convergence.allowed,
             "converged": one.convergence.holds, "verdict": one.verdict,

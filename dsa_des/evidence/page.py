@@ -89,7 +89,7 @@ def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     by: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         by.setdefault(row["key"].partition(".")[0], []).append(row)
-    result = []
+    blocks = []
     for block, mine in by.items():
         ((usual, _),) = Counter(str(row["source"]) for row in mine).most_common(1)
         cells = [
@@ -97,8 +97,8 @@ def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
              "" if str(row["source"]) == usual else str(row["source"]), row["written_in"])
             for row in mine
         ]  # fmt: skip
-        result.append((block, usual, cells))
-    return result
+        blocks.append((block, usual, cells))
+    return blocks
 
 
 def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
@@ -107,15 +107,15 @@ def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
     rows = [(e["system"]["name"], own)] + [(one["name"], one["results"]) for one in e["beside"]]
     if len(rows) == 1:
         return []
-    result = []
+    cells_of = []
     for name, results in rows:
         known = {r["result"]: r for r in results}
         if not known.keys() & set(names):
             continue
         cells = [f"{_number(known[n]['value'])} ({_interval(known[n])})" if n in known else "-"
                  for n in names]  # fmt: skip
-        result.append((name, *cells))
-    return result
+        cells_of.append((name, *cells))
+    return cells_of
 
 
 def _number(value: Any) -> str:

@@ -14,7 +14,7 @@ from dsa_des.arrays.column_values import (
     is_empty,
     nothing_in,
     of_one_value,
-    same_bits,
+    repeats,
 )
 from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import AnyArray, IntArray
@@ -370,11 +370,9 @@ _LEAST_ROWS = 16
 
 def _joined(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
     """Return the values of all parts in order; where all are the same, as one of them."""
-    first, kind, rows = parts[0][0], parts[0].dtype, sum(map(len, parts))
-    if rows >= _LEAST_ROWS * len(parts) and all(
-        same_bits(part, constant(first, len(part), kind)) for part in parts
-    ):
-        return constant(first, rows if order is None else len(order), kind)
+    first, rows = parts[0][:1], sum(map(len, parts))
+    if rows >= _LEAST_ROWS * len(parts) and all(repeats(part, first) for part in parts):
+        return constant(first[0], rows if order is None else len(order), first.dtype)
     values = np.concatenate(parts) if len(parts) > 1 else parts[0]
     return values if order is None else values.take(order)
 

@@ -9,17 +9,14 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import BLUE, PALETTE, drawing, figure_text, tight
 from dsa_des.results.labels import axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
 
-#: Okabe and Ito's colours and markers, distinct with any kind of colour vision.
-STYLES = (
-    ("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D"), ("#E69F00", "^"), ("#CC79A7", "v"),
-    ("#56B4E9", "P"), ("#000000", "X"),
-)  # fmt: skip
+#: Colours and markers of series, in turn.
+STYLES = tuple(zip(PALETTE, "osD^vPX", strict=True))
 _MOST_LINES = 12
 #: Letters of a title.
 _TITLE = 80
@@ -42,11 +39,11 @@ def _series_along(
     others = [k for k, name in enumerate(axes) if name != axis]
     if by is not None:  # the named axis first, so that its values share a colour
         others.sort(key=lambda k: axes[k] != by)
-    result: dict[str, list[Line]] = {}
+    series: dict[str, list[Line]] = {}
     for line in lines:
         named = ", ".join(value_label(axes[k], line.at[k]) for k in others)
-        result.setdefault(named, []).append(line)
-    return result
+        series.setdefault(named, []).append(line)
+    return series
 
 
 def draw_axis(
@@ -363,11 +360,11 @@ def _bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
-    result = [
+    bounds = [
         np.array(chi_square_bounds(freedom * n, confidence)) / n if n else (math.nan, math.nan)
         for n in (line.estimate.count for line in lines)
     ]
-    low, high = np.array(result).T
+    low, high = np.array(bounds).T
     axes.fill_between(
         x, low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0,
         label=f"{100 * confidence:g} % bounds of χ², {freedom:g} degrees",
@@ -385,7 +382,7 @@ def draw_scatter(
             held = np.concatenate([first[both], second[both]])
             ends = [held.min(), held.max()]
             axes.plot(ends, ends, color="#888888", lw=0.8)
-        axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color="#0072B2",
+        axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color=BLUE,
                   alpha=0.6, markeredgewidth=0)  # fmt: skip
         across, up = (f"{readable(metric)}: {figure_text(name)}" for name in names)
         axes.set(xlabel=across, ylabel=up)

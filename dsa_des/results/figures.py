@@ -116,13 +116,13 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
     if not result.is_number:
         return False
     axis = next((name for name in rows.axes if figure.axis in (None, name)), None)
-    matches: dict[Any, list[FloatArray]] = {}
+    by_value: dict[Any, list[FloatArray]] = {}
     for at, chosen in rows.each_place():
         value = None if axis is None else at[rows.axes.index(axis)]
-        matches.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
+        by_value.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
     series = [
         ("" if axis is None else value_label(axis, value), np.concatenate(values))
-        for value, values in matches.items()
+        for value, values in by_value.items()
     ]
     draw = draw_histogram if figure.kind == "histogram" else draw_cdf
     draw(target, series, metric, title, result.mark)

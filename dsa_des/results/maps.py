@@ -133,12 +133,12 @@ def _axis_values(lines: Sequence[Line], index: int) -> list[Any]:
 def _grids(
     lines: Sequence[Line], across: int, up: int, columns: list[Any], rows: list[Any]
 ) -> dict[str, FloatArray]:
-    result = {part: np.full((len(rows), len(columns)), np.nan) for part in _PARTS}
+    grids = {part: np.full((len(rows), len(columns)), np.nan) for part in _PARTS}
     for line in lines:
         at = rows.index(line.at[up]), columns.index(line.at[across])
         for part in _PARTS:
-            result[part][at] = getattr(line.estimate, part)
-    return result
+            grids[part][at] = getattr(line.estimate, part)
+    return grids
 
 
 def _contours(axes: Any, parts: dict[str, FloatArray], limits: Sequence[float]) -> None:

@@ -124,9 +124,9 @@ RATIO_HEADS = (
 
 def ratio_cells(line: Line) -> list[str]:
     """Return the cells of a ratio, as `RATIO_HEADS` names them."""
-    result = line.ratio
-    assert result is not None
-    by = {r.method: r for r in (result, line.other) if r is not None}
+    ratio = line.ratio
+    assert ratio is not None
+    by = {r.method: r for r in (ratio, line.other) if r is not None}
 
     def interval(method: str) -> str:
         if method not in by or by[method].interval[0] != by[method].interval[0]:
@@ -135,10 +135,10 @@ def ratio_cells(line: Line) -> list[str]:
         return f"{short(low)} to {short(high)}" + (" *" if by[method].few else "")
 
     return [
-        line.result.name, short(result.unresolved), short(result.induced), interval("gamma"),
-        interval("bootstrap"), f"{result.effective_sample_size:.1f} of {result.encounters}",
-        result.reason
-        or f"{result.nominal_events}, {result.mitigated_events}, {result.induced_events}",
+        line.result.name, short(ratio.unresolved), short(ratio.induced), interval("gamma"),
+        interval("bootstrap"), f"{ratio.effective_sample_size:.1f} of {ratio.encounters}",
+        ratio.reason
+        or f"{ratio.nominal_events}, {ratio.mitigated_events}, {ratio.induced_events}",
         str(line.missing) if line.missing else "",
     ]  # fmt: skip
 

@@ -205,12 +205,12 @@ def ratios_by_class(
     ratio: Callable[..., PairedRatio] = paired_ratio
     if len(names) != len(n):
         raise ValueError(f"there are {len(names)} classes for {len(n)} encounters")
-    result = {}
+    ratios = {}
     for name in np.unique(names):
         mine = names == name
         together = None if cluster is None else np.asarray(cluster)[mine]
-        result[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
-    return result
+        ratios[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
+    return ratios
 
 
 def influences(

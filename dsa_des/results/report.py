@@ -169,15 +169,15 @@ def _methods(tables: Tables) -> str:
     known = {EVENT: "shares by Wilson's score", FRACTION: "fractions by Wilson's score",
              NUMBER: f"means by {means}"}  # fmt: skip
     known[RATIO] = "ratios of events by a gamma interval or by drawing units again, as they say"
-    result = [text for kind, text in known.items() if kind in kinds]
+    methods = [text for kind, text in known.items() if kind in kinds]
     if any(line.result.quantile is not None for line in tables.lines):
-        result.append("quantiles by order statistics")
-    return ", ".join(result)
+        methods.append("quantiles by order statistics")
+    return ", ".join(methods)
 
 
 def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
     """Return a table for each requirement, with the values of the last other axis side by side."""
-    result = []
+    pivots = []
     for requirement in tables.record.requirements:
         mine = [one for one in tables.answers if one.requirement == requirement][:_MOST_ROWS]
         if not mine:
@@ -186,7 +186,7 @@ def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
         along = tables.rows.axes[tables.rows.axes.index(requirement.axis)]
         title = f"{axis_label(along)} for {requirement.text()}"
         if not others:
-            result.append((title, ["cheapest"], [[_cheapest(mine[0])]]))
+            pivots.append((title, ["cheapest"], [[_cheapest(mine[0])]]))
             continue
         columns = list(dict.fromkeys(one.at[-1] for one in mine))
         rows: dict[tuple[Any, ...], dict[Any, str]] = {}
@@ -194,11 +194,11 @@ def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
             rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest(one)
         heads = [axis_label(name) for name in others[:-1]]
         heads += [value_label(others[-1], column) for column in columns]
-        result.append((title, heads, [
+        pivots.append((title, heads, [
             [*map(_value, at), *(cells.get(column, "") for column in columns)]
             for at, cells in rows.items()
         ]))  # fmt: skip
-    return result
+    return pivots
 
 
 def _cheapest(answer: Answer) -> str:
@@ -250,14 +250,14 @@ def _effects(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str
 
 def _pictures(folder: StudyFolder) -> list[tuple[str, str, str]]:
     """Return stem, name and content of the folder's figures."""
-    result = []
+    pictures = []
     for path in sorted(folder.path.glob("*.png"))[:_MOST_PICTURES]:
         try:
             content = read_regular(path, _LARGEST_PICTURE)
         except OSError:
             continue  # a link, or gone
-        result.append((path.stem, path.name, base64.b64encode(content).decode()))
-    return result
+        pictures.append((path.stem, path.name, base64.b64encode(content).decode()))
+    return pictures
 
 
 def _hashes(folder: StudyFolder) -> list[tuple[str, str]]:

@@ -89,8 +89,8 @@ def _seal_start(content: bytes) -> int | None:
 
 
 def _digest(content: bytes, index: int, owner: str) -> bytes:
-    result = hashlib.sha256(owner.encode() + b"\0")
-    result.update(memoryview(content)[:index])
-    result.update(_ZEROS)
-    result.update(memoryview(content)[index + _DIGITS :])
-    return result.hexdigest().encode()
+    digest = hashlib.sha256(owner.encode() + b"\0")
+    digest.update(memoryview(content)[:index])
+    digest.update(_ZEROS)
+    digest.update(memoryview(content)[index + _DIGITS :])
+    return digest.hexdigest().encode()

@@ -92,7 +92,7 @@ def compare_axis(
     Rows are paired that share the unit and the values of all other axes. `weight` names the result
     that weighs units in ratios of events.
     """
-    matches = []
+    compared = []
     for value, others, base, chosen in rows.against(axis, baseline):
         for result in results:
             if not result.summed_up or result.quantile is not None:
@@ -105,8 +105,8 @@ def compare_axis(
             ratio = None
             if result.kind == EVENT:
                 ratio = rows.event_ratio(result.name, base, chosen, weight, confidence)
-            matches.append(Compared(others, value, baseline, result, change, ratio))
-    return matches
+            compared.append(Compared(others, value, baseline, result, change, ratio))
+    return compared
 
 
 @dataclass(frozen=True)
@@ -131,13 +131,13 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
     if requirement.axis not in axes:
         return []
     index = list(axes).index(requirement.axis)
-    result: dict[tuple[Any, ...], list[Line]] = {}
+    by_others: dict[tuple[Any, ...], list[Line]] = {}
     for line in lines:
         if line.result.name == requirement.metric:
             others = (*line.at[:index], *line.at[index + 1 :])
-            result.setdefault(others, []).append(line)
+            by_others.setdefault(others, []).append(line)
     sentences = []
-    for at, some in result.items():
+    for at, some in by_others.items():
         dearest_first = some if requirement.cheap_last else some[::-1]
         sure = [
             not line.estimate.few and requirement.met(line.estimate.low, line.estimate.high)
@@ -171,13 +171,13 @@ def one_sided(confidence: float) -> float:
 
 def of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
     """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
-    result = {}
+    numbers = {}
     for name in names:
         number = name.removeprefix(f"{metric}.")
         if number == name:
             continue
         try:
-            result[name] = float(number)
+            numbers[name] = float(number)
         except ValueError:
             continue
-    return dict(sorted(result.items(), key=lambda item: item[1]))
+    return dict(sorted(numbers.items(), key=lambda item: item[1]))

@@ -67,12 +67,12 @@ class Tables:
         table = self.folder.table(SUMMARY)
         if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):
             return {}
-        result = {}
+        expected = {}
         for row in table.to_pylist():
             if isinstance(row["expected"], float):
                 at = tuple(row[name] for name in self.rows.axes)
-                result[str(row["result"]), at] = row["expected"]
-        return result
+                expected[str(row["result"]), at] = row["expected"]
+        return expected
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
         """Return the lines of some results; by default those the study draws or waits for."""
@@ -113,10 +113,12 @@ class Tables:
         )  # fmt: skip
         columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):
-            result = [{r.method: r for r in (line.ratio, line.other) if r is not None}.get(method)
-                     for line in lines]  # fmt: skip
+            of_method = [
+                next((r for r in (line.ratio, line.other) if r and r.method == method), None)
+                for line in lines
+            ]
             columns |= _columns(
-                result,
+                of_method,
                 **{f"{method}_error": "standard_error"},
                 **{f"{method}_low": "interval.0", f"{method}_high": "interval.1"},
             )

@@ -22,9 +22,9 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     path = Path(asked)
     if not str(asked) or "\0" in str(asked) or os.path.lexists(path):
         return path
-    result = find_example(path.as_posix(), kind)
-    if result is not None:
-        return result
+    shipped = find_example(path.as_posix(), kind)
+    if shipped is not None:
+        return shipped
     # A name that no file system takes is refused where it is opened.
     if len(path.parts) == 1 and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
@@ -101,11 +101,11 @@ def examples() -> list[Example]:
 
 def find_example(name: str, kind: Kind | None = None) -> Path | None:
     """Return the file of a shipped scene, study or case; None if there is none of that name."""
-    result = files_named(name)
-    if len(result) > 1:
-        kinds = {path: read[0] for path in result if (read := _kind_and_title(path))}
-        result = [path for path, one in kinds.items() if kind in (None, one)]
-    return result[0] if len(result) == 1 else None
+    paths = files_named(name)
+    if len(paths) > 1:
+        kinds = {path: read[0] for path in paths if (read := _kind_and_title(path))}
+        paths = [path for path, one in kinds.items() if kind in (None, one)]
+    return paths[0] if len(paths) == 1 else None
 
 
 @cache

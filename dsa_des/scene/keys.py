@@ -34,13 +34,13 @@ def flat(
     prefix: str = "",
 ) -> dict[str, Any]:
     """Return dotted key → value of nested tables."""
-    result: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name, value in tables.items():
         if is_value(value):
-            result[f"{prefix}{name}"] = value
+            values[f"{prefix}{name}"] = value
         else:
-            result |= flat(value, is_value, f"{prefix}{name}.")
-    return result
+            values |= flat(value, is_value, f"{prefix}{name}.")
+    return values
 
 
 def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
@@ -144,8 +144,8 @@ def _ends(item: Any) -> list[str]:
 
 
 def _name(item: Any) -> str:
-    result = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
-    return str(result) if isinstance(result, str) else ""
+    name = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
+    return str(name) if isinstance(name, str) else ""
 
 
 def _longest(names: list[str], rest: str) -> str | None:
@@ -158,13 +158,13 @@ def key_in(tables: Any, text: str) -> Key:
 
     What the tables do not hold stays as it was written.
     """
-    result: list[str | int] = []
+    path: list[str | int] = []
     rest = unquoted(text)
     while rest:
         index, part, rest = step(tables, rest)
-        result.append(part if index is None else index)
+        path.append(part if index is None else index)
         inside = index is not None if isinstance(tables, list) else index in tables
         tables = tables[index] if inside else {}
         if not isinstance(tables, dict | list):
             tables = {}
-    return tuple(result)
+    return tuple(path)

@@ -48,7 +48,7 @@ def parse_value(text: str) -> Any:
 
 def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
     """Return the keys and values of all ``--set``, and what is wrong with how they are written."""
-    result: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     problems: list[Problem] = []
     for assignment in assignments:
         parsed = parse_assignment(assignment, "--set")
@@ -61,10 +61,10 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
         except TomlError as error:
             problems.append(Problem(COMMAND_LINE, text, str(error)))
             continue
-        if text in result:
+        if text in values:
             problems.append(Problem(COMMAND_LINE, text, "--set gives it twice", written))
-        result[text] = value
-    return list(result.items()), problems
+        values[text] = value
+    return list(values.items()), problems
 
 
 def read_changes(

@@ -18,14 +18,14 @@ from dsa_des.scene.scene_file import SceneFile
 
 def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
     """Return what every validator of a whole model says of a table that one of them refused."""
-    result = _texts(item.get("ctx", {}).get("error")) or [item["msg"]]
+    texts = _texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
         table = SchemaValidator(_of_fields(model.__pydantic_core_schema__)).validate_python(
             item["input"]
         )
     except Exception:  # a foreign model may raise anything; the errors so far stand
-        return result
-    return list(dict.fromkeys(result + _asked(model, table)))
+        return texts
+    return list(dict.fromkeys(texts + _asked(model, table)))
 
 
 def disagreements_besides(
@@ -51,7 +51,7 @@ def disagreements_besides(
 
 def _asked(model: type[BaseModel], table: Any) -> list[str]:
     """Return what the validators of a whole model say of it."""
-    result: list[str] = []
+    texts: list[str] = []
     names = set(model.model_fields)
     for validator in model.__pydantic_decorators__.model_validators.values():
         if validator.info.mode != "after":
@@ -61,8 +61,8 @@ def _asked(model: type[BaseModel], table: Any) -> list[str]:
         except Exception as error:
             # One that reads refused keys may fail in any way; one that means a key names it.
             if isinstance(error, ValueError):
-                result += [text for text in _texts(error) if names & set(re.findall(r"\w+", text))]
-    return result
+                texts += [text for text in _texts(error) if names & set(re.findall(r"\w+", text))]
+    return texts
 
 
 def _texts(error: Any) -> list[str]:
@@ -160,16 +160,16 @@ def _names_meant(model: Any, item: Any) -> list[str]:
 
 def _one_by_key(problems: list[Problem]) -> list[Problem]:
     """Return problems with one for each key: "must be true or false" "or 'auto'"."""
-    result: dict[tuple[str, str], Problem] = {}
+    by_key: dict[tuple[str, str], Problem] = {}
     rest = []
     for problem in problems:
-        first = result.setdefault((problem.source, problem.key), problem)
+        first = by_key.setdefault((problem.source, problem.key), problem)
         if first is problem:
             rest.append(problem)
         elif first.message.startswith(_MUST) and problem.message.startswith(_MUST):
             more = problem.message.removeprefix(_MUST)
             merged = replace(first, message=f"{first.message} or {more}")
-            rest[rest.index(first)] = result[problem.source, problem.key] = merged
+            rest[rest.index(first)] = by_key[problem.source, problem.key] = merged
         else:
             rest.append(problem)
     return rest
@@ -206,10 +206,10 @@ def _list_length(model: Any, item: Any) -> int:
     elif item["type"] != "missing":
         return 0
     for name in path:
-        result = model.model_fields.get(name) if isinstance(name, str) else None
-        if result is None:
+        field = model.model_fields.get(name) if isinstance(name, str) else None
+        if field is None:
             continue
-        annotation = result.annotation
+        annotation = field.annotation
         if typing.get_origin(annotation) is tuple and name == path[-1]:
             items = typing.get_args(annotation)
             return 0 if items[-1] is Ellipsis else len(items)
@@ -235,10 +235,10 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
     value = _at(scene_file, key)
     path: list[str | int] = list(key)
     for position, part in enumerate(loc):
-        result = (isinstance(value, Mapping) and part in value) or (
+        exists = (isinstance(value, Mapping) and part in value) or (
             isinstance(value, list) and isinstance(part, int) and part < len(value)
         )
-        if result:
+        if exists:
             value = value[part]
         elif position < len(loc) - 1 or not isinstance(value, Mapping) or part in value.values():
             continue  # a tag is a value of the table that it tells apart
@@ -250,9 +250,9 @@ def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
     """Return the names allowed where `loc` points, following nested models as far as they go."""
     names = list(model.model_fields)
     for part in loc[:-1]:
-        result = model.model_fields.get(part) if isinstance(part, str) else None
-        if result is not None:
-            nested = _nested_model(result.annotation)
+        field = model.model_fields.get(part) if isinstance(part, str) else None
+        if field is not None:
+            nested = _nested_model(field.annotation)
             if nested is None:
                 return []
             model, names = nested, list(nested.model_fields)

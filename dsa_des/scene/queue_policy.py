@@ -63,11 +63,11 @@ def find_policy(name: Any) -> type[QueuePolicy]:
         hint, allowed = did_you_mean(str(name), POLICIES), ", ".join(map(repr, POLICIES))
         raise ValueError(f"must be one of {allowed}, or module:Class{hint}")
     try:
-        result = load_named(name, "processors")
+        policy = load_named(name, "processors")
     except NotAllowed:
         return QueuePolicy
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
-    if not (isinstance(result, type) and issubclass(result, QueuePolicy)):
+    if not (isinstance(policy, type) and issubclass(policy, QueuePolicy)):
         raise ValueError(f"{name} is not a dsa_des.scene.queue_policy.QueuePolicy")
-    return result
+    return policy

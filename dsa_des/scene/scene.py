@@ -205,11 +205,11 @@ class Scene:
     @property
     def queues(self) -> dict[str, list[str]]:
         """The blocks that line up at each shared processor, by its name."""
-        result: dict[str, list[str]] = {name: [] for name in sorted(self.processors)}
+        queues: dict[str, list[str]] = {name: [] for name in sorted(self.processors)}
         for name, block in sorted(self.blocks.items()):
             if block.options.processor:
-                result[block.options.processor].append(name)
-        return result
+                queues[block.options.processor].append(name)
+        return queues
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

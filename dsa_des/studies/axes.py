@@ -136,7 +136,7 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
     patterns = pattern if isinstance(pattern, list) else [pattern]
     if not patterns or not all(isinstance(item, str) for item in patterns):
         raise ValueError('files must be a pattern such as "encounters/*.daa", or a list of names')
-    result: list[Path] = []
+    paths: list[Path] = []
     for item in patterns:
         try:
             path = Path(item).expanduser()
@@ -152,18 +152,18 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
                 raise ValueError(f"files: {item!r} is no pattern of file names: {error}") from None
             if not matches:
                 raise ValueError(f"no file matches {base}")
-            result += matches
+            paths += matches
         elif _is(base, Path.is_dir):
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
         elif _is(base, Path.is_file):
-            result.append(base)
+            paths.append(base)
         else:
             raise ValueError(f"there is no file {base}")
-    _refuse_many(len(result), _MOST_FILES)
-    names = Counter(path.name for path in result)
-    labels = tuple(path.name if names[path.name] == 1 else str(path) for path in result)
+    _refuse_many(len(paths), _MOST_FILES)
+    names = Counter(path.name for path in paths)
+    labels = tuple(path.name if names[path.name] == 1 else str(path) for path in paths)
     _refuse_twice(labels)
-    sets = tuple(((key, str(path.resolve())),) for path in result)
+    sets = tuple(((key, str(path.resolve())),) for path in paths)
     return Axis(key, labels, sets, ((),) * len(labels), files=True)
 
 

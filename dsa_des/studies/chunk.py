@@ -213,17 +213,17 @@ def _measured(
     group = Group(
         scene, [replica for replica, _ in runs], [run for _, run in runs], wanted_by(metrics)
     )
-    result: dict[str, AnyArray] = {}
+    values: dict[str, AnyArray] = {}
     for metric in metrics:
         try:
-            result.update(metric.measure(group))
+            values.update(metric.measure(group))
         except BaseException as error:
             if must_pass(error):
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
             return _one_by_one(scene, metrics, runs)
-    return result, {}
+    return values, {}
 
 
 def _one_by_one(

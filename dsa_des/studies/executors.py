@@ -141,13 +141,13 @@ def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
     while (first := worker.pop()) is not None:
         future, piece = first
         try:
-            result = attempts.done(piece, future.result())
+            done = attempts.done(piece, future.result())
         except BrokenProcessPool:
             for other in worker.renew():
                 attempts.give_back(other)
-            result = attempts.lost(piece)
-        if result is not None:
-            yield result
+            done = attempts.lost(piece)
+        if done is not None:
+            yield done
 
 
 @contextmanager
@@ -272,12 +272,12 @@ class Dask:
         for future in running:
             piece = given.pop(future.key)
             try:
-                result = attempts.done(piece, future.result())
+                done = attempts.done(piece, future.result())
             except KilledWorker:
-                result = attempts.lost(piece)
+                done = attempts.lost(piece)
             submit()
-            if result is not None:
-                yield result
+            if done is not None:
+                yield done
             if not given:
                 return
 

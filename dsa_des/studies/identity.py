@@ -80,8 +80,8 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
     if not isinstance(value, str):
         return set()
     try:
-        result = _module_of(value, beside) or _named(value)
-        return set() if result is None else result | _extended_by(result)
+        files = _module_of(value, beside) or _named(value)
+        return set() if files is None else files | _extended_by(files)
     except (OSError, ValueError):  # a text that can be no path
         return set()
 
@@ -115,22 +115,22 @@ def _module_of(text: str, beside: Sequence[Path]) -> set[Path] | None:
 
 def _extended_by(files: set[Path]) -> set[Path]:
     """Return what TOML files among some extend and name themselves."""
-    result: set[Path] = set()
+    extended: set[Path] = set()
     for path in files:
         if path.suffix == ".toml":
             with contextlib.suppress(SceneError):  # its runs say what is wrong with it
                 scene = read_scene_file(path)
-                result |= {Path(os.path.abspath(source)) for source in scene.sources.values()}
-                result |= _files_in(scene.data, ())
-    return result
+                extended |= {Path(os.path.abspath(source)) for source in scene.sources.values()}
+                extended |= _files_in(scene.data, ())
+    return extended
 
 
 def results_of(study: Study) -> list[Result]:
     """Return the results that a study's metrics give."""
     scene = study.scene(0)
-    matches = [result for spec in study.metrics for result in spec.build(scene).results()]
+    results = [result for spec in study.metrics for result in spec.build(scene).results()]
     marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
-    return [_marked(result, scene, marks) for result in matches]
+    return [_marked(result, scene, marks) for result in results]
 
 
 def _marked(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:

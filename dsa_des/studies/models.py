@@ -44,11 +44,11 @@ def explained(study: Study) -> Explained:
         where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
         try:
             scene = scene_of(study.scene(cell), study.replica(0, cell))
-            result = _of_scene(where, scene)
+            record = _of_scene(where, scene)
             text = text or to_toml(scene.resolved())
         except (SceneError, BlockFailure, ValueError):
             continue  # its rows say why
-        scenes.append(_less(result, scenes[0]) if scenes else result)
+        scenes.append(_less(record, scenes[0]) if scenes else record)
     scenes = [one for one in scenes if one.models or one.effects or one.spared]
     return Explained(versions=versions(), scene=text, scenes=scenes)
 

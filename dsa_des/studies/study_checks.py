@@ -240,11 +240,11 @@ def _build_metrics(
 
 def _tables_read(study: Study, scene: Scene) -> set[str]:
     """Return the tables that the metrics read; problems of metrics are reported elsewhere."""
-    result: set[str] = set()
+    tables: set[str] = set()
     for spec in study.metrics:
         with contextlib.suppress(ValueError):
-            result.update(spec.build(scene).tables)
-    return result
+            tables.update(spec.build(scene).tables)
+    return tables
 
 
 def one_per_value(study: Study) -> list[int]:
@@ -258,10 +258,10 @@ def one_per_value(study: Study) -> list[int]:
 
 def _different(scenes: list[Scene]) -> list[Scene]:
     """Return one scene for every set of block types."""
-    result: dict[tuple[Any, ...], Scene] = {}
+    by_types: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:
-        result.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
-    return list(result.values())
+        by_types.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
+    return list(by_types.values())
 
 
 def _types(scene: Scene, other: Scene) -> str:

@@ -245,24 +245,24 @@ class _StudyReader:
     # -- axes and draws --------------------------------------------------------------------
 
     def axes(self, scene: Scene, swaps: Iterable[tuple[str, list[str]]]) -> tuple[Axis, ...]:
-        result: list[Axis] = []
+        axes: list[Axis] = []
         specs = flatten_axes(self.table("axes")) | {f"swap.{b}": types for b, types in swaps}
         for key, spec in specs.items():
             try:
-                result.append(parse_axis(key, spec, scene))
+                axes.append(parse_axis(key, spec, scene))
             except ValueError as error:
                 self.add(("axes", key), str(error))
                 self.unread.append(key.removeprefix("blocks."))
-        return tuple(result)
+        return tuple(axes)
 
     def draws(self) -> tuple[Draw, ...]:
-        result = []
+        draws = []
         for key, spec in flatten_draws(self.table("draws")).items():
             try:
-                result.append(parse_draw(key, spec))
+                draws.append(parse_draw(key, spec))
             except ValueError as error:
                 self.add(("draws", key), str(error))
-        return tuple(result)
+        return tuple(draws)
 
     def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
         """Return the column of the axis that `name` means."""
@@ -326,7 +326,7 @@ class _StudyReader:
             shown = ", ".join(registered(METRICS))
             self.add(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
-        result: list[MetricSpec] = []
+        specs: list[MetricSpec] = []
         for number, item in enumerate(items):
             key: Key = ("metrics", number)
             table = {"metric": item} if isinstance(item, str) else item
@@ -344,8 +344,8 @@ class _StudyReader:
             except ValueError as error:
                 self.add(key, str(error), name)
                 continue
-            result.append(MetricSpec(name, keys, number))
-        return tuple(result)
+            specs.append(MetricSpec(name, keys, number))
+        return tuple(specs)
 
     def stop_when(self, replicas: int) -> StopWhen | None:
         table = self.data.get("stop_when")

@@ -1,7 +1,7 @@
 """Tables of a study file: figures, requirements, draws, and paths seen from anywhere."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,20 @@ _MOST_FREEDOM = 1e6
 _AXES = ("axis", "lines", "x", "y")
 
 
+def _each_table(
+    name: str, items: Any, add: Callable[..., None]
+) -> Iterator[tuple[Key, dict[str, Any]]]:
+    """Give key and content of each table of a list; what else it holds is a problem."""
+    if not isinstance(items, list):
+        add((name,), f"must be a list of tables ([[{name}]])")
+        return
+    for number, item in enumerate(items):
+        if isinstance(item, dict):
+            yield (name, number), item
+        else:
+            add((name, number), f"must be a table ([[{name}]])", item)
+
+
 def read_figures(
     items: Any,
     axes: tuple[Axis, ...],
@@ -99,16 +113,9 @@ def read_figures(
     `column` gives the column of the axis that a name means, or reports that there is none; `add`
     takes the key, the message and the value of a problem.
     """
-    if not isinstance(items, list):
-        add(("figures",), "must be a list of tables ([[figures]])")
-        return ()
     most = {"cell": math.prod(len(axis.labels) for axis in axes), "replica": replicas}
-    result: list[FigureRecord] = []
-    for number, item in enumerate(items):
-        key: Key = ("figures", number)
-        if not isinstance(item, dict):
-            add(key, "must be a table ([[figures]])", item)
-            continue
+    figures: list[FigureRecord] = []
+    for key, item in _each_table("figures", items, add):
         kind = item.get("kind", "axis")
         if not isinstance(kind, str) or kind not in FIGURES:
             add((*key, "kind"), f"there is no such figure{did_you_mean(str(kind), FIGURES)}", kind)
@@ -149,15 +156,15 @@ def read_figures(
         if kind == "polar" and chosen and not chosen[0].numeric:
             add(key, f"a polar figure needs an axis in degrees; {chosen[0].column} is no number")
         # What is wrong with it is reported, and then no study is made.
-        result.append(FigureRecord.model_construct(**figure))
-    return tuple(result)
+        figures.append(FigureRecord.model_construct(**figure))
+    return tuple(figures)
 
 
 def _limits(value: Any) -> list[float]:
     """Return the limits that a figure draws contours of; none where one is no finite number."""
     numbers = [number_of(item) for item in (value if isinstance(value, list) else [value])]
-    result = [number for number in numbers if number is not None]
-    return result if len(result) == len(numbers) else []
+    limits = [number for number in numbers if number is not None]
+    return limits if len(limits) == len(numbers) else []
 
 
 _KEYS = ("metric", "axis", "most", "least", "cheaper")
@@ -173,15 +180,8 @@ def read_requirements(
 
     `column` and `add` are those of `read_figures`.
     """
-    if not isinstance(items, list):
-        add(("requirements",), "must be a list of tables ([[requirements]])")
-        return ()
-    result = []
-    for number, item in enumerate(items):
-        key: Key = ("requirements", number)
-        if not isinstance(item, dict):
-            add(key, "must be a table ([[requirements]])", item)
-            continue
+    requirements = []
+    for key, item in _each_table("requirements", items, add):
         for name in item:
             if name not in _KEYS:
                 add((*key, name), f"unknown key of a requirement{did_you_mean(name, _KEYS)}")
@@ -207,8 +207,8 @@ def read_requirements(
         along = column((*key, "axis"), item["axis"], axes)
         if along is not None and limit is not None:
             below, last = limits[0] == "most", cheaper == "last"
-            result.append(Requirement(str(item["metric"]), along, limit, below, last))
-    return tuple(result)
+            requirements.append(Requirement(str(item["metric"]), along, limit, below, last))
+    return tuple(requirements)
 
 
 def number_of(value: Any) -> float | None:

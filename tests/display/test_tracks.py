@@ -20,11 +20,10 @@ EKF = "blocks.tracker.type='tracking.ekf'"
 
 
 def near(*sets):
-    return dsa_des.load_scene(
-        "first_light",
-        sets=["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
-              "blocks.traffic.intruders.0.north_m=3000", *sets],
-    )  # fmt: skip
+    every = ["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
+             "blocks.traffic.intruders.0.north_m=3000", *sets]  # fmt: skip
+    last = {one.partition("=")[0]: one for one in every}  # --set gives no key twice
+    return dsa_des.load_scene("first_light", sets=[*last.values()])
 
 
 def told(tmp_path, *sets):

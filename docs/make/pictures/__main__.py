@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from components.thesis.drawing import BLUE, GREY, PINK
+from components.thesis.drawing import GREY
 from docs.make.pictures.bound import bound_table
 from docs.make.pictures.flow import flow_table
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing
+from dsa_des.record.drawing import BLUE, PINK, drawing
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

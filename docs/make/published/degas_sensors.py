@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 import dsa_des
-from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, RED, legend_below, panels
+from components.thesis.drawing import GREY, legend_below, panels
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE, RED
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
 #: Of the study as it is shipped.

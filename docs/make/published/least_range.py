@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.thesis.drawing import BLUE, GREEN, GREY, ORANGE, panels
+from components.thesis.drawing import GREY, panels
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.turn_flights import (
     KT_MPS,
@@ -26,6 +26,7 @@ from docs.make.published.turn_flights import (
 )
 from docs.make.published.turn_geometry import least_range_m
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 

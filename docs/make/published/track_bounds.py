@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 import dsa_des
-from components.thesis.drawing import BLUE, GREEN, ORANGE, panels
+from components.thesis.drawing import panels
 from components.well_clear.volume import FOOT_M
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 
 TITLE = "Does an open tracker pass DO-365?"
 ORDER = 2
