@@ -14,6 +14,7 @@ from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
 from components.alerting.received import OwnPoses
+from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
@@ -33,13 +34,10 @@ _OWN_MOTION = ("alt_m", "east_mps", "north_mps", "climb_mps")
 _SOURCES = ("tracks", "fused", "estimates")
 
 
-class DaidalusParameters(ClockedParameters):
+class DaidalusParameters(ConfParameters, ClockedParameters):
     """Parameters of alerting."""
 
     conf: ScenePath = Field(description="Alerters, times and memory: a .conf file of DAIDALUS.")
-    alerter: int = Field(
-        default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
-    )
     hysteresis: bool = Field(default=True, description="Whether levels are remembered at all.")
     fit_s: float = Field(
         default=3.0, gt=0, le=60, description="Positions of so long give a target's flight, s."
@@ -88,14 +86,9 @@ class DaidalusAlerting(Component):
 
     def setup(self) -> None:
         """Read the configuration and find out what is believed."""
-        configuration = read_conf(self.p.conf)
+        configuration, self._alerter = self.p.read()
         if not self.p.hysteresis:
             configuration = without_memory(configuration)
-        if self.p.alerter > len(configuration.alerters):
-            raise ValueError(
-                f"alerter is {self.p.alerter}: it must be at most {len(configuration.alerters)}, "
-                f"the number of alerters of {self.p.conf}"
-            )
         ports = {producer.port for producer in self.context.producers}
         wired = [port for port in _SOURCES if port in ports]
         if len(wired) > 1:
@@ -104,7 +97,6 @@ class DaidalusAlerting(Component):
             )
         self._source = wired[0] if wired else ""
         self._configuration: Configuration = configuration
-        self._alerter = configuration.alerters[self.p.alerter - 1]
         self._roster: Any = None
         self._own = OwnPoses(self.context.ticks_per_s)
         # Over which time the ownship's velocity is taken; at least its last two poses count.

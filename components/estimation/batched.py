@@ -6,6 +6,7 @@ computed with it; sums run over components in a fixed order.
 """
 
 from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 
@@ -39,6 +40,22 @@ def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
 def selected(values: FloatArray, which: IntArray) -> FloatArray:
     """Return some tracks' values (…, n), contiguous in memory as indexing would not leave them."""
     return values.take(which, axis=-1)
+
+
+class Batch:
+    """Records of arrays over many tracks, on their last axis; parts may be None, or lists."""
+
+    def take(self, which: IntArray | slice) -> Self:
+        """Return those of some tracks."""
+        return type(self)(*(_some(part, which) for part in vars(self).values()))
+
+
+def _some(part: Any, which: IntArray | slice) -> Any:
+    if isinstance(part, np.ndarray):
+        return part[..., which] if isinstance(which, slice) else part.take(which, axis=-1)
+    if isinstance(part, list):
+        return [_some(one, which) for one in part]
+    return None if part is None else part.take(which)
 
 
 def is_everything(which: IntArray, count: int) -> bool:

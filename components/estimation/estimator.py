@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 
 from components.estimation.batched import (
+    Batch,
     cholesky,
     distance_squared,
     is_everything,
@@ -73,7 +74,7 @@ class Estimates(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class PairMeasurement:
+class PairMeasurement(Batch):
     """What each model says of pairs of a track and a detection."""
 
     innovations: list[Innovation]  # Of the pairs, for every model
@@ -85,18 +86,10 @@ class PairMeasurement:
     learning: list[Innovation] | None = None
     log_odds: FloatArray | None = None  # (models, pairs) or None: The likelihoods by these
 
-    def take(self, which: IntArray) -> "PairMeasurement":
+    def take(self, which: IntArray | slice) -> Self:
         """Return some of the pairs."""
-        if len(which) == len(self.distance):
-            return self
-        return PairMeasurement(
-            [one.take(which) for one in self.innovations],
-            [selected(apart, which) for apart in self.residuals],
-            self.distance[which],
-            selected(self.log_likelihoods, which),
-            self.learning and [one.take(which) for one in self.learning],
-            None if self.log_odds is None else selected(self.log_odds, which),
-        )
+        whole = not isinstance(which, slice) and len(which) == len(self.distance)
+        return self if whole else super().take(which)
 
 
 class Estimator(Protocol):

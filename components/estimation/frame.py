@@ -9,13 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, times
+from components.estimation.batched import Batch, product, product_transposed, times
 from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray
+
+#: Three rows (n,), such as those of an array (3, n).
+Three = FloatArray | tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
-class SensorPose:
+class SensorPose(Batch):
     """Where sensors are and how they are turned, in frames."""
 
     position_m: FloatArray  # (3, n), of the sensor in the frame
@@ -24,26 +27,19 @@ class SensorPose:
     # (3, n) or None: Of the sensor in the frame; needed where range rates are measured
     velocity_m_s: FloatArray | None = None
 
-    def take(self, which: IntArray) -> "SensorPose":
-        """Return some of the places."""
-        moves = self.velocity_m_s
-        return SensorPose(
-            self.position_m.take(which, axis=-1), self.to_body.take(which, axis=-1),
-            None if moves is None else moves.take(which, axis=-1),
-        )  # fmt: skip
-
 
 def pose_in_frame(
-    origin_deg_m: tuple[FloatArray, FloatArray, FloatArray],
-    position_deg_m: tuple[FloatArray, FloatArray, FloatArray],
-    attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
+    origin_deg_m: Three,
+    position_deg_m: Three,
+    attitude_rad: Three,
     velocity_m_s: FloatArray | None = None,
 ) -> SensorPose:
     """Return where poses are in frames."""
     lat, lon, alt = position_deg_m
+    from_lat, from_lon, from_alt = origin_deg_m
     # np.array joins a few short arrays in a fifth of the time that np.stack takes.
-    north, east, up = north_east_up(*origin_deg_m, lat, lon, alt)
-    there, here = ned_axes(lat, lon), ned_axes(origin_deg_m[0], origin_deg_m[1])
+    north, east, up = north_east_up(from_lat, from_lon, from_alt, lat, lon, alt)
+    there, here = ned_axes(lat, lon), ned_axes(from_lat, from_lon)
     turned = np.empty((3, 3, np.size(lat)))
     for j in range(3):
         # Axis j of the frame, along the axes of the aircraft's own horizon.

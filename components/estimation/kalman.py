@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import (
+    Batch,
     cholesky,
     is_everything,
     log_determinant,
@@ -26,7 +27,7 @@ _TOGETHER = 2048
 
 
 @dataclass(frozen=True, eq=False)
-class Innovation:
+class Innovation(Batch):
     """The predicted measurement, the covariance of the residual, and how states relate to it."""
 
     expected: FloatArray  # (m, n)
@@ -39,17 +40,6 @@ class Innovation:
     spread: FloatArray
     # (m, k, n) or None: Of those errors, the covariance with the state's first k; `cross` has it
     shared: FloatArray | None = None
-
-    def take(self, which: IntArray | slice) -> "Innovation":
-        """Return those of some tracks."""
-
-        def one(values: FloatArray) -> FloatArray:
-            return values[..., which] if isinstance(which, slice) else selected(values, which)
-
-        return Innovation(
-            one(self.expected), one(self.root), one(self.cross), one(self.jacobian),
-            one(self.spread), None if self.shared is None else one(self.shared),
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -260,10 +260,8 @@ class StoneSoupTracker(Component):
             return None
         if self._origin is None:
             self._origin = scans.pose[:3, 0].copy()
-        lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
-        pose = scans.pose
-        poses = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
-                                (pose[3], pose[4], pose[5]))  # fmt: skip
+        origin = np.repeat(self._origin[:, np.newaxis], len(scans), axis=1)
+        poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:])
         followed: list[tuple[int, int, Followed]] = []
         rows: list[int] = []
         for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):

@@ -70,10 +70,9 @@ def _apart(
 ) -> tuple[FloatArray, FloatArray]:
     """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
     measured_s = fused.measured_tick[entry] / wake.ticks_per_s
-    lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
-    origin: Any = tuple(getattr(tracks, name)[mine] for name in ORIGIN)
-    turned: Any = tuple(attitude)
-    pose = pose_in_frame(origin, (lat, lon, alt), turned)
+    own = np.stack([fused.pose_columns()[name][entry] for name in POSE])
+    origin = np.stack([getattr(tracks, name)[mine] for name in ORIGIN])
+    pose = pose_in_frame(origin, own[:3], own[3:])
     true = np.stack(
         [fused.true_azimuth_rad[entry], fused.true_elevation_rad[entry], fused.true_range_m[entry]]
     )

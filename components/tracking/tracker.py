@@ -34,7 +34,7 @@ from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
 from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_after
 from dsa_des.arrays.keyed_table import KeyedTable, turns
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
@@ -187,7 +187,7 @@ class Tracker(Component):
         self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(records.origin, of)
-        poses = pose_in_frame(tuple(origin), *_pose(scans.pose), moves)
+        poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
         codes = scans.kinds(self.rules.rates_of, self.rules.carried is not None)
         turned = scans.in_frame(origin)
         reported: list[TrackStore] = []
@@ -260,7 +260,3 @@ class Tracker(Component):
         """Return whose looks came too late, and how many had to wait for their own instant."""
         late = {self.name: self._count.late()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}
-
-
-def _pose(pose: FloatArray) -> tuple[Any, Any]:
-    return tuple(pose[:3]), tuple(pose[3:])
