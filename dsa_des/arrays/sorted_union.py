@@ -20,10 +20,10 @@ def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
     Parameters
     ----------
     arrays : sequence of ndarray, shape (n,)
-        At least one; whole numbers or doubles, no NaN.
+        At least one, in any order; whole numbers or doubles, no NaN.
     """
     joined: Any = np.concatenate(arrays)
-    order = np.arange(len(joined)) if len(arrays) == 1 else joined.argsort(kind="stable")
+    order = joined.argsort(kind="stable")
     values: _Array = joined.take(order)
     if len(values) == 0:
         return values, [order for _ in arrays]
