@@ -46,9 +46,10 @@ CASES = {
         range_m=5e3 * np.abs(a),
         visibility_m=2e4,
     ),
-    "grid": lambda a, b, c, d: Grid(6.25e-4, limit_low=-1.9, limit_high=1.9).round(a),
+    "grid": lambda a, b, c, d: GRID.round(np.atleast_1d(a)).reshape(np.shape(a)),
 }
 TABLE = table()
+GRID = Grid(6.25e-4, limit_low=-1.9, limit_high=1.9)
 
 
 @pytest.fixture(scope="module")
