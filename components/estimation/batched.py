@@ -15,11 +15,13 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 def product(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left · right for matrices (a, k, n) and (k, b, n)."""
-    total = left[:, 0, np.newaxis] * right[np.newaxis, 0]
-    if left.shape[1] > 1:
+    terms = zip(left.swapaxes(0, 1)[:, :, np.newaxis], right[:, np.newaxis], strict=True)
+    column, row = next(terms)
+    total = column * row
+    if len(right) > 1:
         term = np.empty_like(total)  # one for all terms: memory is the cost here
-        for k in range(1, left.shape[1]):
-            np.multiply(left[:, k, np.newaxis], right[np.newaxis, k], out=term)
+        for column, row in terms:
+            np.multiply(column, row, out=term)
             total += term
     return total
 
@@ -60,7 +62,9 @@ def _some(part: Any, which: IntArray | slice) -> Any:
 
 def is_everything(which: IntArray, count: int) -> bool:
     """Return whether an index array takes all of `count` in their order: nothing need be copied."""
-    return len(which) == count and bool((which == np.arange(count)).all())
+    if len(which) != count or (count and (which[0] != 0 or which[-1] != count - 1)):
+        return False
+    return count < 3 or bool((which == np.arange(count)).all())
 
 
 def symmetric(matrix: FloatArray) -> FloatArray:

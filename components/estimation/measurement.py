@@ -133,8 +133,7 @@ def direction(
 def residual(measured: FloatArray, expected: FloatArray) -> FloatArray:
     """Return measured less expected, azimuth and elevation wrapped into (-pi, pi]."""
     apart = measured - expected
-    apart[0] = wrap_pi_unchecked(np.ascontiguousarray(apart[0]))
-    apart[1] = wrap_pi_unchecked(np.ascontiguousarray(apart[1]))
+    apart[:2] = wrap_pi_unchecked(np.ascontiguousarray(apart[:2]))
     return apart
 
 

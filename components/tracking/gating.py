@@ -258,6 +258,8 @@ def common_errors(
     if rules.lasting is None:
         return None
     source = scans.source[rows].take(cells, axis=1)
+    if not rules.lasting.lasts[source].any():
+        return None
     there = np.maximum(source, 0)
     when = part.seen_tick[there, track]
     apart_s = np.abs(part.tick.take(track) - when) / rules.ticks_per_s

@@ -45,24 +45,30 @@ def judged(
     score: FloatArray,
 ) -> IntArray:
     """Return the status of tracks after a look: confirmed, coasted, deleted, or as it was."""
-    p = rules.p
-    if p.initiation == "m_of_n":
-        window = np.minimum(looks, p.confirm_n)
-        hits = bits_set(history & ((np.int64(1) << np.int64(p.confirm_n)) - 1))
-        confirm = hits >= p.confirm_m
-        # What cannot come to m hits any more within its first n looks is dropped.
-        hopeless = hits + (p.confirm_n - window) < p.confirm_m
-    else:
-        gained = score - rules.start_score
-        low = np.log(p.missed_confirmation / (1.0 - p.false_confirmation))
-        confirm = gained >= np.log((1.0 - p.missed_confirmation) / p.false_confirmation)
-        hopeless = gained <= low
-    tentative = status == TENTATIVE
-    new = np.where(tentative & confirm, CONFIRMED, status)
-    new = np.where(tentative & ~confirm & hopeless, DELETED, new)
+    tentative, new = status == TENTATIVE, status
+    if tentative.any():
+        confirm, hopeless = _confirmed(rules, history, looks, score)
+        new = np.where(tentative & confirm, CONFIRMED, status)
+        new = np.where(tentative & ~confirm & hopeless, DELETED, new)
     held = (new == CONFIRMED) | (new == COASTED)
     new = np.where(held, np.where(misses > 0, COASTED, CONFIRMED), new)
-    return np.where(held & (misses >= p.delete_misses), DELETED, new)
+    return np.where(held & (misses >= rules.p.delete_misses), DELETED, new)
+
+
+def _confirmed(
+    rules: TrackerRules, history: IntArray, looks: IntArray, score: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Return which tentative tracks are confirmed, and which can no longer be."""
+    p = rules.p
+    if p.initiation == "m_of_n":
+        hits = bits_set(history & (1 << p.confirm_n) - 1)
+        # What cannot come to m hits any more within its first n looks is dropped.
+        left = p.confirm_n - np.minimum(looks, p.confirm_n)
+        return hits >= p.confirm_m, hits + left < p.confirm_m
+    gained = score - rules.start_score
+    low = np.log(p.missed_confirmation / (1.0 - p.false_confirmation))
+    high = np.log((1.0 - p.missed_confirmation) / p.false_confirmation)
+    return gained >= high, gained <= low
 
 
 def seeing(misdetections: IntArray) -> BoolArray:
@@ -88,8 +94,7 @@ def after_hits_and_misses(
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return history, looks and misses after a look that hit or missed some of the tracks."""
     counted = hit | missed
-    mask = (np.int64(1) << np.int64(LONGEST_WINDOW)) - 1
-    moved = np.where(counted, (history << 1 & mask) | hit, history)
+    moved = np.where(counted, (history << 1 & (1 << LONGEST_WINDOW) - 1) | hit, history)
     return moved, looks + counted, np.where(hit, 0, misses + missed)
 
 
@@ -158,10 +163,9 @@ def initiated(
             Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
         ),
     )
-    if rules.lasting is not None:
-        born = born.with_columns(**now_seen(born, pose, mask))
     status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
-    return born.with_columns(status=status), next_number + counts
+    born = born.with_columns(status=status, **now_seen(rules, born, pose, mask))
+    return born, next_number + counts
 
 
 def expected_looks(
@@ -223,15 +227,14 @@ def managed(
     )
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = judged(rules, part.status, history, count, misses, score)
-    if rules.lasting is not None:
-        changed = changed.with_columns(**now_seen(changed, pose, by))
-    changed = changed.with_columns(
-        history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
-        updated_tick=np.where(hit, changed.tick, changed.updated_tick),
-    )  # fmt: skip
+    updated_tick = np.where(hit, changed.tick, changed.updated_tick)
     ended = changed.ranged & (position_variance(changed) > rules.p.delete_above_m**2)
-    ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
-    return changed.with_columns(status=np.where(ended, DELETED, status))
+    ended |= changed.tick - updated_tick > rules.delete_after_ticks
+    return changed.with_columns(
+        history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
+        updated_tick=updated_tick, status=np.where(ended, DELETED, status),
+        **now_seen(rules, changed, pose, by),
+    )  # fmt: skip
 
 
 def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
@@ -264,8 +267,15 @@ def position_variance(part: TrackStore) -> FloatArray:
     return total
 
 
-def now_seen(part: TrackStore, pose: SensorPose, mask: IntArray) -> dict[str, Any]:
-    """Return the columns of where tracks were last seen after the sensors of a mask saw them."""
+def now_seen(
+    rules: TrackerRules, part: TrackStore, pose: SensorPose, mask: IntArray
+) -> dict[str, Any]:
+    """Return the columns of where tracks were last seen, changed by the sensors of a mask.
+
+    Nothing is kept of sensors all of whose errors are new.
+    """
+    if rules.lasting is None or not (mask := mask & rules.lasting.sensors).any():
+        return {}
     mine = (mask >> np.arange(len(part.misdetections))[:, np.newaxis] & 1).astype(bool)
     here = expected(Kind(True), part.state0, pose)
     return {

@@ -19,7 +19,7 @@ from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
 from components.tracking.reported_errors import CarriedErrors
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 
 _QUANTITIES = ("azimuth", "elevation", "range", "range_rate", "velocity")
@@ -59,6 +59,17 @@ class LastingErrors:
                 variance[k][cell], across_m2[k][cell] = part.variance, part.across_m2
                 lasts_s[k][cell], share[k][cell] = part.lasts_s, part.share
         return cls(step, variance, lasts_s, across_m2, share)
+
+    @cached_property
+    def lasts(self) -> BoolArray:
+        """Whether any error of each sensor is correlated; last False, for no sensor (-1)."""
+        parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
+        return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
+
+    @cached_property
+    def sensors(self) -> int:
+        """Mask of the sensors any of whose errors is correlated."""
+        return sum(1 << i for i in np.flatnonzero(self.lasts).tolist())
 
     @cached_property
     def _across(self) -> bool:

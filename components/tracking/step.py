@@ -52,7 +52,9 @@ def step(
     if not held.all():
         new, next_number = initiated(rules, batch, ~held, next_number)
         parts.append(new)
-    return TrackStore.joined(parts).in_order(), next_number
+    # A single part is in the order that the store has.
+    store = parts[0] if len(parts) == 1 else TrackStore.joined(parts).in_order()
+    return store, next_number
 
 
 def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:

@@ -28,7 +28,7 @@ class TrackStore(KeyedTable):
     ``misdetections`` (sensors, n) are those of each sensor since its last hit, from `NEVER` where
     it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth, elevation and
     range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that was; NaN and
-    -1 where none did.
+    -1 where it did not, or where all its errors are new at every look.
     """
 
     #: Columns beside states, with their types.

@@ -127,6 +127,8 @@ def seen_once(values: AnyArray) -> AnyArray:
 def picked(values: AnyArray, rows: IntArray) -> AnyArray:
     """Return some rows of a column; of one that is constant, without a look at them."""
     if len(values) and of_one_value(values):
+        if len(rows) <= len(values):  # a part of it is made in no time
+            return values[: len(rows)]
         return constant(values[0], len(rows), values.dtype)
     return values.take(rows)
 

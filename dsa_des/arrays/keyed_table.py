@@ -20,12 +20,11 @@ class KeyedTable:
 
     def __init__(self, **columns: Any) -> None:
         self.columns = columns
+        # As attributes too: a look-up of a missing one takes many times as long.
+        self.__dict__.update(columns)
 
     def __getattr__(self, name: str) -> Any:
-        try:
-            return self.__dict__["columns"][name]
-        except KeyError:
-            raise AttributeError(name) from None
+        raise AttributeError(name)
 
     def __len__(self) -> int:
         return len(self.columns["replica"])
@@ -97,8 +96,8 @@ class KeyedTable:
 
 def turns(keys: IntArray) -> list[IntArray]:
     """Return the first row of every key, then the second ones, and so on."""
-    if len(keys) == 0:
-        return []
+    if len(keys) == 0 or bool((keys == keys[0]).all()):
+        return list(np.arange(len(keys))[:, np.newaxis])
     order = np.argsort(keys, kind="stable")
     begins = np.append(True, keys[order][1:] != keys[order][:-1])
     turn = np.empty(len(keys), dtype=np.int64)
