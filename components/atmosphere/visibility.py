@@ -13,18 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.checks import (
+    as_numbers,
+    broadcast_flat,
+    not_negative,
+    positive,
+    refuse,
+    unflatten,
+)
 
 # ln 50, as meteorologists round it: visibility is where a black object's contrast falls to 2 %.
 KOSCHMIEDER = 3.912
-
-
-__all__ = [
-    "combined_visibility_m",
-    "fog_visibility_m",
-    "rain_extinction_per_m",
-    "rain_visibility_m",
-]
 
 # Assumption: droplets per cm³ of a continental fog; the relation was fitted for 1 to 400.
 FOG_DROPLETS_PER_CM3 = 200.0
@@ -63,12 +62,9 @@ def fog_visibility_m(
     parameterization for warm-fog applications in numerical weather prediction models", J. Appl.
     Meteor. Climatol. 45, 2006.
     """
-    droplets = as_numbers("droplets_per_cm3", droplets_per_cm3)
-    good = (droplets > 0.0) & np.isfinite(droplets)
-    refuse("droplets_per_cm3", droplets, ~good, "be finite and above 0")
     shape, (water, number) = broadcast_flat(
         liquid_water_g_m3=not_negative("liquid_water_g_m3", liquid_water_g_m3),
-        droplets_per_cm3=droplets,
+        droplets_per_cm3=positive("droplets_per_cm3", droplets_per_cm3),
     )
     with np.errstate(under="ignore", over="ignore"):  # ends of the number range
         product = water * number

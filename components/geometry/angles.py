@@ -164,7 +164,7 @@ def wrap_longitude_deg(lon_deg: FloatArray) -> FloatArray:
     inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
     wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
     wrapped = np.where(inside, lon_deg, wrapped)
-    return np.where(wrapped >= 180.0, -180.0, np.where(wrapped < -180.0, -180.0, wrapped))
+    return np.where((wrapped >= 180.0) | (wrapped < -180.0), -180.0, wrapped)
 
 
 def wrap_difference_rad(angle: FloatArray) -> FloatArray:

@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import common_shape, shaped, squarable
-from components.geometry.angles import sine_and_cosine, wrap_pi
+from components.geometry.angles import Vector, sine_and_cosine, wrap_pi
 from dsa_des.arrays.types import FloatArray
-
-Triple = tuple[FloatArray, FloatArray, FloatArray]
 
 # Nearer to straight up or down than this, the azimuth is nothing but rounding.
 _ZENITH_RAD = 4.0 * float(np.finfo(np.float64).eps)
@@ -30,7 +28,7 @@ def ned_to_body(
     yaw_rad: npt.ArrayLike,
     pitch_rad: npt.ArrayLike,
     roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Rotate a vector from the local NED frame into body axes.
 
     Parameters
@@ -66,7 +64,7 @@ def body_to_ned(
     yaw_rad: npt.ArrayLike,
     pitch_rad: npt.ArrayLike,
     roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Rotate a vector from body axes into the local NED frame; undoes `ned_to_body`.
 
     Parameters
@@ -97,7 +95,7 @@ def body_to_ned(
 
 
 @np.errstate(under="ignore")
-def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Triple:
+def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vector:
     """Give the unit vector of a direction, in NED.
 
     Parameters
@@ -161,7 +159,7 @@ def relative_attitude(
     target_yaw_rad: npt.ArrayLike,
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Find the target's attitude relative to the line of sight, angle by angle (thesis eq. 6).
 
     Parameters
@@ -206,7 +204,7 @@ def line_of_sight_in_target_axes(
     target_yaw_rad: npt.ArrayLike,
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Give the unit vector from the observer to the target in the target's body axes.
 
     Parameters
@@ -276,13 +274,13 @@ def aspect_angles(
     return body_angles(-x, -y, -z)
 
 
-def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Triple:
+def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Vector:
     """`unit_vector` for arrays of finite doubles."""
     level = np.cos(elevation)
     return level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
 
 
-def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Triple:
+def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Vector:
     """`ned_to_body` for arrays of finite doubles."""
     level_x, level_y = turn_axes(n, e, yaw)
     z, x = turn_axes(d, level_x, pitch)

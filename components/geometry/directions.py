@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, unflatten
-from components.geometry.attitude import Triple, unit_vector_unchecked
+from components.geometry.angles import Vector
+from components.geometry.attitude import unit_vector_unchecked
 from dsa_des.arrays.types import FloatArray
 
 
@@ -108,7 +109,7 @@ def angle_between_vectors(one: FloatArray, other: FloatArray) -> FloatArray:
     return apart
 
 
-def chord_between(one: Triple, other: Triple) -> FloatArray:
+def chord_between(one: Vector, other: Vector) -> FloatArray:
     """Give the distance between the tips of two unit vectors, in [0, 2]."""
     x, y, z = (a - b for a, b in zip(one, other, strict=True))
     chord: FloatArray = np.sqrt(x * x + y * y + z * z)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.messages.columns import TrueLine
+from dsa_des.arrays.entries import entries_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, columns_of, instants_of
 
@@ -38,11 +39,7 @@ class Looks:
 
     def take_rows(self, rows: slice | IntArray) -> Self:
         """Return the looks of some rows."""
-        if isinstance(rows, slice):
-            rows = np.arange(*rows.indices(len(self)))
-        counts = (self.offsets[1:] - self.offsets[:-1])[rows]
-        offsets = np.concatenate(([0], np.cumsum(counts)))
-        which = np.repeat(self.offsets[rows] - offsets[:-1], counts) + np.arange(offsets[-1])
+        offsets, which = entries_of(self.offsets, rows)
         return type(self)(offsets, self.sensor[which], self.age_ticks[which], self.pose[:, which])
 
     @classmethod
@@ -105,11 +102,11 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
         Not evaluated: not ``detected``, and NaN.
     """
     shape = (scans, len(cells.roster))
-    place = (cells.row, cells.target)
-    found: dict[str, AnyArray] = {}
+    cell = (cells.row, cells.target)
+    looks: dict[str, AnyArray] = {}
     for name, values in (("evaluated", True), ("detected", look.detected)):
-        found[name] = np.zeros(shape, dtype=bool)
-        found[name][place] = values
+        looks[name] = np.zeros(shape, dtype=bool)
+        looks[name][cell] = values
     known = {
         "true_azimuth_rad": cells.body_azimuth_rad,
         "true_elevation_rad": cells.body_elevation_rad,
@@ -118,10 +115,10 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
         **look.extras,
     }
     for name in _NUMBERS:
-        found[name] = np.full(shape, np.nan)
+        looks[name] = np.full(shape, np.nan)
         if name in known:
-            found[name][place] = known[name]
-    return found
+            looks[name][cell] = known[name]
+    return looks
 
 
 def look_columns(detections: Any) -> Columns:

@@ -13,6 +13,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.geometry import TrajectoryState, line_of_sight_ned
+from components.geometry.state import POSE, POSITION
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
@@ -28,10 +29,9 @@ _OWN_STEP_S = 1.0 / 64.0
 # Aircraft and instants worked on together.
 _AT_ONCE = 16384
 
-_PLACE = ("lat_deg", "lon_deg", "alt_m")
 _TURNED = {"yaw_rad": "heading_rad", "pitch_rad": "pitch_rad", "roll_rad": "roll_rad"}
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
-_NUMBERS = (*_PLACE, *_VELOCITY, *_TURNED.values())
+_NUMBERS = (*POSITION, *_VELOCITY, *_TURNED.values())
 
 
 @dataclass(eq=False)
@@ -107,7 +107,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
         "tick": tick[row],
         "counts": np.bincount(row, minlength=len(tick)),
         "who": column - 1,
-        **{name: state[name][row, column] for name in _PLACE},
+        **{name: state[name][row, column] for name in POSITION},
         **{name: v[row, column] for name, v in zip(_VELOCITY, velocity, strict=True)},
         **{name: state[key][row, column] for key, name in _TURNED.items()},
     }
@@ -143,7 +143,7 @@ def _velocity(
 
 def _way(here: _State, there: _State) -> FloatArray:
     """Return where everybody is in one state, north, east and down of where they are in another."""
-    places = [*(here[name] for name in _PLACE), *(there[name] for name in _PLACE)]
+    places = [*(here[name] for name in POSITION), *(there[name] for name in POSITION)]
     return np.stack(line_of_sight_ned(*places, validate=False))
 
 
@@ -152,7 +152,7 @@ def _together(states: Any) -> dict[str, Any]:
     own, others = states
     return {
         name: np.concatenate([getattr(own, name), getattr(others, name)], axis=1)
-        for name in (*_PLACE, *_TURNED, "present")
+        for name in (*POSITION, *_TURNED, "present")
     }
 
 
@@ -211,18 +211,8 @@ class TrafficStates(Message):
         """Return the message of what an ownship and others fly; `more` are its other fields."""
         return cls(
             tick=tick,
-            own_lat_deg=own.lat_deg,
-            own_lon_deg=own.lon_deg,
-            own_alt_m=own.alt_m,
-            own_yaw_rad=own.yaw_rad,
-            own_pitch_rad=own.pitch_rad,
-            own_roll_rad=own.roll_rad,
-            lat_deg=others.lat_deg,
-            lon_deg=others.lon_deg,
-            alt_m=others.alt_m,
-            yaw_rad=others.yaw_rad,
-            pitch_rad=others.pitch_rad,
-            roll_rad=others.roll_rad,
+            **{f"own_{name}": getattr(own, name) for name in POSE},
+            **{name: getattr(others, name) for name in POSE},
             **more,
         )
 
@@ -382,10 +372,10 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
         {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
         for at in (time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S)
     ]
-    here = [own[0][name] for name in _PLACE]
+    here = [own[0][name] for name in POSITION]
     moved, span_s = [], np.zeros(len(row))
     for there in own[1:]:
-        places = [there[name] for name in _PLACE]
+        places = [there[name] for name in POSITION]
         way = np.stack(line_of_sight_ned(*here, *places, validate=False))
         moved.append(np.where(there["present"], way, 0.0))
         span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)
