@@ -45,18 +45,15 @@ def add_false_detections(
 
     Parameters
     ----------
-    detections : Detections
     row : (alarms,) of int
         Row of `detections` that each false one belongs to, ascending.
     azimuth_rad, elevation_rad : (alarms,)
         As reported: ownship's body axes, on the sensor's grid.
     range_m, confidence : (alarms,) or one number
         NaN where the sensor has none.
-    extras : mapping of (alarms,) or one number
-        Columns of `Detections.extras`; those not given are NaN, or False where they hold truth
-        values.
-    measured : mapping of (alarms,) or one number
-        Range rate and variances (`MEASURED`), as for a target; those not given are NaN.
+    extras, measured : mapping of (alarms,) or one number
+        Columns of `Detections.extras`, and range rate and variances (`MEASURED`) as for a target;
+        those not given are NaN, or False where they hold truth values.
 
     Returns
     -------

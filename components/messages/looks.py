@@ -16,22 +16,13 @@ from dsa_des.block.message import Column, Columns, Message, Text, columns_of, in
 class Looks:
     """The looks behind the rows of a message, also those in which nothing was detected.
 
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-        Looks ``offsets[i]:offsets[i + 1]`` belong to row i.
-    sensor : (looks,) of int
-        Index into the message's ``sensors``.
-    age_ticks : (looks,) of int
-        How long before its row's tick each was made.
-    pose : (6, looks)
-        Of the ownship as believed then: `components.messages.detections.POSE`; NaN where the
-        sensor does not say.
+    Looks ``offsets[i]:offsets[i + 1]`` belong to row i.
     """
 
-    offsets: IntArray
-    sensor: IntArray
-    age_ticks: IntArray
+    offsets: IntArray  # (rows + 1,)
+    sensor: IntArray  # (looks,): index into the message's `sensors`
+    age_ticks: IntArray  # (looks,): how long before its row's tick each was made
+    # (6, looks): the ownship's, as believed then (`Detections`); NaN from a sensor without
     pose: FloatArray
 
     def __len__(self) -> int:
@@ -86,21 +77,7 @@ class EveryLook(Message):
 
 
 def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
-    """Return a sensor's looks at all targets of the roster.
-
-    Parameters
-    ----------
-    cells : Cells
-        What was evaluated.
-    look : Look
-        What came of it.
-    scans : int
-
-    Returns
-    -------
-    dict of (scans, targets) arrays
-        Not evaluated: not ``detected``, and NaN.
-    """
+    """Return a sensor's looks at all targets, (scans, targets); NaN where not evaluated."""
     shape = (scans, len(cells.roster))
     cell = (cells.row, cells.target)
     looks: dict[str, AnyArray] = {}

@@ -57,20 +57,11 @@ class TrueStates(Message):
 def truth_columns(states: Any) -> Columns:
     """Return the ownship and every target that is there at each instant of a message.
 
-    Parameters
-    ----------
-    states : TrafficStates
-        With ``true_flights`` and ``run_time_s``. All targets of the roster count, whatever its
-        arrays hold.
-
-    Returns
-    -------
-    dict of columns
-        At each instant the ownship first (its ``target`` is null), then the targets as the roster
-        has them. Velocities are those of the path in the aircraft's own NED frame, from positions
-        1/1024 s before and after: good to 1e-5 m/s where the path has no kink in between, by
-        which they are the mean of both sides. Where an aircraft comes or goes, two positions on
-        the one side take their place.
+    At each instant the ownship first (its ``target`` is null), then the targets as the roster has
+    them, whatever the arrays of `states` hold. Velocities are those of the path in the aircraft's
+    own NED frame, from positions 1/1024 s before and after: good to 1e-5 m/s where the path has no
+    kink in between, by which they are the mean of both sides. Where an aircraft comes or goes, two
+    positions on the one side take their place.
     """
     count = len(states.roster)
     step = max(1, _AT_ONCE // (1 + count))
@@ -243,15 +234,9 @@ class RelativeTargets(Message):
         The thesis's p and q: line of sight in the ownship's body axes; p in (-pi, pi].
     relative_heading_rad : (rows, targets)
         Target's heading minus bearing of the line of sight: 0 when it flies away from us.
-    target_pitch_rad, target_roll_rad : (rows, targets)
-    own_alt_m : (rows,)
-    alt_m : (rows, targets)
+    own_alt_m, alt_m : (rows,) and (rows, targets)
         Altitudes above the ellipsoid, for what changes with height.
-    present : (rows, targets) of bool
-    roster : Roster
-    columns : (targets,) of int
-        Which targets of the roster the arrays hold.
-    culled : (rows,) of int, or None
+    roster, columns, culled, present
         As in `TrafficStates`.
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
@@ -309,13 +294,7 @@ class RelativeTargets(Message):
 
 @dataclass(eq=False)
 class GatedTargets(RelativeTargets):
-    """Relative targets with the simulation decision for each sensor (thesis §3.4).
-
-    Parameters
-    ----------
-    decisions : dict of Decision
-        By sensor name.
-    """
+    """Relative targets with each sensor's simulation decision, by its name (thesis §3.4)."""
 
     decisions: dict[str, Decision] = per_row()
 
@@ -358,10 +337,10 @@ def _widened(part: Any, columns: IntArray) -> Any:
 
 
 def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
+    """Return the ownship's velocity over ground (north, east, down, m/s) at times of some rows.
 
-    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
-    by the position itself where the flight begins or ends between; NaN where no flights are known.
+    From positions 1/64 s before and after, of which one is replaced by the position itself where
+    the flight begins or ends between; NaN where no flights are known.
     """
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
