@@ -204,7 +204,7 @@ def coverage(corners: FloatArray, rows: int, columns: int) -> FloatArray:
 def _coverages(
     corners: FloatArray, rows: int, columns: int
 ) -> Iterator[tuple[tuple[slice, slice], FloatArray]]:
-    """Yield the box round each of several polygons (count, n, 2) in a picture, and `coverage` there."""
+    """Yield the box in the picture round each polygon (count, n, 2), and its `coverage` there."""
     corners = np.asarray(finite("corners", corners))
     count, edges = corners.shape[:2]
     if edges < 3:
