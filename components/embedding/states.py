@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.aircraft import Roster
 from components.arguments.checks import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
-from components.geometry.state import POSE
+from components.geometry import POSE_FIELDS
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import shown_value
@@ -113,8 +113,8 @@ def traffic_states(
         np.degrees(angles, out=angles)
     return TrafficStates(
         tick=np.array([tick], dtype=np.int64),
-        **{f"own_{name}": row for name, row in zip(POSE, own_values, strict=True)},
-        **dict(zip(POSE, values, strict=True)),
+        **{f"own_{name}": row for name, row in zip(POSE_FIELDS, own_values, strict=True)},
+        **dict(zip(POSE_FIELDS, values, strict=True)),
         present=present,
         roster=roster,
         columns=np.arange(len(roster)) if chosen is None else np.array(chosen, dtype=np.int64),

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from dsa_des.arrays.types import FloatArray
 
 #: Where an aircraft is (WGS 84) and how it is turned, in the order of `TrajectoryState`.
-POSITION = ("lat_deg", "lon_deg", "alt_m")
-POSE = (*POSITION, "yaw_rad", "pitch_rad", "roll_rad")
+POSITION_FIELDS = ("lat_deg", "lon_deg", "alt_m")
+POSE_FIELDS = (*POSITION_FIELDS, "yaw_rad", "pitch_rad", "roll_rad")
 
 
 @dataclass(frozen=True)
@@ -47,4 +47,4 @@ class TrajectoryState:
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Return the seven arrays in the order of the fields."""
-        return tuple(getattr(self, name) for name in (*POSE, "present"))
+        return tuple(getattr(self, name) for name in (*POSE_FIELDS, "present"))

@@ -8,8 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.environment.tables import Terrain
-from components.geometry import SeenFromOwnship, sensor_angles
-from components.geometry.state import POSITION
+from components.geometry import POSITION_FIELDS, SeenFromOwnship, sensor_angles
 from components.terrain.rays import (
     behind_terrain,
     behind_the_limb,
@@ -142,7 +141,7 @@ def _of_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
         here = np.nonzero(present)
         if len(here[0]):
             ends = (
-                tuple(np.broadcast_to(getattr(s, n), present.shape)[here] for n in POSITION)
+                tuple(np.broadcast_to(getattr(s, n), present.shape)[here] for n in POSITION_FIELDS)
                 for s in (own, other)
             )
             hidden[here] = hidden_of(*ends)

@@ -12,8 +12,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.geometry import TrajectoryState, line_of_sight_ned
-from components.geometry.state import POSE, POSITION
+from components.geometry import (
+    POSE_FIELDS,
+    POSITION_FIELDS,
+    TrajectoryState,
+    line_of_sight_ned,
+)
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
@@ -31,7 +35,7 @@ _AT_ONCE = 16384
 
 _TURNED = {"yaw_rad": "heading_rad", "pitch_rad": "pitch_rad", "roll_rad": "roll_rad"}
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
-_NUMBERS = (*POSITION, *_VELOCITY, *_TURNED.values())
+_NUMBERS = (*POSITION_FIELDS, *_VELOCITY, *_TURNED.values())
 
 
 @dataclass(eq=False)
@@ -98,7 +102,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
         "tick": tick[row],
         "counts": np.bincount(row, minlength=len(tick)),
         "who": column - 1,
-        **{name: state[name][row, column] for name in POSITION},
+        **{name: state[name][row, column] for name in POSITION_FIELDS},
         **{name: v[row, column] for name, v in zip(_VELOCITY, velocity, strict=True)},
         **{name: state[key][row, column] for key, name in _TURNED.items()},
     }
@@ -134,7 +138,7 @@ def _velocity(
 
 def _way(here: _State, there: _State) -> FloatArray:
     """Return where everybody is in one state, north, east and down of where they are in another."""
-    places = [*(here[name] for name in POSITION), *(there[name] for name in POSITION)]
+    places = [*(here[name] for name in POSITION_FIELDS), *(there[name] for name in POSITION_FIELDS)]
     return np.stack(line_of_sight_ned(*places, validate=False))
 
 
@@ -143,7 +147,7 @@ def _together(states: Any) -> dict[str, Any]:
     own, others = states
     return {
         name: np.concatenate([getattr(own, name), getattr(others, name)], axis=1)
-        for name in (*POSITION, *_TURNED, "present")
+        for name in (*POSITION_FIELDS, *_TURNED, "present")
     }
 
 
@@ -202,8 +206,8 @@ class TrafficStates(Message):
         """Return the message of what an ownship and others fly; `more` are its other fields."""
         return cls(
             tick=tick,
-            **{f"own_{name}": getattr(own, name) for name in POSE},
-            **{name: getattr(others, name) for name in POSE},
+            **{f"own_{name}": getattr(own, name) for name in POSE_FIELDS},
+            **{name: getattr(others, name) for name in POSE_FIELDS},
             **more,
         )
 
@@ -351,10 +355,10 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
         {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
         for at in (time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S)
     ]
-    here = [own[0][name] for name in POSITION]
+    here = [own[0][name] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(row))
     for there in own[1:]:
-        places = [there[name] for name in POSITION]
+        places = [there[name] for name in POSITION_FIELDS]
         way = np.stack(line_of_sight_ned(*here, *places, validate=False))
         moved.append(np.where(there["present"], way, 0.0))
         span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)
