@@ -96,15 +96,6 @@ def attenuation_table(
         The same everywhere between `fog_base_m` and `fog_top_m` (m; everywhere by default).
     fog_temperature_k : float, K
 
-    Returns
-    -------
-    AttenuationTable
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, the polarisation unknown, or the fog's top below its base.
-
     Notes
     -----
     Recommendations ITU-R P.676-12, P.835-6, P.838-3, P.839-4 and P.840-8. The gases between nodes
@@ -183,11 +174,6 @@ def one_way_attenuation_db(
     array of the broadcast shape, dB
         0 at range 0. Twice this is lost on the way there and back.
 
-    Raises
-    ------
-    ValueError
-        If a range is negative or an argument not finite.
-
     Notes
     -----
     The mean specific attenuation between the two altitudes times the range: along a straight path
@@ -222,11 +208,6 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
     """Return the factor by which a one-way attenuation in dB multiplies the SNR of an echo.
 
     10^(-2 A / 10); exactly 1 for 0 dB.
-
-    Raises
-    ------
-    ValueError
-        If the attenuation is negative or not finite.
     """
     shape, (attenuation,) = broadcast_flat(one_way_db=not_negative("one_way_db", one_way_db))
     # Beyond 1600 dB one way nothing is left that a double could hold.
@@ -289,15 +270,6 @@ def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: Arr
         Range R0 without attenuation, 0 or more.
     specific_attenuation_db_km : array_like, dB/km
         One way, the same all along the path, 0 or more.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative or not finite.
 
     Notes
     -----

@@ -1,4 +1,8 @@
-"""Directions, rotations and the ellipsoid, as pure functions over arrays: import them from here."""
+"""Directions, rotations and the ellipsoid, as pure functions over arrays: import them from here.
+
+Arguments that are `array_like` broadcast together; NaN, infinity and shapes that do not fit raise
+ValueError. Those that are `ndarray` are not checked.
+"""
 
 from components.geometry.angles import (
     DEG_PER_RAD,

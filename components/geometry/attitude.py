@@ -43,11 +43,6 @@ def ned_to_body(
     x, y, z : ndarray
         Components along nose, right wing and down through the floor, the same unit. The length
         is kept to 1e-15 of itself, also there and back (measured 5e-16 and 6e-16).
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, arrays = checked(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
@@ -70,19 +65,13 @@ def body_to_ned(
     Parameters
     ----------
     x, y, z : array_like
-        Components along nose, right wing and down through the floor, any unit.
+        Components along nose, right wing and down through the floor, any unit, which stays.
     yaw_rad, pitch_rad, roll_rad : array_like
-        The aircraft's attitude, ZYX. All six broadcast.
+        As for `ned_to_body`.
 
     Returns
     -------
     north, east, down : ndarray
-        The same unit.
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, (bx, by, bz, yaw, pitch, roll) = checked(
         x=x, y=y, z=z, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
@@ -107,11 +96,6 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vec
     -------
     north, east, down : ndarray
         Length 1. From body angles instead of NED angles it gives x, y, z in body axes.
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, arrays = checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
     north, east, down = shaped(shape, *unit_vector_unchecked(*arrays))
@@ -137,11 +121,6 @@ def body_angles(
     body_elevation_rad : ndarray
         Elevation above the plane of the wings, in [-pi/2, pi/2].
 
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
     Notes
     -----
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
@@ -162,30 +141,16 @@ def relative_attitude(
 ) -> Vector:
     """Find the target's attitude relative to the line of sight, angle by angle (thesis eq. 6).
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Absolute bearing and elevation of the line of sight, from the observer to the target.
-        (Eq. 6 as printed takes p and q, which contain the ownship's own attitude, so that the
-        aspect would change when we turn.)
-    target_yaw_rad, target_pitch_rad, target_roll_rad : array_like
-        The target's attitude, ZYX. All five broadcast.
+    A small-angle form of `line_of_sight_in_target_axes`, which has the same arguments: the sign of
+    the elevation is right only for a receding target, and roll shares its axis with elevation only
+    abeam. (Eq. 6 as printed takes p and q, which contain the ownship's own attitude, so that the
+    aspect would change when we turn.)
 
     Returns
     -------
     psi_rel_rad, theta_rel_rad, phi_rel_rad : ndarray
         yaw - azimuth (0 when it flies away from us), elevation - pitch and elevation - roll, all
         wrapped into (-pi, pi].
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
-    Notes
-    -----
-    A small-angle form: the sign of the elevation is right only for a receding target, and roll
-    shares its axis with elevation only abeam. `line_of_sight_in_target_axes` is exact.
     """
     shape, (azimuth, elevation, yaw, pitch, roll) = checked(
         azimuth_rad=azimuth_rad,
@@ -219,11 +184,6 @@ def line_of_sight_in_target_axes(
     u_x, u_y, u_z : ndarray
         Along the target's nose, right wing and down; (-1, 0, 0) when it flies straight at us.
 
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
     Notes
     -----
     The target's attitude is taken in the observer's NED frame. The target's own NED frame leans
@@ -244,12 +204,7 @@ def aspect_angles(
 ) -> tuple[FloatArray, FloatArray]:
     """Find from which side the observer sees the target, exactly.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Absolute bearing and elevation of the line of sight, from the observer to the target.
-    target_yaw_rad, target_pitch_rad, target_roll_rad : array_like
-        The target's attitude, ZYX. All five broadcast.
+    Arguments and frames are those of `line_of_sight_in_target_axes`.
 
     Returns
     -------
@@ -258,15 +213,6 @@ def aspect_angles(
         the observer is off its right wing, pi from behind; in (-pi, pi].
     aspect_elevation_rad : ndarray
         Positive when the observer is above the plane of the target's wings; in [-pi/2, pi/2].
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
-    Notes
-    -----
-    The remark on frames at `line_of_sight_in_target_axes` holds here too.
     """
     x, y, z = line_of_sight_in_target_axes(
         azimuth_rad, elevation_rad, target_yaw_rad, target_pitch_rad, target_roll_rad
