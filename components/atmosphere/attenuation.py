@@ -45,15 +45,6 @@ def gas_specific_attenuation(
         0 or more. Its partial pressure (density times temperature / 216.7) must be below the
         barometric pressure.
 
-    Returns
-    -------
-    array of the broadcast shape, dB/km
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
     Notes
     -----
     Recommendation ITU-R P.676-12 (08/2019), Annex 1: 44 oxygen and 35 water vapour lines, the dry
@@ -159,15 +150,6 @@ def rain_coefficients(frequency_hz: float) -> RainCoefficients:
     frequency_hz : float, Hz
         1 GHz to 1 THz.
 
-    Returns
-    -------
-    RainCoefficients
-
-    Raises
-    ------
-    ValueError
-        If the frequency is out of range.
-
     Notes
     -----
     Recommendation ITU-R P.838-3 (03/2005), eq. 2 and 3 with Tables 1-4.
@@ -195,10 +177,6 @@ def polarisation_balance(polarisation: str | float) -> float:
     ----------
     polarisation : {"horizontal", "vertical", "circular"} or float
         A name, or the tilt τ of a linear polarisation from the horizontal in radians.
-
-    Returns
-    -------
-    float
 
     Raises
     ------
@@ -230,15 +208,6 @@ def rain_specific_attenuation(
     elevation_rad : array_like, rad
         Elevation of the path; with circular polarisation it makes no difference.
 
-    Returns
-    -------
-    array of the broadcast shape, dB/km
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the polarisation unknown.
-
     Notes
     -----
     Recommendation ITU-R P.838-3 (03/2005), eq. 1, 4 and 5.
@@ -264,15 +233,6 @@ def fog_specific_attenuation_coefficient(frequency_hz: ArrayLike, temperature_k:
         1 to 200 GHz: there the droplets (below 0.01 cm) are small against the wavelength.
     temperature_k : array_like, K
         Of the liquid water, 233.15 to 323.15 K (it can be supercooled).
-
-    Returns
-    -------
-    array of the broadcast shape, (dB/km)/(g/m³)
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
 
     Notes
     -----
@@ -310,15 +270,6 @@ def fog_specific_attenuation(
     liquid_water_g_m3 : array_like, g/m³
         Liquid water content, 0 or more. The Recommendation gives 0.05 for medium fog (visibility
         about 300 m) and 0.5 for thick fog (about 50 m).
-
-    Returns
-    -------
-    array of the broadcast shape, dB/km
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
 
     Notes
     -----

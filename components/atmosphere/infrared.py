@@ -31,13 +31,7 @@ _HPA_PER_ATM = 1013.25
 
 
 def check_band(band: str) -> tuple[float, float]:
-    """Return a band's wavelengths (µm), or say which bands there are.
-
-    Raises
-    ------
-    ValueError
-        If there is none of that name.
-    """
+    """Return a band's wavelengths (µm); ValueError with those there are if none has that name."""
     if band not in BANDS:
         raise ValueError(f"band is {band!r}: it must be one of {', '.join(BANDS)}")
     return BANDS[band]
@@ -62,11 +56,6 @@ def precipitable_water_mm(
     Returns
     -------
     array of the broadcast shape, mm (1 mm is 1000 g/m²)
-
-    Raises
-    ------
-    ValueError
-        If a range or a density is negative or an argument not finite.
     """
     shape, (distance, own, target, density) = broadcast_flat(
         range_m=not_negative("range_m", range_m),
@@ -88,15 +77,6 @@ def mid_wave_transmission(water_mm: ArrayLike) -> Any:
     ----------
     water_mm : array_like, mm
         Precipitable water along the path, 0 or more.
-
-    Returns
-    -------
-    array of the same shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If it is negative or not finite.
 
     Notes
     -----
@@ -134,15 +114,6 @@ def continuum_per_km(
     temperature_k : array_like, K
     pressure_hpa : array_like, hPa
         Barometric pressure.
-
-    Returns
-    -------
-    array of the broadcast shape, 1/km
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative, 0 where it must not be, or not finite.
 
     Notes
     -----
@@ -185,20 +156,7 @@ def long_wave_transmission(
     The water vapour continuum (`continuum_per_km`) in the standard atmosphere, whose vapour
     density at sea level is given, along a straight path on which altitude grows evenly. Lines of
     water vapour and carbon dioxide are left out: they take a further 3 to 8 % per 10 km.
-
-    Parameters
-    ----------
-    range_m, own_alt_m, target_alt_m : array_like, m
-    sea_level_vapour_density_g_m3 : float, g/m³
-
-    Returns
-    -------
-    array of the broadcast shape, in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If a range or a density is negative or an argument not finite.
+    Arguments are those of `precipitable_water_mm`.
     """
     shape, (distance, own, target) = broadcast_flat(
         range_m=not_negative("range_m", range_m),
@@ -239,11 +197,6 @@ def haze_share(visibility_m: ArrayLike, band: str) -> Any:
     -------
     array of the same shape, in (0, 1]
 
-    Raises
-    ------
-    ValueError
-        If the visibility is not above 0 or the band is unknown.
-
     Notes
     -----
     P. W. Kruse et al., Elements of Infrared Technology, 1962; q of I. I. Kim, B. McArthur and E.
@@ -272,19 +225,10 @@ def haze_share_at(visibility_m: ArrayLike, wavelength_um: float) -> Any:
 def band_extinction_per_m(
     band: str, haze_visibility_m: float | None = None, rain_extinction_per_m: float = 0.0
 ) -> float:
-    """Return what haze, fog and rain take from a band, per metre.
+    """Return what haze, fog and rain take from a band ("mwir" or "lwir"), per metre.
 
-    Parameters
-    ----------
-    band : {"mwir", "lwir"}
-    haze_visibility_m : float, m, optional
-        Visibility in the haze or fog alone.
-    rain_extinction_per_m : float
-        Large drops take the same from all light.
-
-    Returns
-    -------
-    float, 1/m
+    `haze_visibility_m` is that in the haze or fog alone; large drops of rain take the same from all
+    light.
     """
     check_band(band)
     if haze_visibility_m is None:

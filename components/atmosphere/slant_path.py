@@ -47,12 +47,10 @@ class AttenuationTable:
     """
 
     frequency_hz: float
-    # (nodes,) arrays or None: Specific attenuation of the gases at altitudes `BOTTOM_M` + i
+    # (nodes,) arrays: specific attenuation of the gases (dB/km) at altitudes `BOTTOM_M` + i
     # `STEP_M`, its increase to the next node, and its sum up to node i by the trapezium rule
     # (in node steps). None: no gas
-    gas_db_km: FloatArray | None
-    gas_slope: FloatArray | None
-    gas_sum: FloatArray | None
+    gas: tuple[FloatArray, FloatArray, FloatArray] | None
     rain: RainCoefficients | None
     # Rain falls from `rain_height_m` down; the balance is cos 2τ of the polarisation
     rain_rate_mm_h: float
@@ -98,15 +96,6 @@ def attenuation_table(
         The same everywhere between `fog_base_m` and `fog_top_m` (m; everywhere by default).
     fog_temperature_k : float, K
 
-    Returns
-    -------
-    AttenuationTable
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, the polarisation unknown, or the fog's top below its base.
-
     Notes
     -----
     Recommendations ITU-R P.676-12, P.835-6, P.838-3, P.839-4 and P.840-8. The gases between nodes
@@ -127,17 +116,13 @@ def attenuation_table(
         raise ValueError(
             f"fog_top_m is {fog_top_m:g}: it must be at least fog_base_m, {fog_base_m:g}"
         )
-    nodes = _gas_nodes(frequency_hz, vapour_density_g_m3) if gas else (None, None, None)
-    balance = polarisation_balance(polarisation)
     return AttenuationTable(
         frequency_hz=float(frequency_hz),
-        gas_db_km=nodes[0],
-        gas_slope=nodes[1],
-        gas_sum=nodes[2],
+        gas=_gas_nodes(frequency_hz, vapour_density_g_m3) if gas else None,
         rain=rain_coefficients(frequency_hz) if rain_rate > 0.0 else None,
         rain_rate_mm_h=rain_rate,
         rain_height_m=float(rain_height_m),
-        rain_balance=balance,
+        rain_balance=polarisation_balance(polarisation),
         fog_db_km=float(fog_specific_attenuation(frequency_hz, water, fog_temperature_k))
         if water > 0.0
         else 0.0,
@@ -170,9 +155,6 @@ def _gas_nodes(
     return gas, slope, total
 
 
-EARTH_RADIUS_M = 6_371_000.0
-
-
 def one_way_attenuation_db(
     range_m: ArrayLike, own_alt_m: ArrayLike, target_alt_m: ArrayLike, table: AttenuationTable
 ) -> Any:
@@ -191,11 +173,6 @@ def one_way_attenuation_db(
     -------
     array of the broadcast shape, dB
         0 at range 0. Twice this is lost on the way there and back.
-
-    Raises
-    ------
-    ValueError
-        If a range is negative or an argument not finite.
 
     Notes
     -----
@@ -217,11 +194,11 @@ def one_way_attenuation_db(
     )
     low, high = np.minimum(own, target), np.maximum(own, target)
     mean_db_km = np.zeros_like(distance)
-    if table.gas_sum is not None:
-        mean_db_km += _mean_gas(low, high, table)
+    if table.gas is not None:
+        mean_db_km += _mean_gas(low, high, *table.gas)
     if table.rain is not None:
         share = _share_between(low, high, -np.inf, table.rain_height_m)
-        mean_db_km += share * _rain(distance, high - low, table)
+        mean_db_km += share * _rain(distance, high - low, table.rain, table)
     if table.fog_db_km > 0.0:
         mean_db_km += table.fog_db_km * _share_between(low, high, table.fog_base_m, table.fog_top_m)
     return unflatten(mean_db_km * (distance * 1e-3), shape)
@@ -231,11 +208,6 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
     """Return the factor by which a one-way attenuation in dB multiplies the SNR of an echo.
 
     10^(-2 A / 10); exactly 1 for 0 dB.
-
-    Raises
-    ------
-    ValueError
-        If the attenuation is negative or not finite.
     """
     shape, (attenuation,) = broadcast_flat(one_way_db=not_negative("one_way_db", one_way_db))
     # Beyond 1600 dB one way nothing is left that a double could hold.
@@ -244,17 +216,17 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
     return unflatten(np.where(gone, 0.0, factor), shape)
 
 
-def _mean_gas(low: FloatArray, high: FloatArray, table: AttenuationTable) -> FloatArray:
-    assert table.gas_db_km is not None and table.gas_slope is not None
-    assert table.gas_sum is not None
-    last = len(table.gas_sum) - 2
+def _mean_gas(
+    low: FloatArray, high: FloatArray, gas: FloatArray, slope: FloatArray, total: FloatArray
+) -> FloatArray:
+    last = len(total) - 2
     i, t = _node(low, last)
     j, s = _node(high, last)
-    at_i, slope_i = table.gas_db_km.take(i), table.gas_slope.take(i)
+    at_i, slope_i = gas.take(i), slope.take(i)
     in_one_step = at_i + slope_i * (0.5 * (t + s))
     to_next_node = (1.0 - t) * (at_i + slope_i * (0.5 * (1.0 + t)))
-    from_last_node = s * (table.gas_db_km.take(j) + table.gas_slope.take(j) * (0.5 * s))
-    whole_steps = table.gas_sum.take(j) - table.gas_sum.take(i + 1)
+    from_last_node = s * (gas.take(j) + slope.take(j) * (0.5 * s))
+    whole_steps = total.take(j) - total.take(i + 1)
     same = i == j
     # (1 - t) + whole steps + s is the height difference in steps, free of cancellation.
     steps = np.where(same, 1.0, (1.0 - t) + (j - i - 1) + s)
@@ -277,16 +249,16 @@ def _share_between(low: FloatArray, high: FloatArray, bottom: float, top: float)
     return np.where(level, level_share, inside / np.where(level, 1.0, span))
 
 
-def _rain(distance: FloatArray, climb: FloatArray, table: AttenuationTable) -> FloatArray:
-    assert table.rain is not None
+def _rain(
+    distance: FloatArray, climb: FloatArray, rain: RainCoefficients, table: AttenuationTable
+) -> FloatArray:
     if table.rain_balance == 0.0:
-        flat = np.zeros(1)
-        return table.rain.specific_attenuation(np.full(1, table.rain_rate_mm_h), flat)
+        return rain.specific_attenuation(np.full(1, table.rain_rate_mm_h), np.zeros(1))
     # A climb longer than the path (another frame's altitudes) counts as vertical.
     sine = np.minimum(climb, distance) / np.where(distance > 0.0, distance, 1.0)
     cosine_squared = (1.0 - sine) * (1.0 + sine)
     rate = np.full_like(distance, table.rain_rate_mm_h)
-    return table.rain.specific_attenuation(rate, cosine_squared * table.rain_balance)
+    return rain.specific_attenuation(rate, cosine_squared * table.rain_balance)
 
 
 def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: ArrayLike) -> Any:
@@ -298,15 +270,6 @@ def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: Arr
         Range R0 without attenuation, 0 or more.
     specific_attenuation_db_km : array_like, dB/km
         One way, the same all along the path, 0 or more.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative or not finite.
 
     Notes
     -----

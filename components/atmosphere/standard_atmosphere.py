@@ -65,11 +65,6 @@ def standard_atmosphere(
     pressure_hpa, temperature_k, vapour_density_g_m3 : arrays of the broadcast shape
         The pressure is the barometric one, vapour included.
 
-    Raises
-    ------
-    ValueError
-        If an altitude is outside the range or the vapour density negative.
-
     Notes
     -----
     Recommendation ITU-R P.835-6 (12/2017), Annex 1, mean annual global reference atmosphere.

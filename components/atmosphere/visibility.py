@@ -13,18 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.checks import (
+    as_numbers,
+    broadcast_flat,
+    not_negative,
+    positive,
+    refuse,
+    unflatten,
+)
 
 # ln 50, as meteorologists round it: visibility is where a black object's contrast falls to 2 %.
 KOSCHMIEDER = 3.912
-
-
-__all__ = [
-    "combined_visibility_m",
-    "fog_visibility_m",
-    "rain_extinction_per_m",
-    "rain_visibility_m",
-]
 
 # Assumption: droplets per cm³ of a continental fog; the relation was fitted for 1 to 400.
 FOG_DROPLETS_PER_CM3 = 200.0
@@ -48,27 +47,15 @@ def fog_visibility_m(
         Droplet number concentration N_d, above 0; fitted from 1 to 400. The default 200 is an
         assumption; with it the relation agrees with Kunkel's 27 m · LWC^-0.88 to 3 % in thick fog.
 
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or not finite.
-
     Notes
     -----
     V = 1.002 km · (LWC · N_d)^-0.6473: I. Gultepe, M. D. Müller and Z. Boybeyi, "A new visibility
     parameterization for warm-fog applications in numerical weather prediction models", J. Appl.
     Meteor. Climatol. 45, 2006.
     """
-    droplets = as_numbers("droplets_per_cm3", droplets_per_cm3)
-    good = (droplets > 0.0) & np.isfinite(droplets)
-    refuse("droplets_per_cm3", droplets, ~good, "be finite and above 0")
     shape, (water, number) = broadcast_flat(
         liquid_water_g_m3=not_negative("liquid_water_g_m3", liquid_water_g_m3),
-        droplets_per_cm3=droplets,
+        droplets_per_cm3=positive("droplets_per_cm3", droplets_per_cm3),
     )
     with np.errstate(under="ignore", over="ignore"):  # ends of the number range
         product = water * number
@@ -85,15 +72,6 @@ def rain_extinction_per_m(rain_rate_mm_h: ArrayLike) -> Any:
     rain_rate_mm_h : array_like, mm/h
         0 or more.
 
-    Returns
-    -------
-    array, 1/m
-
-    Raises
-    ------
-    ValueError
-        If the rain rate is negative or not finite.
-
     Notes
     -----
     Drops are large against the wavelength: each takes twice its cross-section out of the beam. With
@@ -107,13 +85,7 @@ def rain_extinction_per_m(rain_rate_mm_h: ArrayLike) -> Any:
 
 
 def rain_visibility_m(rain_rate_mm_h: ArrayLike) -> Any:
-    """Return the visibility in rain: 3.912 / `rain_extinction_per_m`; infinite without rain.
-
-    Raises
-    ------
-    ValueError
-        If the rain rate is negative or not finite.
-    """
+    """Return the visibility in rain (m): 3.912 / `rain_extinction_per_m`; infinite without rain."""
     shape, (extinction,) = broadcast_flat(
         extinction=np.asarray(rain_extinction_per_m(rain_rate_mm_h))
     )
@@ -136,11 +108,6 @@ def combined_visibility_m(*visibility_m: ArrayLike) -> Any:
     -------
     array of the broadcast shape, m
         Infinite if nothing obscures.
-
-    Raises
-    ------
-    ValueError
-        If a visibility is 0, negative or NaN.
     """
     arrays = {}
     for number, value in enumerate(visibility_m):

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
+from components.messages.contributors import names_in
 from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray
@@ -119,11 +120,6 @@ def _line(one: Sighting) -> str:
     return f"{name}: azimuth {azimuth:.2f}°, elevation {elevation:.2f}°{range_m}, by {seen}"
 
 
-@lru_cache(maxsize=256)
-def _names_of(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
-
-
 def sightings_of(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
@@ -152,7 +148,7 @@ def sightings_of(
         fused.contributors.tolist(),
         strict=True,
     ):
-        sensors = _names_of(mask, fused.sensors)
+        sensors = names_in(mask, fused.sensors)
         if target < 0:
             false.append(Sighting("", p, q, r, sensors))
             continue

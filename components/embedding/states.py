@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.aircraft import Roster
 from components.arguments.checks import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
+from components.geometry import POSE_FIELDS
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import shown_value
@@ -106,23 +107,14 @@ def traffic_states(
         present[0] = there
         # Arithmetic on who is not there must be safe: far enough from us to have a direction.
         rows = np.where(there[:, np.newaxis], rows, own)
-    values = np.ascontiguousarray(rows.T)
-    own_values = own.reshape(6, 1)
-    lat_lon, own_lat_lon = np.degrees(values[:2]), np.degrees(own_values[:2])
+    # Rows (1,) of the ownship and (1, planes) of the others: a state's six numbers each.
+    own_values, values = own.T.copy(), rows.T.copy()[:, np.newaxis]
+    for angles in (own_values[:2], values[:2]):
+        np.degrees(angles, out=angles)
     return TrafficStates(
         tick=np.array([tick], dtype=np.int64),
-        own_lat_deg=own_lat_lon[0],
-        own_lon_deg=own_lat_lon[1],
-        own_alt_m=own_values[2],
-        own_yaw_rad=own_values[3],
-        own_pitch_rad=own_values[4],
-        own_roll_rad=own_values[5],
-        lat_deg=lat_lon[:1],
-        lon_deg=lat_lon[1:],
-        alt_m=values[2:3],
-        yaw_rad=values[3:4],
-        pitch_rad=values[4:5],
-        roll_rad=values[5:6],
+        **{f"own_{name}": row for name, row in zip(POSE_FIELDS, own_values, strict=True)},
+        **dict(zip(POSE_FIELDS, values, strict=True)),
         present=present,
         roster=roster,
         columns=np.arange(len(roster)) if chosen is None else np.array(chosen, dtype=np.int64),

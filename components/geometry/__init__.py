@@ -1,4 +1,8 @@
-"""Directions, rotations and the ellipsoid, as pure functions over arrays: import them from here."""
+"""Directions, rotations and the ellipsoid, as pure functions over arrays: import them from here.
+
+Arguments that are `array_like` broadcast together; NaN, infinity and shapes that do not fit raise
+ValueError. Those that are `ndarray` are not checked.
+"""
 
 from components.geometry.angles import (
     DEG_PER_RAD,
@@ -71,69 +75,4 @@ from components.geometry.sensor_axes import (
     sensor_angles_of_offsets,
     turned_variances,
 )
-from components.geometry.state import TrajectoryState
-
-__all__ = [
-    "DEG_PER_RAD",
-    "EARTH_MODELS",
-    "ECCENTRICITY_SQUARED",
-    "FLATTENING",
-    "LARGEST_OFFSET_M",
-    "RAD_PER_DEG",
-    "SEMI_MAJOR_AXIS_M",
-    "TWO_PI",
-    "FieldOfView",
-    "LineOfSight",
-    "SeenFromOwnship",
-    "TrajectoryState",
-    "Vector",
-    "angle_between",
-    "angle_between_vectors",
-    "angle_by_haversine",
-    "angle_of_chord",
-    "aspect_angles",
-    "azimuth_off_nose",
-    "body_angles",
-    "body_angles_unchecked",
-    "body_to_ned",
-    "chord_between",
-    "direction_angle",
-    "east_north_m",
-    "east_north_mps",
-    "enu_to_geodetic",
-    "geodesic_line_of_sight",
-    "heading_from_deg",
-    "line_of_sight",
-    "line_of_sight_in_target_axes",
-    "line_of_sight_ned",
-    "local_axes",
-    "longitude_difference_deg",
-    "longitude_difference_rounded",
-    "ned_to_body",
-    "ned_to_body_unchecked",
-    "normal_to_degrees",
-    "north_east_up",
-    "past",
-    "positive_turn",
-    "radii_of_curvature",
-    "relative_attitude",
-    "rising_sector",
-    "sector_width_rad",
-    "sensor_angles",
-    "sensor_angles_of_offsets",
-    "sine_and_cosine",
-    "slope_angle",
-    "spherical_from_enu",
-    "turn_axes",
-    "turned_variances",
-    "unit_vector",
-    "unit_vector_unchecked",
-    "unit_vectors",
-    "wrap_by_sines",
-    "wrap_difference_rad",
-    "wrap_heading_rad",
-    "wrap_longitude_deg",
-    "wrap_pi",
-    "wrap_pi_unchecked",
-    "wrap_two_pi",
-]  # fmt: skip
+from components.geometry.state import POSE_FIELDS, POSITION_FIELDS, TrajectoryState

@@ -18,17 +18,9 @@ RAD_PER_DEG = np.pi / 180.0
 
 
 def local_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector, Vector]:
-    """Give the unit vectors east, north and up of a place, in Earth-centred axes.
+    """Give the unit vectors east, north and up at a position (degrees), in Earth-centred axes.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg : ndarray
-        Degrees, one shape.
-
-    Returns
-    -------
-    east, north, up : tuple of three ndarray
-        Each the (x, y, z) components. Up is the ellipsoid normal.
+    Each is its (x, y, z) components; up is the ellipsoid normal.
     """
     lat, lon = lat_deg * RAD_PER_DEG, lon_deg * RAD_PER_DEG
     sin_lat, cos_lat, sin_lon, cos_lon = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
@@ -77,11 +69,6 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     ndarray
         The same shape, radians, reduced by the true 2 pi (not the double nearest to it), so that
         many turns lose nothing beyond what the input itself had lost.
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
     """
     angle = squarable("angle_rad", angle_rad)
     (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
@@ -119,23 +106,7 @@ def wrap_by_sines(angle: FloatArray) -> FloatArray:
 
 
 def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
-    """Wrap angles into [0, 2 pi); rounding never gives 2 pi itself.
-
-    Parameters
-    ----------
-    angle_rad : array_like
-        Any shape, radians.
-
-    Returns
-    -------
-    ndarray
-        The same shape, radians. An angle already there keeps its bits.
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
-    """
+    """Wrap radians of any size into [0, 2 pi), as `wrap_pi` does; rounding never gives 2 pi."""
     angle = squarable("angle_rad", angle_rad)
     flat = np.atleast_1d(angle)
     inside = (flat >= 0.0) & (flat < TWO_PI)
@@ -164,7 +135,7 @@ def wrap_longitude_deg(lon_deg: FloatArray) -> FloatArray:
     inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
     wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
     wrapped = np.where(inside, lon_deg, wrapped)
-    return np.where(wrapped >= 180.0, -180.0, np.where(wrapped < -180.0, -180.0, wrapped))
+    return np.where((wrapped >= 180.0) | (wrapped < -180.0), -180.0, wrapped)
 
 
 def wrap_difference_rad(angle: FloatArray) -> FloatArray:
@@ -247,18 +218,10 @@ def slope_angle(rise: FloatArray, run: FloatArray) -> FloatArray:
 
 
 def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
-    """Give arctan2(across, along), 0 where both are 0.
+    """Give arctan2(across, along), 0 where both are 0: as `slope_angle`, for all four quadrants.
 
-    Parameters
-    ----------
-    across, along : ndarray
-        Contiguous, of one shape, any unit; `along` is 0 or at least 1e-200 in size, `across`
-        below 1e100.
-
-    Returns
-    -------
-    ndarray
-        Radians in [-pi, pi], within 4e-16; in 0.6 of the time of arctan2.
+    Within 4e-16 rad, in [-pi, pi], in 0.6 of the time of arctan2; `along` is 0 or at least 1e-200
+    in size.
     """
     ahead = slope_angle(across, np.abs(along))
     backward = along < 0.0
@@ -286,11 +249,6 @@ def longitude_difference_deg(
     error_deg : ndarray
         What that rounding left out: modulo 360, `difference_deg + error_deg` is lon2 - lon1
         exactly. Below 1.5e-14 in size.
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
 
     Notes
     -----

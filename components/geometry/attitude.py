@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import common_shape, shaped, squarable
-from components.geometry.angles import sine_and_cosine, wrap_pi
+from components.geometry.angles import Vector, sine_and_cosine, wrap_pi
 from dsa_des.arrays.types import FloatArray
-
-Triple = tuple[FloatArray, FloatArray, FloatArray]
 
 # Nearer to straight up or down than this, the azimuth is nothing but rounding.
 _ZENITH_RAD = 4.0 * float(np.finfo(np.float64).eps)
@@ -30,7 +28,7 @@ def ned_to_body(
     yaw_rad: npt.ArrayLike,
     pitch_rad: npt.ArrayLike,
     roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Rotate a vector from the local NED frame into body axes.
 
     Parameters
@@ -45,11 +43,6 @@ def ned_to_body(
     x, y, z : ndarray
         Components along nose, right wing and down through the floor, the same unit. The length
         is kept to 1e-15 of itself, also there and back (measured 5e-16 and 6e-16).
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, arrays = checked(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
@@ -66,25 +59,19 @@ def body_to_ned(
     yaw_rad: npt.ArrayLike,
     pitch_rad: npt.ArrayLike,
     roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Rotate a vector from body axes into the local NED frame; undoes `ned_to_body`.
 
     Parameters
     ----------
     x, y, z : array_like
-        Components along nose, right wing and down through the floor, any unit.
+        Components along nose, right wing and down through the floor, any unit, which stays.
     yaw_rad, pitch_rad, roll_rad : array_like
-        The aircraft's attitude, ZYX. All six broadcast.
+        As for `ned_to_body`.
 
     Returns
     -------
     north, east, down : ndarray
-        The same unit.
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, (bx, by, bz, yaw, pitch, roll) = checked(
         x=x, y=y, z=z, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
@@ -97,7 +84,7 @@ def body_to_ned(
 
 
 @np.errstate(under="ignore")
-def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Triple:
+def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vector:
     """Give the unit vector of a direction, in NED.
 
     Parameters
@@ -109,11 +96,6 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Tri
     -------
     north, east, down : ndarray
         Length 1. From body angles instead of NED angles it gives x, y, z in body axes.
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
     """
     shape, arrays = checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
     north, east, down = shaped(shape, *unit_vector_unchecked(*arrays))
@@ -139,11 +121,6 @@ def body_angles(
     body_elevation_rad : ndarray
         Elevation above the plane of the wings, in [-pi/2, pi/2].
 
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
     Notes
     -----
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
@@ -161,33 +138,19 @@ def relative_attitude(
     target_yaw_rad: npt.ArrayLike,
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Find the target's attitude relative to the line of sight, angle by angle (thesis eq. 6).
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Absolute bearing and elevation of the line of sight, from the observer to the target.
-        (Eq. 6 as printed takes p and q, which contain the ownship's own attitude, so that the
-        aspect would change when we turn.)
-    target_yaw_rad, target_pitch_rad, target_roll_rad : array_like
-        The target's attitude, ZYX. All five broadcast.
+    A small-angle form of `line_of_sight_in_target_axes`, which has the same arguments: the sign of
+    the elevation is right only for a receding target, and roll shares its axis with elevation only
+    abeam. (Eq. 6 as printed takes p and q, which contain the ownship's own attitude, so that the
+    aspect would change when we turn.)
 
     Returns
     -------
     psi_rel_rad, theta_rel_rad, phi_rel_rad : ndarray
         yaw - azimuth (0 when it flies away from us), elevation - pitch and elevation - roll, all
         wrapped into (-pi, pi].
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
-    Notes
-    -----
-    A small-angle form: the sign of the elevation is right only for a receding target, and roll
-    shares its axis with elevation only abeam. `line_of_sight_in_target_axes` is exact.
     """
     shape, (azimuth, elevation, yaw, pitch, roll) = checked(
         azimuth_rad=azimuth_rad,
@@ -206,7 +169,7 @@ def line_of_sight_in_target_axes(
     target_yaw_rad: npt.ArrayLike,
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
-) -> Triple:
+) -> Vector:
     """Give the unit vector from the observer to the target in the target's body axes.
 
     Parameters
@@ -220,11 +183,6 @@ def line_of_sight_in_target_axes(
     -------
     u_x, u_y, u_z : ndarray
         Along the target's nose, right wing and down; (-1, 0, 0) when it flies straight at us.
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
 
     Notes
     -----
@@ -246,12 +204,7 @@ def aspect_angles(
 ) -> tuple[FloatArray, FloatArray]:
     """Find from which side the observer sees the target, exactly.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Absolute bearing and elevation of the line of sight, from the observer to the target.
-    target_yaw_rad, target_pitch_rad, target_roll_rad : array_like
-        The target's attitude, ZYX. All five broadcast.
+    Arguments and frames are those of `line_of_sight_in_target_axes`.
 
     Returns
     -------
@@ -260,15 +213,6 @@ def aspect_angles(
         the observer is off its right wing, pi from behind; in (-pi, pi].
     aspect_elevation_rad : ndarray
         Positive when the observer is above the plane of the target's wings; in [-pi/2, pi/2].
-
-    Raises
-    ------
-    ValueError
-        NaN, infinity, or shapes that do not fit.
-
-    Notes
-    -----
-    The remark on frames at `line_of_sight_in_target_axes` holds here too.
     """
     x, y, z = line_of_sight_in_target_axes(
         azimuth_rad, elevation_rad, target_yaw_rad, target_pitch_rad, target_roll_rad
@@ -276,13 +220,13 @@ def aspect_angles(
     return body_angles(-x, -y, -z)
 
 
-def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Triple:
+def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Vector:
     """`unit_vector` for arrays of finite doubles."""
     level = np.cos(elevation)
     return level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
 
 
-def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Triple:
+def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Vector:
     """`ned_to_body` for arrays of finite doubles."""
     level_x, level_y = turn_axes(n, e, yaw)
     z, x = turn_axes(d, level_x, pitch)

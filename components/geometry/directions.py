@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, unflatten
-from components.geometry.attitude import Triple, unit_vector_unchecked
+from components.geometry.angles import Vector
+from components.geometry.attitude import unit_vector_unchecked
 from dsa_des.arrays.types import FloatArray
 
 
@@ -38,11 +39,6 @@ def angle_between(
     -------
     array of the broadcast shape, rad
         In [0, pi].
-
-    Raises
-    ------
-    ValueError
-        If an angle is not finite.
     """
     shape, flat = broadcast_flat(
         first_azimuth_rad=angle("first_azimuth_rad", first_azimuth_rad),
@@ -66,17 +62,9 @@ def angle_by_haversine(
     other_azimuth_rad: FloatArray,
     other_elevation_rad: FloatArray,
 ) -> FloatArray:
-    """Give the angle between two directions by the haversine, accurate when it is small.
+    """Give the angle between two directions (rad, of one shape) by the haversine; NaN stays NaN.
 
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad, other_azimuth_rad, other_elevation_rad : ndarray
-        Directions in any one frame, rad, of one shape; not checked, NaN stays NaN.
-
-    Returns
-    -------
-    ndarray
-        Rad, in [0, pi]; near pi only half of the digits are right.
+    Accurate when it is small; near pi only half of the digits are right.
     """
     high = np.sin(0.5 * (elevation_rad - other_elevation_rad))
     wide = np.sin(0.5 * (azimuth_rad - other_azimuth_rad))
@@ -91,24 +79,13 @@ def unit_vectors(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArr
 
 
 def angle_between_vectors(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Give the angle between vectors, components along the last axis; accurate if small, too.
-
-    Parameters
-    ----------
-    one, other : ndarray
-        (..., 3), any length; not checked, NaN stays NaN.
-
-    Returns
-    -------
-    ndarray
-        (...), rad, in [0, pi].
-    """
+    """Give the angle (rad) between vectors (..., 3) of any length, accurate if small, too."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     apart: FloatArray = np.arctan2(across, (one * other).sum(axis=-1))
     return apart
 
 
-def chord_between(one: Triple, other: Triple) -> FloatArray:
+def chord_between(one: Vector, other: Vector) -> FloatArray:
     """Give the distance between the tips of two unit vectors, in [0, 2]."""
     x, y, z = (a - b for a, b in zip(one, other, strict=True))
     chord: FloatArray = np.sqrt(x * x + y * y + z * z)

@@ -95,16 +95,9 @@ def local_radii_offsets(
 def east_north_m(
     lat_rad: FloatArray, lon_rad: FloatArray, own_lat_rad: FloatArray, own_lon_rad: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a position in the plane that touches the sphere below the ownship.
+    """Return a position east and north of the ownship (m), all arrays of one shape.
 
-    Parameters
-    ----------
-    lat_rad, lon_rad, own_lat_rad, own_lon_rad : (n,)
-
-    Returns
-    -------
-    tuple of (n,)
-        East and north of the ownship, m.
+    In the plane that touches the sphere below the ownship.
     """
     away = lon_rad - own_lon_rad
     east = RADIUS_M * np.cos(lat_rad) * np.sin(away)
@@ -122,20 +115,10 @@ def east_north_mps(
     own_lat_rad: FloatArray,
     own_lon_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a velocity in the plane that touches the sphere below the ownship.
+    """Return a velocity (m/s) in the plane that touches the sphere below the ownship.
 
-    Parameters
-    ----------
-    lat_rad, lon_rad : (n,)
-        Where the aircraft is, the ownship itself too.
-    east_mps, north_mps : (n,)
-        Its velocity over ground there.
-    own_lat_rad, own_lon_rad : (n,)
-
-    Returns
-    -------
-    tuple of (n,)
-        East and north in the plane, m/s: the mean over the next ten seconds along a great circle.
+    Its position and its velocity over ground there are given, of one shape, the ownship itself too.
+    The result is the mean over the next ten seconds along a great circle.
     """
     track = np.arctan2(east_mps, north_mps)
     arc = _AHEAD_S * np.hypot(east_mps, north_mps) / RADIUS_M
@@ -340,16 +323,9 @@ class LineOfSight:
     def from_ownship(self, own: Any, other: Any) -> SeenFromOwnship:
         """Find where the ownship sees targets, in NED and in its body axes, without checks.
 
-        Parameters
-        ----------
-        own, other
-            Objects with ``lat_deg``, ``lon_deg`` and ``alt_m``, the ownship with ``yaw_rad``,
-            ``pitch_rad`` and ``roll_rad`` as well: finite doubles of one axis up that broadcast,
-            the targets' of the broadcast shape.
-
-        Returns
-        -------
-        SeenFromOwnship
+        Both have ``lat_deg``, ``lon_deg`` and ``alt_m``, the ownship ``yaw_rad``, ``pitch_rad`` and
+        ``roll_rad`` as well: finite doubles of one axis up that broadcast, the targets' of the
+        broadcast shape.
         """
         places = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
         attitude = own.yaw_rad, own.pitch_rad, own.roll_rad

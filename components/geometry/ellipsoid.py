@@ -135,18 +135,7 @@ def line_of_sight_ned(
 
 
 def radii_of_curvature(lat_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Find the radii of curvature of the WGS-84 ellipsoid at a latitude.
-
-    Parameters
-    ----------
-    lat_deg : array_like
-        Geodetic latitude, degrees.
-
-    Returns
-    -------
-    meridian_m, prime_vertical_m : ndarray
-        M (north-south) and N (east-west), metres, on the ellipsoid.
-    """
+    """Find the meridian and the prime vertical radius of WGS-84 (M and N, m) at a latitude."""
     sine = np.sin(np.asarray(lat_deg, dtype=np.float64, order="C") * RAD_PER_DEG)
     w_squared = 1.0 - ECCENTRICITY_SQUARED * sine * sine
     prime_vertical = SEMI_MAJOR_AXIS_M / np.sqrt(w_squared)
@@ -156,17 +145,9 @@ def radii_of_curvature(lat_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
 def spherical_from_enu(
     north: FloatArray, east: FloatArray, up: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Turn north, east, up offsets into azimuth in [0, 2 pi), elevation and range.
+    """Turn north, east, up offsets (m, one axis up) into azimuth, elevation and range.
 
-    Parameters
-    ----------
-    north, east, up : ndarray
-        Metres, broadcast, at least one axis.
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad, range_m : ndarray
-        Azimuth is 0 where there is no horizontal offset.
+    They broadcast; the azimuth is in [0, 2 pi), 0 where there is no horizontal offset.
     """
     if not north.shape == east.shape == up.shape:
         north, east, up = (np.ascontiguousarray(x) for x in np.broadcast_arrays(north, east, up))
@@ -189,10 +170,7 @@ def north_east_up(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Give the target's north, east and up offsets in m, without checks; see `line_of_sight_ned`.
 
-    Parameters
-    ----------
-    lat1, lon1, alt1, lat2, lon2, alt2 : ndarray
-        The observer and the target, in degrees and m: contiguous, at least one axis, in bounds.
+    Degrees and m, contiguous, at least one axis, in bounds.
     """
     e2 = ECCENTRICITY_SQUARED
     sin1, cos1 = np.sin(lat1 * RAD_PER_DEG), _cos_deg(lat1)

@@ -167,19 +167,9 @@ def sensor_angles_of_offsets(
 ) -> tuple[FloatArray, FloatArray]:
     """Find where in its own axes the ownship sees what lies at some offsets, without checks.
 
-    Parameters
-    ----------
-    north_m, east_m, up_m : ndarray
-        Offsets in the ownship's local frame, of the broadcast shape.
-    yaw_rad, pitch_rad, roll_rad : ndarray
-        The ownship's attitude, ZYX. All six are contiguous arrays of finite doubles, at least one
-        axis.
-
-    Returns
-    -------
-    body_azimuth_rad, body_elevation_rad : ndarray
-        As from `sensor_angles`, to the last digit or two; at a third to half of its cost, because
-        the direction need not be taken apart into angles first.
+    As `sensor_angles`, to the last digit or two, at a third to half of its cost: the direction need
+    not be taken apart into angles first. All are contiguous arrays of finite doubles, at least one
+    axis, the offsets (in the ownship's local frame) of the broadcast shape.
     """
     x, y = turn_axes(north_m, east_m, yaw_rad)
     z = 0.0 - up_m

@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 from dsa_des.arrays.types import FloatArray
 
+#: Where an aircraft is (WGS 84) and how it is turned, in the order of `TrajectoryState`.
+POSITION_FIELDS = ("lat_deg", "lon_deg", "alt_m")
+POSE_FIELDS = (*POSITION_FIELDS, "yaw_rad", "pitch_rad", "roll_rad")
+
 
 @dataclass(frozen=True)
 class TrajectoryState:
@@ -43,12 +47,4 @@ class TrajectoryState:
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Return the seven arrays in the order of the fields."""
-        return (
-            self.lat_deg,
-            self.lon_deg,
-            self.alt_m,
-            self.yaw_rad,
-            self.pitch_rad,
-            self.roll_rad,
-            self.present,
-        )
+        return tuple(getattr(self, name) for name in (*POSE_FIELDS, "present"))

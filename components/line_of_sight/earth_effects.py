@@ -8,17 +8,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.environment.tables import Terrain
-from components.geometry import SeenFromOwnship, sensor_angles
+from components.geometry import POSITION_FIELDS, SeenFromOwnship, sensor_angles
 from components.terrain.rays import (
     behind_terrain,
     behind_the_limb,
     bent_elevation_rad,
     miss_bound_m,
 )
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import BoolArray
 from dsa_des.block.effect import Effect, Hook, Verdict
-
-_PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 
 class Hides(Protocol):
@@ -62,16 +60,9 @@ class Limb(Effect[Hides]):
         """Return what tells which targets are behind the limb."""
         terrain = terrain_section(block)
         surface_m = terrain.height_m or 0.0
-
-        def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
-            return _of_present(
-                own, other, present,
-                lambda a, b: behind_the_limb(
-                    a, b, surface_m=surface_m, refraction=terrain.refraction
-                ),
-            )  # fmt: skip
-
-        return hides
+        return _of_present(
+            lambda a, b: behind_the_limb(a, b, surface_m=surface_m, refraction=terrain.refraction)
+        )
 
 
 class Mountains(Effect[Hides]):
@@ -99,16 +90,11 @@ class Mountains(Effect[Hides]):
         terrain = terrain_section(block)
         assert terrain.raster is not None
         raster = terrain.raster.raster
-
-        def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
-            return _of_present(
-                own, other, present,
-                lambda a, b: behind_terrain(
-                    a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
-                ),
-            )  # fmt: skip
-
-        return hides
+        return _of_present(
+            lambda a, b: behind_terrain(
+                a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
+            )
+        )
 
 
 class Refraction(Effect[Bends]):
@@ -147,17 +133,18 @@ class Refraction(Effect[Bends]):
 EARTH_EFFECTS = (Limb(), Mountains(), Refraction())
 
 
-def _of_present(
-    own: Any, other: Any, present: BoolArray, tell: Callable[[Any, Any], BoolArray]
-) -> BoolArray:
-    """Ask only for the targets that are there; the others count as not hidden."""
-    hidden = np.zeros(present.shape, dtype=bool)
-    here = np.nonzero(present)
-    if len(here[0]):
-        hidden[here] = tell(_flat(own, present, here), _flat(other, present, here))
-    return hidden
+def _of_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
+    """Return what asks of the targets that are there only; the others count as not hidden."""
 
+    def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
+        hidden = np.zeros(present.shape, dtype=bool)
+        here = np.nonzero(present)
+        if len(here[0]):
+            ends = (
+                tuple(np.broadcast_to(getattr(s, n), present.shape)[here] for n in POSITION_FIELDS)
+                for s in (own, other)
+            )
+            hidden[here] = hidden_of(*ends)
+        return hidden
 
-def _flat(state: Any, present: BoolArray, here: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
-    lat, lon, alt = (np.broadcast_to(getattr(state, name), present.shape)[here] for name in _PLACE)
-    return lat, lon, alt
+    return hides

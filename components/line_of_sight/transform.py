@@ -8,8 +8,19 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from components.geometry import LineOfSight, unit_vectors, wrap_pi_unchecked
-from components.line_of_sight.earth_effects import BENDS, EARTH_EFFECTS, HIDES
+from components.geometry import (
+    POSE_FIELDS,
+    POSITION_FIELDS,
+    LineOfSight,
+    unit_vectors,
+    wrap_pi_unchecked,
+)
+from components.line_of_sight.earth_effects import (
+    BENDS,
+    EARTH_EFFECTS,
+    HIDES,
+    terrain_section,
+)
 from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, true_reach_m
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
@@ -53,8 +64,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 
 def _straight(block: Any) -> str:
     """Say that rays are straight where the scene says so; nothing where they bend."""
-    terrain = block.context.sections.get("terrain")
-    bends = terrain is not None and terrain.refraction != "none"
+    bends = terrain_section(block).refraction != "none"
     return "" if bends else "[terrain] refraction is 'none': rays are straight"
 
 
@@ -139,9 +149,6 @@ REFRACTION = Ladder(
     applies=_straight,
 )  # fmt: skip
 
-
-_TURNED = ("yaw_rad", "pitch_rad", "roll_rad")
-_PLACE = ("lat_deg", "lon_deg", "alt_m", *_TURNED)
 
 # Cells worked on together: the two dozen arrays in flight then stay in the processor's cache,
 # which was measured to be three times faster than whole windows.
@@ -232,7 +239,7 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed={name: seen_once(v) for name, v in self._believed(states).items()},
-            own_attitude={name: getattr(states, f"own_{name}") for name in _TURNED},
+            own_attitude={name: getattr(states, f"own_{name}") for name in POSE_FIELDS[3:]},
             revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
         )
@@ -278,35 +285,35 @@ class Transform(Component):
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where all aircraft are then."""
         seen = self._as_seen(own, other, own.present & other.present)
-        places = {"target": {name: getattr(other, name) for name in _PLACE[:3]}}
+        places = {"target": {name: getattr(other, name) for name in POSITION_FIELDS}}
         return {
             **seen,
             **places,
-            "own": {name: getattr(own, name) for name in (*_PLACE, "present")},
+            "own": {name: getattr(own, name) for name in (*POSE_FIELDS, "present")},
         }
 
     def _believed(self, states: TrafficStates) -> dict[str, FloatArray]:
         """Return what the ownship believes of itself."""
         for belief in self._beliefs:
             return belief(states)
-        return {name: getattr(states, f"own_{name}") for name in _PLACE}
+        return {name: getattr(states, f"own_{name}") for name in POSE_FIELDS}
 
 
 def _block(state: Any, rows: slice) -> SimpleNamespace:
-    return SimpleNamespace(**{name: getattr(state, name)[rows] for name in _PLACE})
+    return SimpleNamespace(**{name: getattr(state, name)[rows] for name in POSE_FIELDS})
 
 
 def _beside_targets(states: TrafficStates) -> SimpleNamespace:
     """Return the ownship's position and attitude, broadcastable to the targets'."""
-    own = [getattr(states, f"own_{name}") for name in _PLACE]
+    own = [getattr(states, f"own_{name}") for name in POSE_FIELDS]
     if len(states) > 1:
         columns = [values[:, np.newaxis] for values in own]
-        return SimpleNamespace(**dict(zip(_PLACE, columns, strict=True)))
+        return SimpleNamespace(**dict(zip(POSE_FIELDS, columns, strict=True)))
     # Of a single row, arrays of the targets' own shape take NumPy half as long as broadcast ones.
     wide = np.empty((6, *states.lat_deg.shape))
     for row, values in zip(wide, own, strict=True):
         row[...] = values
-    return SimpleNamespace(**dict(zip(_PLACE, wide, strict=True)))
+    return SimpleNamespace(**dict(zip(POSE_FIELDS, wide, strict=True)))
 
 
 def _require_numbers(*angles: FloatArray) -> None:

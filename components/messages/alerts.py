@@ -29,18 +29,12 @@ class AlertLevels(Message):
 
     Parameters
     ----------
-    offsets : (rows + 1,)
     target : (entries,) of int
-    level : (entries,) of int
-        0 without an alert.
-    times : dict of (entries,)
-        ``time_to_level_1_s`` and so on: time to the volume of each level, NaN where it is not
-        met within the lookahead.
-    time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
-        The projected closest approach, in straight flight.
-    numbers : dict of (entries,)
-        ``track``: the tracker's own number, where tracks with states are believed. Their `target`
-        is the one they are nearest to, for whoever evaluates; -1 for none.
+        Index into the roster, -1 for none: of a tracker's states the target that they are nearest
+        to, for evaluation.
+    times, numbers : dict of (entries,)
+        Columns that are recorded where they are known: NaN is a level that is not met within the
+        lookahead; ``track`` is the tracker's own number.
     deviations : dict of (entries,)
         Standard deviations of the state, where they are known: ``position_m``, ``height_m``,
         ``velocity_mps``, ``climb_mps``.
@@ -49,7 +43,6 @@ class AlertLevels(Message):
         ``east_mps``, ``north_mps``, ``climb_mps``.
     own_motion : dict of (rows,)
         The ownship's ``alt_m``, ``east_mps``, ``north_mps``, ``climb_mps``; NaN where unknown yet.
-    roster : Roster
     """
 
     entry_table = "alerts"
@@ -79,19 +72,16 @@ class AlertLevels(Message):
         return found
 
     def contacts(self) -> IntArray:
-        """Return whom each entry is about, as those who look at a display know them, (entries,).
+        """Return the contact of each entry, as a display numbers it, (entries,).
 
-        The place of the target; where a tracker's states are believed, which know no targets,
+        The index of the target; where a tracker's states are believed, which know no targets,
         `TRACKS_FROM` and the track's number.
         """
         return TRACKS_FROM + self.numbers["track"] if "track" in self.numbers else self.target
 
 
 def contact_name(names: tuple[str, ...], contact: int) -> str | None:
-    """Return the name of a contact: of a target as the scene has it, else "track 7".
-
-    Empty for -1, none; None where there is no such target.
-    """
+    """Return a target's name, or "track 7"; empty for -1, None where there is no such target."""
     if contact >= TRACKS_FROM:
         return f"track {contact - TRACKS_FROM}"
     if contact < 0:
@@ -108,19 +98,8 @@ BAND_REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY", "UNKNOWN")
 class GuidanceBands(Message):
     """Bands of guidance at each instant with an alert; stretches that are clear are left out.
 
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-    band : (entries,) of int
-        Place in `BAND_KINDS`.
-    region : (entries,) of int
-        Place in `BAND_REGIONS`.
-    low_rad, high_rad : (entries,)
-        Directions over the ground from north, clockwise; NaN in other bands.
-    low_m, high_m : (entries,)
-        Altitudes; NaN in other bands.
-    low_mps, high_mps : (entries,)
-        Speeds over the ground; NaN in other bands.
+    Band and region are indices into `BAND_KINDS` and `BAND_REGIONS`; the bounds (radians, metres,
+    m/s) are NaN in bands of another kind.
     """
 
     entry_table = "bands"

@@ -1,5 +1,6 @@
 """Which sensors contributed to an entry: bit masks, and their names."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,12 +28,13 @@ def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
         codes = (np.cumsum(used > 0) - 1).take(contributors)
     else:
         masks, codes = np.unique(contributors, return_inverse=True)
-    names = tuple("+".join(_names_in(int(mask), sensors)) for mask in masks)
-    return Text(codes, names)
+    return Text(codes, tuple("+".join(names_in(int(mask), sensors)) for mask in masks))
 
 
-def _names_in(mask: int, sensors: tuple[str, ...]) -> list[str]:
-    return [name for i, name in enumerate(sensors) if mask >> i & 1]
+@lru_cache(maxsize=256)
+def names_in(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names behind one bit mask."""
+    return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
 
 
 def contributor_names(message: Any) -> Text:

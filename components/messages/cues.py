@@ -11,16 +11,11 @@ from dsa_des.block.message import Message, column
 
 @dataclass(eq=False)
 class CueCones(PositionAndVelocity, FrameOrigin, Message):
-    """Where targets are thought to be, at each instant at which that is told.
+    """Where targets are thought to be, at each instant at which it is reported.
 
     A sensor carries a cone with a range on with its velocity; one without keeps its direction. The
     axis is as the ownship saw it at `state_s`; the cone holds the target until `until_s`, both in s
     since the start of the run.
-
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-    track, azimuth_rad, elevation_rad, half_angle_rad, has_range, state_s, until_s : (entries,)
     """
 
     entry_table = "cues"

@@ -13,12 +13,10 @@ SHOWN, LOOKED, VERIFIED, REJECTED, TURN, CLIMB = range(6)
 
 
 class OperatorDecision(NamedTuple):
-    """One decision of an operator.
+    """One decision of an operator: its kind is an index into `KINDS`.
 
     Parameters
     ----------
-    kind : int
-        Place in `KINDS`.
     target : str
         Name of the target it is about; empty for none.
     turn_rad, climb_m : float
@@ -40,22 +38,14 @@ class Decisions(Message):
 
     Parameters
     ----------
-    decision : (rows,) of int
-        Place in `KINDS`.
-    target : (rows,) of int
-        Place in `targets`; -1 for none.
+    decision, target : (rows,) of int
+        Index into `KINDS` and into `targets`, -1 for none.
     turn_rad, climb_m : (rows,)
         0 for what is not such a manoeuvre.
-    level : (rows,) of int
-        Alert level of the target, as it had come to the operator.
-    alert_s, response_s : (rows,)
-        When that alert came, and how long ago; NaN without one.
+    alert_s, response_s, replaces_s : (rows,)
+        NaN without an alert, and where nothing was replaced.
     wall_time_s : (rows,)
-        By the wall clock, of a person's decision; it says nothing of the run, and a replay repeats
-        it.
-    replaces_s : (rows,)
-        When the command of the same kind was given that was still being flown; NaN without one.
-    targets : tuple of str
+        Of a person's decision, else NaN; a replay repeats it.
     """
 
     row_table = "decisions"

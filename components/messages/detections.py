@@ -213,12 +213,8 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
 
     Parameters
     ----------
-    scan : (rows,)
-        Scan number of the sensor's clock.
-    evaluated : (rows,)
-        Targets whose physics was evaluated.
     skipped : dict of (rows,)
-        Targets that were not, by reason.
+        Targets that were not evaluated, by reason.
     offsets : (rows + 1,)
         Entries ``offsets[i]:offsets[i + 1]`` belong to row i.
     target : (entries,) of int
@@ -226,19 +222,13 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     confidence : (entries,)
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
     extras : dict of (entries,)
-        Only those in `EXTRAS` are recorded; a subclass may declare more.
-        What the decision rested on, where a sensor has such a thing: ``snr_db``,
-        ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
-        detections to be declared (recorded as true where no rule is in force). A sweeping radar
-        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. A sensor
-        that is cued has ``cued``, whether the target lay in a cone. Where the
-        ownship's navigation errs, there is the line of sight in NED by what it believes of its
-        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``.
-    own_lat_deg, own_lon_deg, own_alt_m : (rows,), or None
-        Where the ownship believes to be at each scan (WGS 84); the truth where its navigation has
-        no error. None from a sensor that does not say.
-    own_heading_rad, own_pitch_rad, own_roll_rad : (rows,), or None
-        How it believes to be turned, NED to body (yaw-pitch-roll).
+        Those of `EXTRAS` that the sensor has; a subclass may declare more. ``declared`` is recorded
+        as true where no rule is in force; with ``illuminated_s`` all of the entry is of that
+        instant; ``ned_azimuth_rad`` and ``ned_elevation_rad`` are there where navigation errs.
+    own_lat_deg, own_lon_deg, own_alt_m, own_heading_rad, own_pitch_rad, own_roll_rad : (rows,)
+        The ownship's pose as it believes it to be at each scan (WGS 84; NED to body,
+        yaw-pitch-roll); the truth where its navigation has no error. None from a sensor that does
+        not say.
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
@@ -252,10 +242,10 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         sweeps. `measured_ticks` gives the instants in any case.
     told_by_target : dict of (entries,), or None
         What aircraft tell (`TOLD`): velocity over ground, along the axes of the horizon where the
-        ownship believes to be, and how much errs of it and of the place; NaN where nothing is told.
+        ownship believes to be, and how much errs of it and of the position; NaN where nothing is
+        told.
     looks : dict of (rows, targets), or None
         Every look at every target (`components.messages.looks`), where they are recorded.
-    roster : Roster
     """
 
     row_table = "scans"

@@ -1,7 +1,7 @@
 """Detections of what is not there: how they join a report, hide in it, and are left out."""
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from components.messages.columns import MEASURED
 from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
+from dsa_des.arrays.entries import offsets_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import PER_ENTRY, offsets_of
 
 #: Index into the roster of a detection without a target; it is recorded as null.
 FALSE_TARGET = -1
@@ -45,18 +45,15 @@ def add_false_detections(
 
     Parameters
     ----------
-    detections : Detections
     row : (alarms,) of int
         Row of `detections` that each false one belongs to, ascending.
     azimuth_rad, elevation_rad : (alarms,)
         As reported: ownship's body axes, on the sensor's grid.
     range_m, confidence : (alarms,) or one number
         NaN where the sensor has none.
-    extras : mapping of (alarms,) or one number
-        Columns of `Detections.extras`; those not given are NaN, or False where they hold truth
-        values.
-    measured : mapping of (alarms,) or one number
-        Range rate and variances (`MEASURED`), as for a target; those not given are NaN.
+    extras, measured : mapping of (alarms,) or one number
+        Columns of `Detections.extras`, and range rate and variances (`MEASURED`) as for a target;
+        those not given are NaN, or False where they hold truth values.
 
     Returns
     -------
@@ -106,15 +103,7 @@ def true_entries(message: AnyDetections) -> AnyDetections:
     """Return the same rows without false alarms; the message itself where it has none."""
     if np.count_nonzero(message.target < 0) == 0:
         return message
-    keep = np.flatnonzero(message.target >= 0)
-    rows = np.arange(len(message) + 1)
-    row = np.repeat(rows[:-1], np.diff(message.offsets))[keep]
-    kept: dict[str, Any] = {}
-    for item in fields(message):
-        if item.metadata.get("per") == PER_ENTRY:
-            values = getattr(message, item.name)
-            if isinstance(values, dict):
-                kept[item.name] = {name: column[keep] for name, column in values.items()}
-            elif values is not None:
-                kept[item.name] = values[keep]
-    return replace(message, offsets=offsets_of(row, len(rows) - 1), **kept)
+    kept = np.flatnonzero(message.target >= 0)
+    true = message.reordered(kept)
+    true.offsets = offsets_of(message.row_of_entries[kept], len(message))
+    return true

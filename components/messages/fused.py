@@ -28,8 +28,6 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
 
     Parameters
     ----------
-    offsets : (rows + 1,)
-    target : (entries,) of int
     contributors : (entries,) of int
         Bit i is set when ``sensors[i]`` contributed; of the type `mask_type` gives.
     angle_source, range_source : (entries,) of int
@@ -46,7 +44,6 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
         As `Detections` has it, of the sensor that the range is of; NaN where it is told nothing.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
-    roster : Roster
     sensors : tuple of str
         Those with range first, each group by name.
     """

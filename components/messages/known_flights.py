@@ -36,32 +36,19 @@ class AllFlights(Protocol):
         time_s: FloatArray,
         ahead_s: FloatArray | float,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of ownships and of targets.
+        """Return states of the ownships of some runs and of targets (`columns` of the roster).
 
-        Parameters
-        ----------
-        run, known : int, broadcastable to the times
-            Whose flights, and how many manoeuvres of the ownship count.
-        columns : int
-            Targets of the roster; with the times they give the shape of what is asked.
-        time_s : (rows, 1) or (rows, columns)
-            The states of the ownships are of this shape.
-        ahead_s : float
-            So long after what is known at a time: where positions are published at a rate of their
-            own, after the last publication.
+        Times are (rows, 1) or (rows, columns), and so are the ownships' states; `known` is how many
+        manoeuvres of the ownship count. `ahead_s` is how long after what is known at a time it is
+        asked: where positions are published at a rate of their own, after the last publication.
         """
 
 
 class KnownFlights:
     """The flights known at each row of a message, all of one traffic.
 
-    Parameters
-    ----------
-    flights : AllFlights
-    run, known : (rows,) of int
-        Of each row its run, and how many manoeuvres of the ownship it knows.
-    seen : callables
-        What makes of states what is seen of them, in turn.
+    Of each row its run, and how many manoeuvres of the ownship it knows, (rows,); `seen` are the
+    functions that are applied to the states in turn.
     """
 
     def __init__(

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.messages.columns import TrueLine
+from dsa_des.arrays.entries import entries_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, columns_of, instants_of
 
@@ -15,22 +16,13 @@ from dsa_des.block.message import Column, Columns, Message, Text, columns_of, in
 class Looks:
     """The looks behind the rows of a message, also those in which nothing was detected.
 
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-        Looks ``offsets[i]:offsets[i + 1]`` belong to row i.
-    sensor : (looks,) of int
-        Index into the message's ``sensors``.
-    age_ticks : (looks,) of int
-        How long before its row's tick each was made.
-    pose : (6, looks)
-        Of the ownship as believed then: `components.messages.detections.POSE`; NaN where the
-        sensor does not say.
+    Looks ``offsets[i]:offsets[i + 1]`` belong to row i.
     """
 
-    offsets: IntArray
-    sensor: IntArray
-    age_ticks: IntArray
+    offsets: IntArray  # (rows + 1,)
+    sensor: IntArray  # (looks,): index into the message's `sensors`
+    age_ticks: IntArray  # (looks,): how long before its row's tick each was made
+    # (6, looks): the ownship's, as believed then (`Detections`); NaN from a sensor without
     pose: FloatArray
 
     def __len__(self) -> int:
@@ -38,11 +30,7 @@ class Looks:
 
     def take_rows(self, rows: slice | IntArray) -> Self:
         """Return the looks of some rows."""
-        if isinstance(rows, slice):
-            rows = np.arange(*rows.indices(len(self)))
-        counts = (self.offsets[1:] - self.offsets[:-1])[rows]
-        offsets = np.concatenate(([0], np.cumsum(counts)))
-        which = np.repeat(self.offsets[rows] - offsets[:-1], counts) + np.arange(offsets[-1])
+        offsets, which = entries_of(self.offsets, rows)
         return type(self)(offsets, self.sensor[which], self.age_ticks[which], self.pose[:, which])
 
     @classmethod
@@ -89,27 +77,13 @@ class EveryLook(Message):
 
 
 def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
-    """Return a sensor's looks at all targets of the roster.
-
-    Parameters
-    ----------
-    cells : Cells
-        What was evaluated.
-    look : Look
-        What came of it.
-    scans : int
-
-    Returns
-    -------
-    dict of (scans, targets) arrays
-        Not evaluated: not ``detected``, and NaN.
-    """
+    """Return a sensor's looks at all targets, (scans, targets); NaN where not evaluated."""
     shape = (scans, len(cells.roster))
-    place = (cells.row, cells.target)
-    found: dict[str, AnyArray] = {}
+    cell = (cells.row, cells.target)
+    looks: dict[str, AnyArray] = {}
     for name, values in (("evaluated", True), ("detected", look.detected)):
-        found[name] = np.zeros(shape, dtype=bool)
-        found[name][place] = values
+        looks[name] = np.zeros(shape, dtype=bool)
+        looks[name][cell] = values
     known = {
         "true_azimuth_rad": cells.body_azimuth_rad,
         "true_elevation_rad": cells.body_elevation_rad,
@@ -118,10 +92,10 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
         **look.extras,
     }
     for name in _NUMBERS:
-        found[name] = np.full(shape, np.nan)
+        looks[name] = np.full(shape, np.nan)
         if name in known:
-            found[name][place] = known[name]
-    return found
+            looks[name][cell] = known[name]
+    return looks
 
 
 def look_columns(detections: Any) -> Columns:

@@ -84,13 +84,8 @@ class Reach:
     ) -> ReasonArray:
         """Return the reason why each target is skipped, or EVALUATE.
 
-        Parameters
-        ----------
-        body_azimuth_rad, body_elevation_rad, range_m, present : arrays of one shape
-            Body azimuth in (-pi, pi] and elevation, slant range, and whether the target is there;
-            finite.
-        hidden : array of that shape, optional
-            Whether Earth or ground stands before the target; nothing is hidden by default.
+        All arrays are of one shape and finite, the azimuth in (-pi, pi]; `hidden` says whether the
+        Earth or its ground stands before the target, by default nowhere.
         """
         if not self.enabled:
             return np.where(present, _OFF, _ABSENT)
@@ -160,20 +155,11 @@ def farthest_look(requests: Iterable[object]) -> FarthestLook:
 
 @dataclass(eq=False)
 class Decision:
-    """The decision for one sensor over the rows of a message.
+    """The decision for one sensor over the rows of a message."""
 
-    Parameters
-    ----------
-    rows : (scans,) of int
-        The message rows at which the sensor scans, ascending.
-    reason : (scans, targets) of uint8
-    count : int
-        How many rows the message has.
-    """
-
-    rows: IntArray
-    reason: ReasonArray
-    count: int
+    rows: IntArray  # (scans,): the message rows at which the sensor scans, ascending
+    reason: ReasonArray  # (scans, targets)
+    count: int  # Rows of the message
 
     def at(self, rows: IntArray) -> ReasonArray | None:
         """Return the reasons at some message rows; None where the sensor does not scan at one."""

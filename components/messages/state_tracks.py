@@ -73,7 +73,6 @@ class StateTracks(PositionAndVelocity, FrameOrigin, Message):
 
     Parameters
     ----------
-    offsets : (rows + 1,)
     track : (entries,) of int
         From 1, in the order in which tracks were started.
     track_status : (entries,) of int
@@ -81,10 +80,7 @@ class StateTracks(PositionAndVelocity, FrameOrigin, Message):
     covariance : dict of (entries,)
         Of the state of six in its order, by column (`COVARIANCE`); NaN without a range.
     contributors, updated_by : (entries,) of int
-        Sensors that ever updated it, and those of its last update, as in `FusedDetections`.
-    extras : dict of (entries,)
-        `EXTRAS`.
-    sensors : tuple of str
+        Bit masks of `sensors`, as in `FusedDetections`.
     nis, nis_freedom : (entries,)
         How far the detections that updated the track lay from what was expected, by the covariance
         of both: for each look 2 quantities, 3 with range, 4 with range rate. NaN where none did,

@@ -62,26 +62,9 @@ class Manoeuvre(NamedTuple):
 
 @dataclass(eq=False)
 class Manoeuvres(Message):
-    """Turns, climbs and changes of speed that the ownship is to fly, one per row.
+    """Turns, climbs and changes of speed that the ownship is to fly, one `Manoeuvre` per row.
 
-    Parameters
-    ----------
-    turn_rad : (rows,)
-        Change of heading, positive to the right; 0 for a climb or descent.
-    rate_rad_s : (rows,)
-        Rate of the turn, above 0 where there is one that has no bank.
-    climb_m : (rows,), optional
-        Change of altitude, positive upward; 0 for a turn, and by default.
-    climb_rate_mps : (rows,), optional
-        Vertical speed, above 0 where there is a climb or descent.
-    speed_mps, acceleration_mps2 : (rows,), optional
-        Change of ground speed, and how fast.
-    vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
-        Change of vertical speed, and how fast.
-    bank_rad, roll_rate_rad_s : (rows,), optional
-        Bank in place of the turn's rate, and how fast it is built up; 0 for neither.
-    heading_rad, eases_rad : (rows,), optional
-        Track that is turned to, and within how much of it the turn is eased; 0 for none.
+    All are (rows,) and 0 for what is not changed; those after `rate_rad_s` are 0 by default.
     """
 
     row_table = "manoeuvres"

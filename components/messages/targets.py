@@ -12,7 +12,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.geometry import TrajectoryState, line_of_sight_ned
+from components.geometry import (
+    POSE_FIELDS,
+    POSITION_FIELDS,
+    TrajectoryState,
+    line_of_sight_ned,
+)
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
@@ -28,10 +33,9 @@ _OWN_STEP_S = 1.0 / 64.0
 # Aircraft and instants worked on together.
 _AT_ONCE = 16384
 
-_PLACE = ("lat_deg", "lon_deg", "alt_m")
 _TURNED = {"yaw_rad": "heading_rad", "pitch_rad": "pitch_rad", "roll_rad": "roll_rad"}
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
-_NUMBERS = (*_PLACE, *_VELOCITY, *_TURNED.values())
+_NUMBERS = (*POSITION_FIELDS, *_VELOCITY, *_TURNED.values())
 
 
 @dataclass(eq=False)
@@ -57,20 +61,11 @@ class TrueStates(Message):
 def truth_columns(states: Any) -> Columns:
     """Return the ownship and every target that is there at each instant of a message.
 
-    Parameters
-    ----------
-    states : TrafficStates
-        With ``true_flights`` and ``run_time_s``. All targets of the roster count, whatever its
-        arrays hold.
-
-    Returns
-    -------
-    dict of columns
-        At each instant the ownship first (its ``target`` is null), then the targets as the roster
-        has them. Velocities are those of the path in the aircraft's own NED frame, from positions
-        1/1024 s before and after: good to 1e-5 m/s where the path has no kink in between, by
-        which they are the mean of both sides. Where an aircraft comes or goes, two positions on
-        the one side take their place.
+    At each instant the ownship first (its ``target`` is null), then the targets as the roster has
+    them, whatever the arrays of `states` hold. Velocities are those of the path in the aircraft's
+    own NED frame, from positions 1/1024 s before and after: good to 1e-5 m/s where the path has no
+    kink in between, by which they are the mean of both sides. Where an aircraft comes or goes, two
+    positions on the one side take their place.
     """
     count = len(states.roster)
     step = max(1, _AT_ONCE // (1 + count))
@@ -107,7 +102,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
         "tick": tick[row],
         "counts": np.bincount(row, minlength=len(tick)),
         "who": column - 1,
-        **{name: state[name][row, column] for name in _PLACE},
+        **{name: state[name][row, column] for name in POSITION_FIELDS},
         **{name: v[row, column] for name, v in zip(_VELOCITY, velocity, strict=True)},
         **{name: state[key][row, column] for key, name in _TURNED.items()},
     }
@@ -143,7 +138,7 @@ def _velocity(
 
 def _way(here: _State, there: _State) -> FloatArray:
     """Return where everybody is in one state, north, east and down of where they are in another."""
-    places = [*(here[name] for name in _PLACE), *(there[name] for name in _PLACE)]
+    places = [*(here[name] for name in POSITION_FIELDS), *(there[name] for name in POSITION_FIELDS)]
     return np.stack(line_of_sight_ned(*places, validate=False))
 
 
@@ -152,7 +147,7 @@ def _together(states: Any) -> dict[str, Any]:
     own, others = states
     return {
         name: np.concatenate([getattr(own, name), getattr(others, name)], axis=1)
-        for name in (*_PLACE, *_TURNED, "present")
+        for name in (*POSITION_FIELDS, *_TURNED, "present")
     }
 
 
@@ -211,18 +206,8 @@ class TrafficStates(Message):
         """Return the message of what an ownship and others fly; `more` are its other fields."""
         return cls(
             tick=tick,
-            own_lat_deg=own.lat_deg,
-            own_lon_deg=own.lon_deg,
-            own_alt_m=own.alt_m,
-            own_yaw_rad=own.yaw_rad,
-            own_pitch_rad=own.pitch_rad,
-            own_roll_rad=own.roll_rad,
-            lat_deg=others.lat_deg,
-            lon_deg=others.lon_deg,
-            alt_m=others.alt_m,
-            yaw_rad=others.yaw_rad,
-            pitch_rad=others.pitch_rad,
-            roll_rad=others.roll_rad,
+            **{f"own_{name}": getattr(own, name) for name in POSE_FIELDS},
+            **{name: getattr(others, name) for name in POSE_FIELDS},
             **more,
         )
 
@@ -253,15 +238,9 @@ class RelativeTargets(Message):
         The thesis's p and q: line of sight in the ownship's body axes; p in (-pi, pi].
     relative_heading_rad : (rows, targets)
         Target's heading minus bearing of the line of sight: 0 when it flies away from us.
-    target_pitch_rad, target_roll_rad : (rows, targets)
-    own_alt_m : (rows,)
-    alt_m : (rows, targets)
+    own_alt_m, alt_m : (rows,) and (rows, targets)
         Altitudes above the ellipsoid, for what changes with height.
-    present : (rows, targets) of bool
-    roster : Roster
-    columns : (targets,) of int
-        Which targets of the roster the arrays hold.
-    culled : (rows,) of int, or None
+    roster, columns, culled, present
         As in `TrafficStates`.
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
@@ -319,13 +298,7 @@ class RelativeTargets(Message):
 
 @dataclass(eq=False)
 class GatedTargets(RelativeTargets):
-    """Relative targets with the simulation decision for each sensor (thesis §3.4).
-
-    Parameters
-    ----------
-    decisions : dict of Decision
-        By sensor name.
-    """
+    """Relative targets with each sensor's simulation decision, by its name (thesis §3.4)."""
 
     decisions: dict[str, Decision] = per_row()
 
@@ -368,10 +341,10 @@ def _widened(part: Any, columns: IntArray) -> Any:
 
 
 def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
+    """Return the ownship's velocity over ground (north, east, down, m/s) at times of some rows.
 
-    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
-    by the position itself where the flight begins or ends between; NaN where no flights are known.
+    From positions 1/64 s before and after, of which one is replaced by the position itself where
+    the flight begins or ends between; NaN where no flights are known.
     """
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
@@ -382,10 +355,10 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
         {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
         for at in (time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S)
     ]
-    here = [own[0][name] for name in _PLACE]
+    here = [own[0][name] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(row))
     for there in own[1:]:
-        places = [there[name] for name in _PLACE]
+        places = [there[name] for name in POSITION_FIELDS]
         way = np.stack(line_of_sight_ned(*here, *places, validate=False))
         moved.append(np.where(there["present"], way, 0.0))
         span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)

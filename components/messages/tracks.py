@@ -22,16 +22,10 @@ class Tracks(MeasuredLine, Message):
 
     Parameters
     ----------
-    offsets : (rows + 1,)
-    target : (entries,) of int
-    age_s : (entries,)
-        Time since what is held was measured.
     contributors : (entries,) of int
         Sensors of the last update, as in `FusedDetections`.
-    roster : Roster
-    sensors : tuple of str
     measured_tick : (entries,) of int
-        When it was measured. By default the row's tick.
+        When what is held was measured. By default the row's tick.
     updated : (entries,) of bool
         Whether it came at this row's instant; others were held. By default what has no age.
     """
@@ -70,12 +64,6 @@ class Tracks(MeasuredLine, Message):
 
 @dataclass(eq=False)
 class TracksWithPose(Tracks):
-    """The same where navigation errs.
-
-    Parameters
-    ----------
-    own_of_entries : dict of (entries,)
-        The ownship's pose as it believed it to be when what is held was measured.
-    """
+    """The same where navigation errs: with the ownship's believed pose when each was measured."""
 
     own_of_entries: dict[str, FloatArray] = columns(ERRING_POSE, kw_only=True)

@@ -7,7 +7,7 @@ Pixels are counted from the upper left corner of the frame: pixel (row, column) 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,8 @@ from dsa_des.arrays.types import FloatArray, IntArray
 _SIDES = 32
 # Edges that are steeper than this across a row are taken at their middle: wrong by less than 1e-7.
 _STEEP = 1e-6
+# Pixels times edges that are worked on together: they stay in the cache.
+_AT_ONCE = 2**17
 #: A picture that turns farther from the optical axis than this has no plane to be drawn on.
 WIDEST_RAD = math.radians(170.0)
 
@@ -170,7 +172,9 @@ def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
         if len(kept) == 0:
             break
         inside = sense * _cross(end - start, kept - start)
-        following, after = np.roll(kept, -1, axis=0), np.roll(inside, -1)
+        # As np.roll by one does, in a fraction of its time.
+        following = np.concatenate([kept[1:], kept[:1]])
+        after = np.concatenate([inside[1:], inside[:1]])
         crosses = (inside >= 0.0) != (after >= 0.0)
         share = inside / np.where(crosses, inside - after, 1.0)
         met = kept + share[:, np.newaxis] * (following - kept)
@@ -192,31 +196,52 @@ def coverage(corners: FloatArray, rows: int, columns: int) -> FloatArray:
     simple polygon, in either sense.
     """
     picture: FloatArray = np.zeros((rows, columns))
-    corners = np.asarray(finite("corners", corners))
-    if len(corners) < 3:
-        return picture
-    low = np.clip(np.floor(corners.min(axis=0)), 0, (columns, rows)).astype(np.int64)
-    high = np.clip(np.ceil(corners.max(axis=0)), 0, (columns, rows)).astype(np.int64)
-    if (low >= high).any():
-        return picture
-    x0, y0 = (corners - low).T
-    x1, y1 = np.roll(x0, -1), np.roll(y0, -1)
-    row = np.arange(high[1] - low[1])[:, np.newaxis]
-    top, bottom = np.clip(y0, row, row + 1.0), np.clip(y1, row, row + 1.0)
-    rise = y1 - y0
-    slope = (x1 - x0) / np.where(rise == 0.0, 1.0, rise)
-    edge = np.arange(1.0, high[0] - low[0] + 1.0)[:, np.newaxis, np.newaxis]
-    begin, end = edge - (x0 + slope * (top - y0)), edge - (x0 + slope * (bottom - y0))
-    wide = end - begin
-    steep = np.abs(wide) < _STEEP
-    mean = np.where(
-        steep,
-        np.clip(0.5 * (begin + end), 0.0, 1.0),
-        (_ramp(end) - _ramp(begin)) / np.where(steep, 1.0, wide),
-    )
-    share = np.abs((mean * (bottom - top)).sum(axis=-1)).T
-    picture[low[1] : high[1], low[0] : high[0]] = np.clip(share, 0.0, 1.0)
+    for box, share in _coverages(np.asarray(corners)[np.newaxis], rows, columns):
+        picture[box] = share
     return picture
+
+
+def _coverages(
+    corners: FloatArray, rows: int, columns: int
+) -> Iterator[tuple[tuple[slice, slice], FloatArray]]:
+    """Yield the box in the picture round each polygon (count, n, 2), and its `coverage` there."""
+    corners = np.asarray(finite("corners", corners))
+    count, edges = corners.shape[:2]
+    if edges < 3:
+        return
+    low = np.clip(np.floor(corners.min(axis=1)), 0, (columns, rows)).astype(np.int64)
+    high = np.clip(np.ceil(corners.max(axis=1)), 0, (columns, rows)).astype(np.int64)
+    width, height = (high - low).max(axis=0).tolist()
+    at_once = max(1, _AT_ONCE // max(1, width * height * edges))
+    for first in range(0, count, at_once):
+        several = slice(first, first + at_once)
+        x0, y0 = np.moveaxis(corners[several] - low[several, np.newaxis], -1, 0)
+        x1, y1 = np.roll(x0, -1, axis=1), np.roll(y0, -1, axis=1)
+        row = np.arange(height)[:, np.newaxis]
+        top, bottom = (np.clip(y[:, np.newaxis], row, row + 1.0) for y in (y0, y1))
+        # Few edges pass through a row; the others hide nothing there.
+        polygon, met, edge = np.nonzero(bottom != top)
+        top, bottom = top[polygon, met, edge], bottom[polygon, met, edge]
+        x0, x1, y0, y1 = (each[polygon, edge] for each in (x0, x1, y0, y1))
+        slope = (x1 - x0) / (y1 - y0)
+        right = np.arange(1.0, width + 1.0)[:, np.newaxis]
+        begin, end = right - (x0 + slope * (top - y0)), right - (x0 + slope * (bottom - y0))
+        wide = end - begin
+        steep = np.abs(wide) < _STEEP
+        mean = np.where(
+            steep,
+            np.clip(0.5 * (begin + end), 0.0, 1.0),
+            (_ramp(end) - _ramp(begin)) / np.where(steep, 1.0, wide),
+        )
+        # Edges are summed up in their order, whatever their number in a row.
+        hidden = np.zeros((len(corners[several]), width, height, edges))
+        hidden[polygon, :, met, edge] = (mean * (bottom - top)).T
+        shares = np.clip(np.abs(hidden.sum(axis=-1)), 0.0, 1.0)
+        for share, (left, above), (beyond, below) in zip(
+            shares, low[several].tolist(), high[several].tolist(), strict=True
+        ):
+            box = slice(above, below), slice(left, beyond)
+            yield box, share[: beyond - left, : below - above].T
 
 
 def _ramp(u: FloatArray) -> FloatArray:
@@ -237,11 +262,14 @@ def union_coverage(
     one, other = outlines
     parts = ((1.0, one), (1.0, other), (-1.0, common_part(one, other)))
     steps = min(64, 1 + math.ceil(4.0 * float(np.hypot(*smear))))
+    moved = ((np.arange(steps) + 0.5) / steps - 0.5)[:, np.newaxis, np.newaxis] * smear
+    drawn = [
+        (sign, _coverages(part + moved, rows, columns)) for sign, part in parts if len(part) > 2
+    ]
     total: FloatArray = np.zeros((rows, columns))
-    for share in (np.arange(steps) + 0.5) / steps - 0.5:
-        for sign, part in parts:
-            if len(part) > 2:
-                total += sign * coverage(part + share * smear, rows, columns)
+    for boxes in zip(*(covered for _, covered in drawn), strict=True):
+        for (sign, _), (box, share) in zip(drawn, boxes, strict=True):
+            total[box] += sign * share
     return np.clip(total / steps, 0.0, 1.0)
 
 

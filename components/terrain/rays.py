@@ -37,13 +37,7 @@ _AXIS_RATIO = float(np.sqrt(1.0 - ECCENTRICITY_SQUARED))
 
 
 def share_of_curvature(refraction: str) -> float:
-    """Return the curvature of a level ray as a share of the Earth's.
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown.
-    """
+    """Return the curvature of a level ray as a share of the Earth's; ValueError if unknown."""
     if refraction not in REFRACTIONS:
         raise ValueError(
             f"refraction is {refraction!r}: it must be one of {', '.join(REFRACTIONS)}"
@@ -52,21 +46,10 @@ def share_of_curvature(refraction: str) -> float:
 
 
 def bent_elevation_rad(elevation_rad: Any, range_m: Any, refraction: str = "four_thirds") -> Any:
-    """Return the elevation at which a ray arrives whose chord rises by `elevation_rad`.
+    """Return the elevation (rad, at most pi/2) at which a ray arrives whose chord rises so much.
 
     The ray is an arc with a quarter of the Earth's curvature, less the steeper it is: it leaves
     its chord by D cos(elevation) / (8 R), 0.022° at 20 km.
-
-    Parameters
-    ----------
-    elevation_rad, range_m : array_like
-        Of the chord; they broadcast.
-    refraction : {"none", "four_thirds"}
-
-    Returns
-    -------
-    array, rad
-        At most pi/2.
     """
     share = share_of_curvature(refraction)
     bent = elevation_rad + (0.5 * share / MEAN_RADIUS_M) * range_m * np.cos(elevation_rad)
@@ -74,21 +57,10 @@ def bent_elevation_rad(elevation_rad: Any, range_m: Any, refraction: str = "four
 
 
 def dip_rad(height_m: Any, refraction: str = "none") -> Any:
-    """Return how far the horizon lies below the horizontal, seen from a height.
+    """Return how far the horizon lies below the horizontal (rad, 0 or more), from a height (m).
 
     acos(R' / (R' + h)) over a sphere of radius R' = R / (1 - share): 1.01° from 1000 m with
-    straight rays, 0.88° with those of the 4/3 Earth.
-
-    Parameters
-    ----------
-    height_m : array_like, m
-        Above the surface; 0 where it is below.
-    refraction : {"none", "four_thirds"}
-
-    Returns
-    -------
-    array, rad
-        0 or more.
+    straight rays, 0.88° with those of the 4/3 Earth; 0 from below the surface.
     """
     radius = MEAN_RADIUS_M / (1.0 - share_of_curvature(refraction))
     above = np.maximum(height_m, 0.0)
@@ -178,13 +150,7 @@ class Rays:
 
 
 def rays_between(own: Vector, other: Vector, refraction: str = "none") -> Rays:
-    """Return the rays between places, each three flat arrays: lat (deg), lon (deg), alt (m).
-
-    Parameters
-    ----------
-    own, other : three (n,) arrays
-    refraction : {"none", "four_thirds"}
-    """
+    """Return the rays between positions, each three (n,) arrays: lat (deg), lon (deg), alt (m)."""
     start = earth_centred(*own)
     end = earth_centred(*other)
     step = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
@@ -214,20 +180,10 @@ _POINTS_AT_ONCE = 1 << 17
 def behind_the_limb(
     own: Vector, other: Vector, *, surface_m: float = 0.0, refraction: str = "none"
 ) -> BoolArray:
-    """Tell which rays dip below a surface of one height above the ellipsoid.
+    """Tell which rays dip below a surface of one height above the ellipsoid (m; 0 for the sea).
 
-    Parameters
-    ----------
-    own, other : three (n,) arrays
-        Latitude (deg), longitude (deg), altitude (m) of both ends.
-    surface_m : float
-        Height of the surface above the ellipsoid, 0 for the sea.
-    refraction : {"none", "four_thirds"}
-
-    Returns
-    -------
-    (n,) of bool
-        An end below the surface is hidden from everywhere.
+    Both ends are three (n,) arrays: latitude (deg), longitude (deg), altitude (m). One below the
+    surface is hidden from everywhere.
     """
     rays = rays_between(own, other, refraction)
     return rays.lowest_height_m() < surface_m - _GRAZING_M
@@ -245,20 +201,8 @@ def behind_terrain(
 
     The ray's height over the ellipsoid is compared with the bilinear ground under it at points
     half a node's spacing apart, the ends left out. Beside the raster no ground is known, and
-    nothing hides.
-
-    Parameters
-    ----------
-    own, other : three (n,) arrays
-        Latitude (deg), longitude (deg), altitude (m) of both ends.
-    raster : ElevationRaster
-    offset_m : float
-        Height above the ellipsoid of the raster's zero.
-    refraction : {"none", "four_thirds"}
-
-    Returns
-    -------
-    (n,) of bool
+    nothing hides. Ends are as for `behind_the_limb`; `offset_m` is the height above the ellipsoid
+    of the raster's zero.
 
     Notes
     -----

@@ -181,14 +181,17 @@ def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Tab
 def _rows_of(table: "pa.Table", other: "pa.Table") -> IntArray:
     """Return the row of another table with the block, tick and replica of each row; -1 for none."""
     import numpy as np
+    import pyarrow as pa
 
     count = len(table)
     keys = np.zeros(count + len(other), dtype=np.int64)
     for name in ("replica", "tick", "block"):
         if name in other.column_names:
-            both = np.concatenate([part[name].to_numpy() for part in (table, other)])
-            values, place = np.unique(both, return_inverse=True)
-            keys = keys * len(values) + place
+            kind = table.schema.field(name).type
+            plain = kind.value_type if pa.types.is_dictionary(kind) else kind
+            chunks = [c for part in (table, other) for c in part[name].cast(plain).chunks]
+            codes = pa.chunked_array(chunks, plain).combine_chunks().dictionary_encode()
+            keys = keys * len(codes.dictionary) + codes.indices.to_numpy()
     mine, theirs = keys[:count], keys[count:]
     if not len(theirs):
         return np.full(count, -1, dtype=np.int64)

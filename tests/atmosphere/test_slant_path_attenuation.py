@@ -65,7 +65,7 @@ def test_gas_path_is_exact_for_its_table(own, target, ends):
 
 def mean_of_table(own, target):
     """Return the mean over altitude of the piecewise linear table, constant beyond its ends."""
-    gas, step = CLEAR.gas_db_km, 25
+    gas, step = CLEAR.gas[0], 25
     cumulative = [mpmath.mpf(0)]
     for below, above in pairwise(gas):
         cumulative.append(cumulative[-1] + (mpmath.mpf(float(below)) + float(above)) / 2)
