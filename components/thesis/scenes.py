@@ -5,7 +5,7 @@ Nothing here changes a value: every item takes one sensor's parameters from the 
 
 import csv
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -132,9 +132,9 @@ def flights_of(simulation: Simulation) -> Flights:
     return result
 
 
-def scene(name: str, *sets: str) -> Scene:
+def scene(name: str, *sets: str, swaps: Sequence[str] = ()) -> Scene:
     """Load a scene of ``configs``, for example ``thesis/fig_4_14``, with values set."""
-    return load_scene(configs() / f"{name}.toml", sets=sets)
+    return load_scene(configs() / f"{name}.toml", sets=sets, swaps=swaps)
 
 
 def run(loaded: Scene) -> SceneRun:

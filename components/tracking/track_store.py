@@ -137,6 +137,27 @@ def tracks_after(
     return store.take(mine).with_columns(look=looks[index], row=rows[index])
 
 
+#: Columns that no message shows.
+_UNSHOWN = {"history", "looks", "misses", "misdetections", "seen", "seen_tick"}
+
+
+def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
+    """Return what is shown of all tracks by row; component by component, which stays in caches."""
+    parts = [part.columns for part in reported if len(part)] or [reported[0].columns]
+    row = np.concatenate([part["row"] for part in parts])
+    if len(parts) == 1 and not bool((row[1:] < row[:-1]).any()):
+        return TrackStore(**parts[0])
+    order = np.argsort(row, kind="stable")
+    columns = {}
+    for name in parts[0].keys() - _UNSHOWN:
+        first = parts[0][name]
+        columns[name] = whole = np.empty((*first.shape[:-1], len(order)), first.dtype)
+        for i in np.ndindex(first.shape[:-1]):
+            joined = np.concatenate([part[name][i] for part in parts])
+            joined.take(order, out=whole[i], mode="clip")  # "clip" needs no buffer
+    return TrackStore(**columns)
+
+
 def state_tracks(
     reported: Sequence[TrackStore],
     poses: SensorPose,
@@ -154,9 +175,7 @@ def state_tracks(
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty
-    tracks = TrackStore.joined(reported)
-    if bool((tracks.row[1:] < tracks.row[:-1]).any()):
-        tracks = tracks.take(np.argsort(tracks.row, kind="stable"))
+    tracks = _by_row(reported)
     state, covariance = combined(tracks.estimates())
     own, origin = selected(poses.position_m, tracks.look), selected(origin, tracks.look)
     away = state[:3] - own

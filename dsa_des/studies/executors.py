@@ -18,6 +18,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import is_ours
 from dsa_des.errors import UsageError
 from dsa_des.studies.attempts import Attempts, Piece
 from dsa_des.studies.chunk import Done, run_chunk
@@ -192,8 +194,15 @@ def _new_pool(study: Study) -> ProcessPoolExecutor:
     method = "forkserver" if "forkserver" in methods else "spawn"
     context = multiprocessing.get_context(method)
     if method == "forkserver":  # what all workers need is imported once
-        context.set_forkserver_preload(["dsa_des.studies.executors"])
+        context.set_forkserver_preload(["dsa_des.studies.executors", *_our_modules(study)])
     return ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker, initargs=(study,))
+
+
+def _our_modules(study: Study) -> list[str]:
+    """Return the modules of a study's blocks that belong to this program."""
+    ours = {point.module.partition(".")[0] for point in registered().values() if is_ours(point)}
+    modules = {block.cls.__module__ for block in study.scene(0).blocks.values()}
+    return sorted(name for name in modules if name.partition(".")[0] in ours)
 
 
 #: What a worker runs chunks of: sent once, when it starts.

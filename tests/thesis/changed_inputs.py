@@ -71,8 +71,8 @@ def rewrite(monkeypatch: Any, apply: Callable[[Path, SceneFile], None]) -> None:
         apply(path, scene_file)
         return scene_file
 
-    def load(path: Path, sets: Any = ()) -> Any:
-        return load_tables(read(path), sets=sets, swaps=(), seed=None, duration_s=None)
+    def load(path: Path, sets: Any = (), swaps: Any = ()) -> Any:
+        return load_tables(read(path), sets=sets, swaps=swaps, seed=None, duration_s=None)
 
     monkeypatch.setattr(scenes, "read_scene_file", read)
     monkeypatch.setattr(scenes, "load_scene", load)
