@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, finite, not_negative, positive, unflatten
-from components.atmosphere.standard_atmosphere import standard_atmosphere
+from components.atmosphere.standard_atmosphere import (
+    SEA_LEVEL_VAPOUR_DENSITY_G_M3,
+    VAPOUR_SCALE_HEIGHT_KM,
+    standard_atmosphere,
+)
 from components.atmosphere.visibility import KOSCHMIEDER
 from dsa_des.arrays.types import FloatArray
 
@@ -16,7 +20,7 @@ BANDS = {"mwir": (3.0, 5.0), "lwir": (8.0, 12.0)}
 """Wavelengths of the bands, µm."""
 
 _VISIBLE_UM = 0.55
-_VAPOUR_SCALE_HEIGHT_M = 2000.0  # of Recommendation ITU-R P.835
+_VAPOUR_SCALE_HEIGHT_M = 1e3 * VAPOUR_SCALE_HEIGHT_KM
 
 # Langer's windows: from, to (µm), A, k, beta and the precipitable water w0 (mm) where the weak
 # law exp(-A sqrt(w)) becomes the strong one k (w0 / w)^beta.
@@ -41,7 +45,7 @@ def precipitable_water_mm(
     range_m: ArrayLike,
     own_alt_m: ArrayLike,
     target_alt_m: ArrayLike,
-    sea_level_vapour_density_g_m3: ArrayLike = 7.5,
+    sea_level_vapour_density_g_m3: ArrayLike = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
 ) -> Any:
     """Return the water vapour along a straight path, as the depth of the water it would make.
 
@@ -149,7 +153,7 @@ def long_wave_transmission(
     range_m: ArrayLike,
     own_alt_m: ArrayLike,
     target_alt_m: ArrayLike,
-    sea_level_vapour_density_g_m3: float = 7.5,
+    sea_level_vapour_density_g_m3: float = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
 ) -> Any:
     """Return the share of 8-12 µm light that clear air leaves, the mean over the band.
 

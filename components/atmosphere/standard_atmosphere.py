@@ -40,7 +40,7 @@ SEA_LEVEL_VAPOUR_DENSITY_G_M3 = 7.5
 
 _EARTH_RADIUS_KM = 6356.766
 _HYDROSTATIC_K_PER_KM = 34.1632
-_VAPOUR_SCALE_HEIGHT_KM = 2.0
+VAPOUR_SCALE_HEIGHT_KM = 2.0
 _SMALLEST_MIXING_RATIO = 2e-6
 
 
@@ -91,7 +91,7 @@ def standard_atmosphere(
         ),
     )
     pressure = layers["base_pressure_hpa"][layer] * fall
-    vapour = sea_level_vapour * np.exp(-height_km / _VAPOUR_SCALE_HEIGHT_KM)
+    vapour = sea_level_vapour * np.exp(-height_km / VAPOUR_SCALE_HEIGHT_KM)
     driest = _SMALLEST_MIXING_RATIO * pressure * 216.7 / temperature
     vapour = np.where(sea_level_vapour > 0.0, np.maximum(vapour, driest), 0.0)
     return unflatten(pressure, shape), unflatten(temperature, shape), unflatten(vapour, shape)

@@ -1,4 +1,4 @@
-"""A scene with the host program in the place of its traffic."""
+"""A scene with the host program in place of its traffic."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -27,15 +27,7 @@ def load_for_host(
     swaps: Iterable[str] = (),
     seed: int | None = None,
 ) -> Scene:
-    """Return a scene, read from a file or as it is, that has a traffic block.
-
-    Raises
-    ------
-    SceneError
-        With every problem found.
-    UsageError
-        If a scene that was loaded already is to be changed.
-    """
+    """Return a scene, from a file or as it is, that has a traffic block; SceneError, UsageError."""
     if isinstance(scene, Scene):
         if tuple(sets) or tuple(swaps):
             raise UsageError("sets and swaps change a scene while it is loaded: give its file")
@@ -71,13 +63,7 @@ _NEEDS_FLIGHTS: dict[str, bool | str] = {
 
 
 def refuse_other_instants(scene: Scene) -> None:
-    """Refuse sensors that ask where aircraft are between the calls of a host.
-
-    Raises
-    ------
-    SceneError
-        With a problem for each key.
-    """
+    """Raise SceneError for sensors that ask for flights between a host's calls, key by key."""
     problems = [
         Problem(
             str(scene.path), f"blocks.{name}.{key}",
@@ -98,19 +84,17 @@ def _written(value: bool | str) -> str:
 
 
 def source_of(scene: Scene) -> str:
-    """Return the name of the block that the host replaces.
-
-    Raises
-    ------
-    SceneError
-        If no block, or more than one, sends traffic.
-    """
-    found = [name for name, block in scene.blocks.items() if _is_traffic(block.cls)]
-    if len(found) != 1:
-        what = f"{len(found)} blocks send traffic ({', '.join(found)})" if found else "no traffic"
+    """Return the name of the one block that sends traffic, for the host; SceneError if not one."""
+    sources = [name for name, block in scene.blocks.items() if _is_traffic(block.cls)]
+    if len(sources) != 1:
+        what = (
+            f"{len(sources)} blocks send traffic ({', '.join(sources)})"
+            if sources
+            else "no traffic"
+        )
         message = f"{what}: a host takes the place of exactly one"
         raise SceneError([Problem(str(scene.path), "blocks", message)])
-    return found[0]
+    return sources[0]
 
 
 def planes_known_to(scene: Scene) -> list[Plane]:

@@ -105,11 +105,11 @@ class FixedPath:
 
     def at(self, time_s: float) -> FloatArray:
         """Return lat, lon, alt, yaw, pitch, roll; before the first time the plane is absent."""
-        place = int(np.searchsorted(self._times, time_s, side="right")) - 1
+        row = int(np.searchsorted(self._times, time_s, side="right")) - 1
         if len(self._times) == 1:
-            place = 0
-        row: FloatArray = self._rows[place] if place >= 0 else np.full(6, np.nan)
-        return row
+            row = 0
+        state: FloatArray = self._rows[row] if row >= 0 else np.full(6, np.nan)
+        return state
 
 
 def _rows(label: str, value: ArrayLike) -> FloatArray:
@@ -122,13 +122,7 @@ def _rows(label: str, value: ArrayLike) -> FloatArray:
 
 
 def number_of(plane: str | int, names: tuple[str, ...]) -> int:
-    """Return the number of a plane by its name or its number.
-
-    Raises
-    ------
-    ValueError
-        If there is none of this name or number.
-    """
+    """Return the number of a plane by its name or its number; ValueError if there is none."""
     if isinstance(plane, str):
         if plane not in names:
             raise ValueError(f"there is no plane {plane!r}{did_you_mean(plane, names)}")

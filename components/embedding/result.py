@@ -125,12 +125,7 @@ def sightings_of(
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
     """Return what was detected, by index in the roster, and the false alarms.
 
-    Parameters
-    ----------
-    fused : FusedDetections, one row, or None
-        None when no sensor reported.
-    detections : mapping of Detections
-        What each sensor reported in this call, one row each.
+    From one row of each message of a call; `fused` is None when no sensor reported.
     """
     seen: dict[int, Sighting] = {}
     false: list[Sighting] = []

@@ -255,18 +255,18 @@ class Simulator:
         return HostDriven(with_host(self.scene, self._planes), self._source, self._wanted)
 
     def _only_fusion(self) -> str:
-        found = [
+        fusions = [
             name
             for name, block in self.scene.blocks.items()
             if any(issubclass(out.message, FusedDetections) for out in block.cls.outputs.values())
         ]
-        if len(found) != 1:
+        if len(fusions) != 1:
             message = (
-                f"{len(found)} blocks fuse detections: a host is told what exactly one says, for "
+                f"{len(fusions)} blocks fuse detections: a host is told what exactly one says, for "
                 'example of type "fusion.pick_best"'
             )
             raise SceneError([Problem(str(self.scene.path), "blocks", message)])
-        return found[0]
+        return fusions[0]
 
     def _rehearse(self, chain: HostDriven) -> None:
         """Let every sensor look at every plane once, from near enough to take it seriously."""
@@ -286,9 +286,9 @@ class Simulator:
     ) -> Any:
         """Return the rows of all planes: what the host said, and the fixed ones."""
         rows = np.empty((len(planes_asked), 6))
-        for place, number in enumerate(planes_asked):
+        for row, number in enumerate(planes_asked):
             fixed = self._fixed.get(number)
-            rows[place] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
+            rows[row] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
         return rows
 
     def _result(self, step: Step, planes_asked: Sequence[int], ticks_per_s: int) -> EncounterResult:

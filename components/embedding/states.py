@@ -13,7 +13,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import shown_value
 
 _NAMES = ("latitude", "longitude", "altitude", "yaw", "pitch", "roll")
-# A latitude of 90° that came through radians may be a last place above pi/2.
+# A latitude of 90° that came through radians may be a last digit above pi/2.
 _LOW = np.array([-math.pi / 2, -LARGEST, LOWEST_ALTITUDE_M, -LARGEST, -LARGEST, -LARGEST])
 _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LARGEST])
 
@@ -32,29 +32,12 @@ def numbers_in(label: str, value: object) -> FloatArray:
 def checked_rows(
     who: str, lla: ArrayLike, att: ArrayLike, count: int, *, missing: bool = True
 ) -> FloatArray:
-    """Return latitude, longitude, altitude, yaw, pitch, roll as rows, checked.
+    """Return latitude, longitude, altitude, yaw, pitch, roll as rows (count, 6), checked.
 
-    Parameters
-    ----------
-    who : str
-        ``ownship`` or ``intruder``, for messages.
-    lla : (count, 3) array_like
-        Rad, rad, m; (3,) for one row; anything empty for none.
-    att : (count, 3) array_like, rad
-    count : int
-        Rows expected.
-    missing : bool
-        Whether a row may be NaN, all of its position: that plane is not there.
-
-    Returns
-    -------
-    (count, 6) array
-        Rows that are not there are NaN throughout.
-
-    Raises
-    ------
-    ValueError
-        If a shape does not fit or a number is out of range.
+    `lla` (rad, rad, m) and `att` (rad) are (count, 3), (3,) for one row, and anything empty for
+    none; `who` names them in messages. With `missing` a row may be NaN, all of its position: that
+    plane is not there, and its row is NaN throughout. ValueError if a shape does not fit or a
+    number is out of range.
     """
     rows = np.empty((count, 6))
     for label, value, columns in (
@@ -75,11 +58,11 @@ def checked_rows(
         if len(wrong):
             row, column = wrong[0].tolist()
             label = f"{'lla' if column < 3 else 'att'}_{who}"
-            place = f" of row {row}" if count > 1 else ""
+            which = f" of row {row}" if count > 1 else ""
             low, high = _LOW[column], _HIGH[column]
             unit = "m" if column == 2 else "rad"
             raise ValueError(
-                f"{label}: {_NAMES[column]}{place} is {rows[row, column]:g}: it must lie in "
+                f"{label}: {_NAMES[column]}{which} is {rows[row, column]:g}: it must lie in "
                 f"[{low:g}, {high:g}] {unit}"
             )
         rows[absent] = np.nan
@@ -89,17 +72,9 @@ def checked_rows(
 def traffic_states(
     own: FloatArray, rows: FloatArray, tick: int, roster: Roster, chosen: list[int] | None
 ) -> TrafficStates:
-    """Return the traffic message of one instant.
+    """Return the traffic message of one instant, from rows of `checked_rows`.
 
-    Parameters
-    ----------
-    own : (1, 6) array
-        From `checked_rows`.
-    rows : (planes, 6) array
-    tick : int
-    roster : Roster
-    chosen : list of int or None
-        Which planes of the roster the rows are; None for all.
+    `chosen` are the planes of the roster that the rows are; None for all.
     """
     present = np.ones((1, len(rows)), dtype=bool)
     there = rows[:, 0] == rows[:, 0]

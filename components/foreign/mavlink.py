@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
-from components.geometry import enu_to_geodetic, line_of_sight_ned
+from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
@@ -266,11 +266,11 @@ def _flying(
         places = [
             np.atleast_1d(getattr(state, f"{prefix}{name}")[k])
             for state in (before, now)
-            for name in ("lat_deg", "lon_deg", "alt_m")
+            for name in POSITION_FIELDS
         ]
         return np.concatenate(line_of_sight_ned(*places)) / elapsed_s
 
-    places = [float(getattr(now, f"own_{name}")[0]) for name in ("lat_deg", "lon_deg", "alt_m")]
+    places = [float(getattr(now, f"own_{name}")[0]) for name in POSITION_FIELDS]
     turned = (float(getattr(now, f"own_{name}_rad")[0]) for name in ("yaw", "pitch", "roll"))
     own = Flying(0, "", *places, *moved("own_", 0).tolist(), *turned)
     at = {number: k for k, number in enumerate(before.columns.tolist())}
@@ -278,7 +278,7 @@ def _flying(
     for k, number in enumerate(now.columns.tolist()):
         if not now.present[0, k]:
             continue
-        place = [float(getattr(now, name)[0, k]) for name in ("lat_deg", "lon_deg", "alt_m")]
+        place = [float(getattr(now, name)[0, k]) for name in POSITION_FIELDS]
         if k == at.get(number) and before.present[0, k]:
             speeds = moved("", (0, k)).tolist()
             others.append(Flying(number + 1, now.roster.names[number], *place, *speeds))

@@ -9,6 +9,7 @@ import numpy as np
 
 from components.embedding.result import EncounterResult
 from components.embedding.simulator import Simulator
+from components.geometry import POSE_FIELDS
 from components.messages.detections import Detections
 from dsa_des.time.clock import parse_rational
 
@@ -19,7 +20,6 @@ except ImportError as error:
         "mosaik needs mosaik-api-v3: install it with  pip install 'dsa-des[mosaik]'"
     ) from error
 
-_PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 _SEEN = ("azimuth_rad", "elevation_rad", "range_m", "sensors")
 _PLANE = ("name", "aircraft", "rcs_dbsm", "swerling", "eo", "ir", "contrast", "contrast_ir")
 
@@ -38,8 +38,8 @@ class ChainOfMosaik(MosaikApi):
 
     def __init__(self) -> None:
         models: dict[str, Any] = {
-            "Ownship": {"public": True, "params": [], "attrs": [*_PLACE, "detections"]},
-            "Plane": {"public": True, "params": [*_PLANE], "attrs": [*_PLACE, *_SEEN]},
+            "Ownship": {"public": True, "params": [], "attrs": [*POSE_FIELDS, "detections"]},
+            "Plane": {"public": True, "params": [*_PLANE], "attrs": [*POSE_FIELDS, *_SEEN]},
         }
         super().__init__({"type": "time-based", "models": models})
         self._ownship: str | None = None
@@ -142,8 +142,8 @@ def _place(entity: str, inputs: Mapping[str, Any]) -> list[float]:
         if len(by_source) != 1:
             raise ValueError(f"{entity}.{name} has {len(by_source)} sources: one is needed")
         values[name] = float(next(iter(by_source.values())))
-    there = [values.get(name, math.nan) for name in _PLACE[:3]]
-    turned = [values.get(name, 0.0) for name in _PLACE[3:]]
+    there = [values.get(name, math.nan) for name in POSE_FIELDS[:3]]
+    turned = [values.get(name, 0.0) for name in POSE_FIELDS[3:]]
     return [*(_angle_of(value) for value in there[:2]), there[2], *turned]
 
 

@@ -317,8 +317,8 @@ class LineOfSight:
         alt_m: Any,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Find azimuth, elevation and slant range in the NED frame, as `line_of_sight` does."""
-        places = own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m
-        return self._in_ned(places, validate=True)
+        coordinates = own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m
+        return self._in_ned(coordinates, validate=True)
 
     def from_ownship(self, own: Any, other: Any) -> SeenFromOwnship:
         """Find where the ownship sees targets, in NED and in its body axes, without checks.
@@ -327,24 +327,24 @@ class LineOfSight:
         ``roll_rad`` as well: finite doubles of one axis up that broadcast, the targets' of the
         broadcast shape.
         """
-        places = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
+        coordinates = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
         attitude = own.yaw_rad, own.pitch_rad, own.roll_rad
         if self._offsets is None or self.attitude != "exact":
-            seen = self._in_ned(places, validate=False)
+            seen = self._in_ned(coordinates, validate=False)
             body = sensor_angles(*seen[:2], *attitude, model=self.attitude, validate=False)
             return SeenFromOwnship(*seen, *body)
         with np.errstate(under="ignore"):  # what is too small for a double is zero
-            offsets = self._offsets(*places)
+            offsets = self._offsets(*coordinates)
             return SeenFromOwnship(
                 *spherical_from_enu(*offsets), *sensor_angles_of_offsets(*offsets, *attitude)
             )
 
     def _in_ned(
-        self, places: tuple[Any, Any, Any, Any, Any, Any], *, validate: bool
+        self, coordinates: tuple[Any, Any, Any, Any, Any, Any], *, validate: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self._offsets is None:
-            return geodesic_line_of_sight(*places, validate=validate)
-        arrays, shape = positions(*places, validate=validate)
+            return geodesic_line_of_sight(*coordinates, validate=validate)
+        arrays, shape = positions(*coordinates, validate=validate)
         with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
             seen = spherical_from_enu(*self._offsets(*arrays))
         azimuth, elevation, range_m = shaped(shape, *seen)

@@ -1,4 +1,4 @@
-"""The WGS-84 ellipsoid: exact lines of sight, NED offsets, and places from offsets."""
+"""The WGS-84 ellipsoid: exact lines of sight, NED offsets, and positions from offsets."""
 
 from __future__ import annotations
 

@@ -310,21 +310,21 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
     if attitude not in ("exact", "small_angle"):
         raise ValueError(f"attitude is {attitude!r}: it must be 'exact' or 'small_angle'")
     if earth == "ellipsoid":
-        found: Interval | None = (_EXACT, _EXACT)
+        errors: Interval | None = (_EXACT, _EXACT)
     elif envelope.range_max_m == 0.0:
-        found = (0.0, 0.0)
+        errors = (0.0, 0.0)
     elif earth == "geodesic":
-        found = geodesic_error(envelope)
+        errors = geodesic_error(envelope)
     elif earth == "local_radii":
-        found = local_radii_error(envelope, envelope.range_max_m)
+        errors = local_radii_error(envelope, envelope.range_max_m)
     elif earth == "daidalus_sphere":
-        found = None  # nobody has proven one: it is there to be compared with, not to be picked
+        errors = None  # nobody has proven one: it is there to be compared with, not to be picked
     else:
-        found = flat_earth_error(envelope)
-    if found is None or not math.isfinite(envelope.range_max_m):
+        errors = flat_earth_error(envelope)
+    if errors is None or not math.isfinite(envelope.range_max_m):
         return ErrorBound(math.pi, math.pi, math.inf, math.inf)
     rounding = 0.0 if earth == "ellipsoid" else _ROUNDING
-    direction, relative = found[0] + rounding, found[1] + rounding
+    direction, relative = errors[0] + rounding, errors[1] + rounding
     if attitude == "small_angle":
         direction += attitude_error_rad(envelope.pitch_rad, envelope.roll_rad)
     direction = min(direction, math.pi)

@@ -56,7 +56,7 @@ class FieldOfView:
     Raises
     ------
     ValueError
-        A bound out of place.
+        A bound out of range.
     """
 
     def __init__(
@@ -72,15 +72,15 @@ class FieldOfView:
 
     def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
         """Tell which directions lie inside, as `inside` does."""
-        found = elevation_rad >= self._lowest
-        found &= elevation_rad <= self._highest
+        result = elevation_rad >= self._lowest
+        result &= elevation_rad <= self._highest
         if self._high - self._low < TWO_PI:
             within = azimuth_rad >= self._low
             within &= azimuth_rad <= self._high
             if self._turns:
                 within = _at_other_turns(azimuth_rad, azimuth_rad, self._low, self._high, within)
-            found &= within
-        return found
+            result &= within
+        return result
 
 
 def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:

@@ -159,12 +159,12 @@ def _draw(
             fontsize=9,
         )
         shades: Any = None
-        for column, (found, error) in enumerate(zip(maps, errors, strict=True)):
+        for column, (shown, error) in enumerate(zip(maps, errors, strict=True)):
             axes = figure.add_axes((left + pitch * column, 0.235, 0.92 * pitch, 0.53))
             inside = np.clip(error, *limits)
             shades = axes.pcolormesh(
-                found.range_m / 1000.0,
-                found.lat_deg,
+                shown.range_m / 1000.0,
+                shown.lat_deg,
                 inside,
                 norm=LogNorm(*limits),
                 cmap=_COLOURS,
@@ -173,18 +173,18 @@ def _draw(
             )
             for level, colour, dashes in styles:
                 axes.contour(
-                    found.range_m / 1000.0, found.lat_deg, inside,
+                    shown.range_m / 1000.0, shown.lat_deg, inside,
                     levels=[level], colors=[colour], linestyles=[dashes], linewidths=1.6,
                 )  # fmt: skip
             axes.set_xscale("log")
             axes.set_xlabel("slant range (km)")
             axes.set_xticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
             axes.set_yticks(np.arange(0, 91, 15), [] if column else None)
-            axes.set_title(found.model.replace("_", " "), loc="left")
+            axes.set_title(shown.model.replace("_", " "), loc="left")
             if column == 0:
                 axes.set_ylabel("latitude (deg)")
-        place = (left + pitch * len(maps), 0.235, 0.13 / width_in, 0.53)
-        bar = figure.colorbar(shades, cax=figure.add_axes(place))
+        box = (left + pitch * len(maps), 0.235, 0.13 / width_in, 0.53)
+        bar = figure.colorbar(shades, cax=figure.add_axes(box))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.set_title(unit, fontsize=9)
         handles = [

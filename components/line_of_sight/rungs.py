@@ -23,12 +23,10 @@ def true_reach_m(context: Context, earth: str, look: FarthestLook) -> float:
     are within R / (1 - e).
     """
     reach_m = look.range_m
-    offers = [producer.offer for producer in context.producers]
     if earth == "ellipsoid" or reach_m == 0.0 or not math.isfinite(reach_m):
         return reach_m
-    if len(offers) != 1 or not isinstance(offers[0], KnownTraffic):
-        return math.inf
-    traffic = offers[0].envelope(reach_m, look.lasts_s)
+    known = _known_traffic(context)
+    traffic = None if known is None else known.envelope(reach_m, look.lasts_s)
     if traffic is None:
         return math.inf
     low_m, high_m = traffic.own_alt_m
@@ -41,6 +39,12 @@ def true_reach_m(context: Context, earth: str, look: FarthestLook) -> float:
     )
     relative = error_bound(earth, envelope).relative_range
     return reach_m / (1.0 - relative) if relative < _LARGEST_RELATIVE_ERROR else math.inf
+
+
+def _known_traffic(context: Context) -> KnownTraffic | None:
+    """Return what the only producer says of its traffic, if it does."""
+    offers = [producer.offer for producer in context.producers]
+    return offers[0] if len(offers) == 1 and isinstance(offers[0], KnownTraffic) else None
 
 
 # CPU time per line of sight in blocks of 10,000, relative to flat earth; only the order matters.
@@ -231,12 +235,12 @@ def pick_rung(transform: Any) -> PickedModels:
 
 def _envelopes(transform: Any, look: FarthestLook) -> list[Envelope] | None:
     """Return where each sensor's lines of sight can lie, if the traffic says so."""
-    offers = [producer.offer for producer in transform.context.producers]
-    if len(offers) != 1 or not isinstance(offers[0], KnownTraffic):
+    known = _known_traffic(transform.context)
+    if known is None:
         return None
     envelopes = []
     for range_m, steepest_rad in look.views:
-        traffic = offers[0].envelope(range_m, look.lasts_s)
+        traffic = known.envelope(range_m, look.lasts_s)
         if traffic is None:
             return None
         # From the horizon to the plane of the wings is at most the sum of pitch and roll.

@@ -78,28 +78,19 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     errors = []
     for row, target in cells.tolist():
         column = int(np.searchsorted(states.columns, target))
-        own = (states.own_lat_deg[row], states.own_lon_deg[row], states.own_alt_m[row])
-        other = (
-            states.lat_deg[row, column],
-            states.lon_deg[row, column],
-            states.alt_m[row, column],
-        )
-        attitude = (
-            states.own_yaw_rad[row],
-            states.own_pitch_rad[row],
-            states.own_roll_rad[row],
-        )
-        found: Any = seen
+        own: Any = tuple(getattr(states, f"own_{name}")[row] for name in POSE_FIELDS)
+        other: Any = tuple(getattr(states, name)[row, column] for name in POSITION_FIELDS)
+        lines: Any = seen
         given = (
-            found.body_azimuth_rad[row, column],
-            found.body_elevation_rad[row, column],
-            found.range_m[row, column],
+            lines.body_azimuth_rad[row, column],
+            lines.body_elevation_rad[row, column],
+            lines.range_m[row, column],
         )
-        errors.append(line_of_sight_errors(own, other, attitude, given))
+        errors.append(line_of_sight_errors(own[:3], other, own[3:], given))
     columns = np.array(errors).reshape(-1, 4)
     columns[:, :3] *= 1e3
     names = [quantity.name for quantity in QUANTITIES]
-    return {name: columns[:, place] for place, name in enumerate(names)}
+    return {name: columns[:, i] for i, name in enumerate(names)}
 
 
 EARTH = Ladder(
@@ -176,7 +167,7 @@ class TransformParameters(Parameters):
 class Transform(Component):
     """Turns geodetic positions into lines of sight; subclasses choose the model of the Earth.
 
-    Where ``[accuracy]`` allows an error of angle and range, cheaper models take the place of the
+    Where ``[accuracy]`` allows an error of angle and range, cheaper models replace the
     exact ones, so long as the proven bounds of their errors together stay within it (`rung`).
     """
 
@@ -285,10 +276,9 @@ class Transform(Component):
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where all aircraft are then."""
         seen = self._as_seen(own, other, own.present & other.present)
-        places = {"target": {name: getattr(other, name) for name in POSITION_FIELDS}}
         return {
             **seen,
-            **places,
+            "target": {name: getattr(other, name) for name in POSITION_FIELDS},
             "own": {name: getattr(own, name) for name in (*POSE_FIELDS, "present")},
         }
 

@@ -67,9 +67,9 @@ class AlertLevels(Message):
 
     def highest(self) -> IntArray:
         """Return the highest level of each row, 0 where there is no target, (rows,)."""
-        found = np.zeros(len(self), dtype=np.int64)
-        np.maximum.at(found, self.row_of_entries, self.level)
-        return found
+        levels = np.zeros(len(self), dtype=np.int64)
+        np.maximum.at(levels, self.row_of_entries, self.level)
+        return levels
 
     def contacts(self) -> IntArray:
         """Return the contact of each entry, as a display numbers it, (entries,).

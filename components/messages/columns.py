@@ -37,7 +37,7 @@ class StatedErrors:
     """The range rate, positive when opening, and mean square errors as the sensor states them.
 
     A grid's is step²/12; the cut at the edge of a field of view is not in it. Where navigation has
-    noise, that of the pose by which angles are turned, and of the place that a range is counted
+    noise, that of the pose by which angles are turned, and of the position that a range is counted
     from, is. NaN where not given: not measured.
     """
 
@@ -84,7 +84,7 @@ class FrameOrigin:
     origin_alt_m: FloatArray = column("m", WGS84, "its height above the ellipsoid")
 
 
-#: The fields of these two, and those of the ownship's place in the same frame (`StateTracks`).
+#: The fields of these two, and those of the ownship's position in the same frame (`StateTracks`).
 STATE, ORIGIN = (tuple(g.__dataclass_fields__) for g in (PositionAndVelocity, FrameOrigin))
 POSITION, VELOCITY = STATE[:3], STATE[3:]
 OWN_POSITION = ("own_north_m", "own_east_m", "own_down_m")
@@ -116,10 +116,10 @@ OWN_VELOCITY = {
 
 #: The keys of `Detections.told_by_target`: the target's own velocity (m/s) and mean square errors
 #: of what is new in it (m²/s²); the ownship's, where bearings are coarse; standard deviations
-#: (`ToldError`) of the target's place along north and east each (m), its height and the height's
+#: (`ToldError`) of the target's position along north and east each (m), its height and the height's
 #: rounding, its vertical rate, its velocity along north and east each (m/s), a bearing (rad), the
-#: delay of a transponder and ranges (m); for how long a place was carried on, and the age of the
-#: velocity (s); and the mean square error of all else that is new in the place, along every axis
+#: delay of a transponder and ranges (m); how long a position was carried on, and the age of the
+#: velocity (s); and the mean square error of all else that is new in the position, along every axis
 #: (m²).
 TOLD = (
     "north", "east", "down", "north_variance", "east_variance", "down_variance",

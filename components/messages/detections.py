@@ -83,7 +83,7 @@ class LastingPart:
     lasts_s : float
         Infinite for what stays the same throughout a run.
     across_m2 : float
-        Variance of a place across the line of sight: that of an angle is it over the range squared.
+        Variance of a position across the line of sight: over the range squared that of an angle.
     share : float
         Share of the variance that a report states, where that differs from report to report;
         `variance` is added to it, and may be below 0 then: what of it is no part of this one.
@@ -148,7 +148,7 @@ class SensorOffer:
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
     folds_range_rate : bool
-        Whether range rates beyond what is unambiguous are told as ones within.
+        Whether range rates beyond what is unambiguous are reported as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
     lasting : mapping of LastingError, or None
@@ -164,7 +164,7 @@ class SensorOffer:
     unforeseen : bool
         Whether they may come later still, as they queue.
     unstated_across_m2 : float
-        Variance of the ownship's own place across the line of sight that its angles' variances
+        Variance of the ownship's own position across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
     tells : bool
         Whether its detections may have something that is `told_by_target`.
@@ -243,7 +243,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     told_by_target : dict of (entries,), or None
         What aircraft tell (`TOLD`): velocity over ground, along the axes of the horizon where the
         ownship believes to be, and how much errs of it and of the position; NaN where nothing is
-        told.
+        reported.
     looks : dict of (rows, targets), or None
         Every look at every target (`components.messages.looks`), where they are recorded.
     """
@@ -303,7 +303,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         return {"declared": np.ones(len(self.target), dtype=bool), **self.extras}
 
     def pose_columns(self) -> dict[str, FloatArray]:
-        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
+        """Return the ownship's believed pose at each entry, by column; empty without one."""
         if self.own_of_entries is not None:
             return self.own_of_entries
         row, pose = self.row_of_entries, {name: getattr(self, name) for name in POSE}

@@ -41,7 +41,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
         How the ownship moved (`OWN_VELOCITY`) when the range rate was measured; NaN where none
         was, None from a fusion of sensors that measure none.
     told_by_target : dict of (entries,), or None
-        As `Detections` has it, of the sensor that the range is of; NaN where it is told nothing.
+        As `Detections` has it, of the sensor that the range is of; NaN where nothing is reported.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
     sensors : tuple of str
@@ -82,7 +82,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
             self.measured_tick = self.tick.take(self.row_of_entries)
 
     def pose_columns(self) -> dict[str, FloatArray]:
-        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
+        """Return the ownship's believed pose at each entry, by column; empty without one."""
         return self.own_of_entries or {}
 
 

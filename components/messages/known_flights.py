@@ -113,8 +113,8 @@ class KnownFlights:
 
 def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
     """Return the single row of what is seen of targets; what is in tables, with their names."""
-    found = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
+    flat = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
     for table, columns in seen.items():
         if isinstance(columns, Mapping):
-            found |= {f"{table}_{name}": values[0] for name, values in columns.items()}
-    return found
+            flat |= {f"{table}_{name}": values[0] for name, values in columns.items()}
+    return flat

@@ -182,10 +182,10 @@ class Decision:
         kept = np.flatnonzero(scan >= 0)
         return Decision(kept, self.reason[scan[kept]], len(scan))
 
-    def widened(self, place: IntArray, width: int) -> "Decision":
-        """Return the decision over `width` targets, ours at `place`, the others absent."""
+    def widened(self, columns: IntArray, width: int) -> "Decision":
+        """Return the decision over `width` targets, ours in these `columns`, the others absent."""
         reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
-        reason[:, place] = self.reason
+        reason[:, columns] = self.reason
         return Decision(self.rows, reason, self.count)
 
     @classmethod

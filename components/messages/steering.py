@@ -120,7 +120,7 @@ class Manoeuvres(Message):
 
     @classmethod
     def at_rows(cls, instants: RunTicks, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
-        """Return the message of manoeuvres at some instants, by their places; None without any."""
+        """Return manoeuvres at some instants, by these' positions; None without any."""
         rows = sorted(manoeuvres)
         if not rows:
             return None

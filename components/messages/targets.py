@@ -65,7 +65,7 @@ def truth_columns(states: Any) -> Columns:
     them, whatever the arrays of `states` hold. Velocities are those of the path in the aircraft's
     own NED frame, from positions 1/1024 s before and after: good to 1e-5 m/s where the path has no
     kink in between, by which they are the mean of both sides. Where an aircraft comes or goes, two
-    positions on the one side take their place.
+    positions on the one side stand in for them.
     """
     count = len(states.roster)
     step = max(1, _AT_ONCE // (1 + count))
@@ -138,8 +138,8 @@ def _velocity(
 
 def _way(here: _State, there: _State) -> FloatArray:
     """Return where everybody is in one state, north, east and down of where they are in another."""
-    places = [*(here[name] for name in POSITION_FIELDS), *(there[name] for name in POSITION_FIELDS)]
-    return np.stack(line_of_sight_ned(*places, validate=False))
+    ends = [*(here[name] for name in POSITION_FIELDS), *(there[name] for name in POSITION_FIELDS)]
+    return np.stack(line_of_sight_ned(*ends, validate=False))
 
 
 def _together(states: Any) -> dict[str, Any]:
@@ -324,16 +324,16 @@ def over_same_targets(parts: Sequence[Any]) -> list[Any]:
 
 
 def _widened(part: Any, columns: IntArray) -> Any:
-    place = np.searchsorted(columns, part.columns)
+    index = np.searchsorted(columns, part.columns)
     result = copy(part)
     for name, values in vars(part).items():
         if isinstance(values, np.ndarray) and values.ndim == 2:
             wide = np.zeros((len(values), len(columns)), dtype=values.dtype)
-            wide[:, place] = values
+            wide[:, index] = values
             setattr(result, name, wide)
     if isinstance(part, GatedTargets):
         result.decisions = {
-            sensor: decision.widened(place, len(columns))
+            sensor: decision.widened(index, len(columns))
             for sensor, decision in part.decisions.items()
         }
     result.columns = columns
@@ -358,8 +358,8 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
     here = [own[0][name] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(row))
     for there in own[1:]:
-        places = [there[name] for name in POSITION_FIELDS]
-        way = np.stack(line_of_sight_ned(*here, *places, validate=False))
+        ends = [there[name] for name in POSITION_FIELDS]
+        way = np.stack(line_of_sight_ned(*here, *ends, validate=False))
         moved.append(np.where(there["present"], way, 0.0))
         span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -23,6 +23,7 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.geometry import (
+    POSE_FIELDS,
     body_angles,
     body_to_ned,
     ned_to_body,
@@ -220,8 +221,9 @@ class NavigationErrors(_Navigation[Believing]):
                 states.own_lat_deg, states.own_lon_deg, states.own_alt_m, *errors[:3]
             )
             attitude = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
-            names = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
-            return dict(zip(names, (*position, *map(_off, attitude, errors[3:])), strict=True))
+            return dict(
+                zip(POSE_FIELDS, (*position, *map(_off, attitude, errors[3:])), strict=True)
+            )
 
         return believed
 

@@ -39,7 +39,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.geometry import north_east_up
+from components.geometry import POSITION_FIELDS, north_east_up
 from components.radar.ground_clutter import Echo, terrain_of
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -240,7 +240,7 @@ def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatAr
     """
 
     def quantities(seen: Mapping[str, Any], times: int) -> tuple[FloatArray, ...]:
-        there = [seen[f"own_{name}"] for name in ("lat_deg", "lon_deg", "alt_m")]
+        there = [seen[f"own_{name}"] for name in POSITION_FIELDS]
         # From where it is at the first of the times: so near that the frame is the same.
         first = [np.tile(values[: len(values) // times], times) for values in there]
         return (seen["range_m"], *north_east_up(*first, *there))

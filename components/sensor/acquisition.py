@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry import north_east_up
+from components.geometry import POSITION_FIELDS, north_east_up
 from components.sensor.look import Cells
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -114,7 +114,7 @@ def ground_speed_m_s(cells: Cells) -> FloatArray:
     for step_s in (STEP_S, -STEP_S):
         seen = cells.seen_at(np.tile(which, 2), np.repeat([0.0, step_s], len(which)))
         now, then = (
-            [seen[f"target_{name}"][part] for name in ("lat_deg", "lon_deg", "alt_m")]
+            [seen[f"target_{name}"][part] for name in POSITION_FIELDS]
             for part in (slice(None, len(which)), slice(len(which), None))
         )
         north, east, _ = north_east_up(*now, *then)

@@ -7,6 +7,7 @@ import numpy as np
 
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import axis_in_body
+from components.geometry import POSE_FIELDS
 from components.messages.columns import ORIGIN, POSE, STATE
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
@@ -20,16 +21,13 @@ from dsa_des.block.wake import Wake
 PORT = "cues"
 
 
-_BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
-
-
 def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
     believed = targets.believed
     if believed is None:
         return {}
     return {
-        field: picked(believed[name], rows) for name, field in zip(_BELIEVED, POSE, strict=True)
+        field: picked(believed[name], rows) for name, field in zip(POSE_FIELDS, POSE, strict=True)
     }
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry import line_of_sight_ned
+from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import Reach
@@ -24,7 +24,6 @@ from components.surveillance.believed_line import (
 )
 from components.surveillance.broadcast import Broadcasts, Sent, Transponders
 from components.surveillance.cooperative import (
-    PLACE,
     STEP_S,
     CooperativeParameters,
     CooperativeSensor,
@@ -91,8 +90,10 @@ def _position_errors(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
     receiver.law = LAWS["certain"][0]
     look = receiver.look(cells)
     here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
-    said = [look.extras[f"reported_{name}"] for name in PLACE]
-    away = line_of_sight_ned(*(here[f"target_{name}"] for name in PLACE), *said, validate=False)
+    said = [look.extras[f"reported_{name}"] for name in POSITION_FIELDS]
+    away = line_of_sight_ned(
+        *(here[f"target_{name}"] for name in POSITION_FIELDS), *said, validate=False
+    )
     return {"north": away[0], "east": away[1]}
 
 
@@ -250,7 +251,7 @@ class AdsB(CooperativeSensor):
         equipage, craft = cells.roster.equipage, cells.craft
         sent = self._sent(cells, reported, number, sent_ns)
         position = self._broadcasts.position(equipage, Transponders.of(cells, reported), sent)
-        for name, values in zip(PLACE, position, strict=True):
+        for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
@@ -280,7 +281,7 @@ class AdsB(CooperativeSensor):
             ahead_s = ahead_s + back_s
         then = cells.seen_at(which, ahead_s)
         velocity = velocity_of(cells, which, ahead_s, then, "target")
-        position = [then[f"target_{name}"] for name in PLACE]
+        position = [then[f"target_{name}"] for name in POSITION_FIELDS]
         if back_s.any():
             before = displaced_position(*position, *(-velocity * back_s))
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
@@ -309,7 +310,7 @@ class AdsB(CooperativeSensor):
         ])  # fmt: skip
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
-        position = [said[f"reported_{name}"] for name in PLACE]
+        position = [said[f"reported_{name}"] for name in POSITION_FIELDS]
         carried = np.nan_to_num(velocity)
         ned = towards(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.

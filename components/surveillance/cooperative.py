@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from components.geometry import line_of_sight_ned
+from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
 from components.sensor.marks import COOPERATIVE
@@ -22,7 +22,6 @@ from dsa_des.errors import Disagreements
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
-PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 #: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
 _MEASURED_KEYS = (
@@ -80,13 +79,13 @@ def velocity_of(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:
     """Return velocities north, east and down (3, n), from positions 1/64 s before and after."""
-    positions = [here[f"{whose}_{name}"] for name in PLACE]
+    positions = [here[f"{whose}_{name}"] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(which))
     for step_s in (-STEP_S, STEP_S):
         then = cells.seen_at(which, ahead_s + step_s)
         there = then["present"]
         way = line_of_sight_ned(
-            *positions, *(then[f"{whose}_{name}"] for name in PLACE), validate=False
+            *positions, *(then[f"{whose}_{name}"] for name in POSITION_FIELDS), validate=False
         )
         moved.append(np.where(there, np.stack(way), 0.0))
         span_s = span_s + np.where(there, STEP_S, 0.0)

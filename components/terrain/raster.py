@@ -110,8 +110,10 @@ class ElevationRaster:
             f"{self.west_deg:.6g} to {self.east_deg:.6g}"
         )
 
-    def place(self, lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return places in rows from the south and columns from the west, with fractions."""
+    def row_and_column(
+        self, lat_deg: FloatArray, lon_deg: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return positions in rows from the south and columns from the west, with fractions."""
         v = (lat_deg - self.south_deg) / self.lat_step_deg
         # Whichever turn the longitude is given in; what lies a rounding west of the first column
         # is on it.
@@ -121,9 +123,9 @@ class ElevationRaster:
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return the heights of the ground (m) at some places, and which lie on the raster."""
+        """Return the heights of the ground (m) at some positions, and which lie on the raster."""
         rows, columns = self.height_m.shape
-        v, u = self.place(lat_deg, lon_deg)
+        v, u = self.row_and_column(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
         v, u = np.clip(v, 0.0, rows - 1), np.clip(u, 0.0, columns - 1)
         row = np.minimum(v.astype(np.int64), rows - 2)
@@ -150,15 +152,8 @@ _FIT = 1e-3
 def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
     """Return one raster of several with the same steps, whose nodes fall onto each other.
 
-    Parameters
-    ----------
-    rasters : sequence of ElevationRaster
-        At least one; together they fill a rectangle. Where two overlap, the later one counts.
-
-    Raises
-    ------
-    ValueError
-        If their steps differ, their nodes do not fit, or the rectangle is not filled.
+    Together they fill a rectangle; where two overlap, the later one counts. ValueError if their
+    steps differ, their nodes do not fit, or the rectangle is not filled.
     """
     first = rasters[0]
     if len(rasters) == 1:

@@ -1,4 +1,4 @@
-"""Rays between two places over the ellipsoid: how high they run, straight or bent by the air.
+"""Rays between two positions over the ellipsoid: how high they run, straight or bent by the air.
 
 A straight ray is the chord in Earth-centred axes, so the Earth's curvature is exact. Where the
 air bends it (`four_thirds`), it arches above the chord by x (D - x) / (8 R): the standard
@@ -29,7 +29,7 @@ REFRACTIONS = ("none", "four_thirds")
 """From crude to good: straight rays, and those of the 4/3 Earth."""
 
 MEAN_RADIUS_M = 6371008.8
-"""Mean radius of WGS-84 (2a + b)/3; the law of 4/3 is not so exact that the place mattered."""
+"""Mean radius of WGS-84 (2a + b)/3; the law of 4/3 is not so exact that the latitude mattered."""
 
 _FOUR_THIRDS = 0.25
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
@@ -87,7 +87,7 @@ def geodetic_of(x: FloatArray, y: FloatArray, z: FloatArray) -> Vector:
 
 
 def earth_centred(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -> Vector:
-    """Return the Earth-centred coordinates (m) of flat arrays of places."""
+    """Return the Earth-centred coordinates (m) of flat arrays of positions."""
     _, _, (ux, uy, uz) = local_axes(lat_deg, lon_deg)
     n = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * uz * uz)
     level = n + alt_m
@@ -96,7 +96,7 @@ def earth_centred(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays from some places to others."""
+    """Rays from some positions to others."""
 
     # three (n,) arrays, m: Where they start, Earth-centred, and from there to where they end
     start: Vector
@@ -107,7 +107,7 @@ class Rays:
     sag_m: FloatArray  # (n,): how far the ray's middle lies below the mean of its ends' heights
     arch_m: FloatArray  # (n,): how far the air lifts its middle above the chord's
 
-    def places(self, share: FloatArray, rays: Any = slice(None)) -> Vector:
+    def points(self, share: FloatArray, rays: Any = slice(None)) -> Vector:
         """Return latitude (rad), longitude (deg) and height (m) at shares of some rays' lengths."""
         x, y, z = (a[rays] + share * d[rays] for a, d in zip(self.start, self.step, strict=True))
         lat, lon, height = geodetic_of(x, y, z)
@@ -125,7 +125,7 @@ class Rays:
         share = 0.5 - rise / np.where(sagging, 8.0 * self.sag_m, np.inf)
         share = np.clip(share, 0.0, 1.0)
         ends = np.minimum(self.start_alt_m, self.end_alt_m)
-        return np.where(sagging, np.minimum(self.places(share)[2], ends), ends)
+        return np.where(sagging, np.minimum(self.points(share)[2], ends), ends)
 
     def below(self, height_m: float) -> tuple[FloatArray, FloatArray]:
         """Return the shares of its length between which each ray may be below a height, (n,).
@@ -247,9 +247,9 @@ def _meets_ground(
     number = count[part]
     ends = np.cumsum(number)
     ray = np.repeat(part, number)
-    place = np.arange(ends[-1]) - np.repeat(ends - number, number)
+    step = np.arange(ends[-1]) - np.repeat(ends - number, number)
     # In the middles of equal pieces: never at an end, which may stand on the ground.
-    share = first[ray] + (place + 0.5) / count[ray] * (last[ray] - first[ray])
+    share = first[ray] + (step + 0.5) / count[ray] * (last[ray] - first[ray])
     stands = _stands_m(rays, ray, share, raster, offset_m)
     met: BoolArray = np.logical_or.reduceat(stands > _GRAZING_M, ends - number)
     # Where it is a near thing, once more with a finer comb around the points that were near.
@@ -278,15 +278,15 @@ def _crossings(
     """Return where pieces of rays cross a row and a column of nodes, where the ground has edges."""
     ends = []
     for side in (-0.5, 0.5):
-        lat_rad, lon_deg, _ = rays.places(share + side * piece, ray)
-        ends.append(raster.place(lat_rad * DEG_PER_RAD, lon_deg))
-    found = []
+        lat_rad, lon_deg, _ = rays.points(share + side * piece, ray)
+        ends.append(raster.row_and_column(lat_rad * DEG_PER_RAD, lon_deg))
+    shares = []
     for a, b in zip(*ends, strict=True):
         line = np.maximum(np.floor(a), np.floor(b))
         crosses = np.floor(a) != np.floor(b)
         along = np.where(crosses, (line - a) / np.where(crosses, b - a, 1.0), 0.5)
-        found.append(share + (np.clip(along, 0.0, 1.0) - 0.5) * piece)
-    return found
+        shares.append(share + (np.clip(along, 0.0, 1.0) - 0.5) * piece)
+    return shares
 
 
 def _stands_m(
@@ -297,6 +297,6 @@ def _stands_m(
     offset_m: float,
 ) -> FloatArray:
     """Return how high the ground stands above rays, at shares of their lengths."""
-    lat_rad, lon_deg, height = rays.places(share, ray)
+    lat_rad, lon_deg, height = rays.points(share, ray)
     ground, _ = raster.height(lat_rad * DEG_PER_RAD, lon_deg)
     return ground + (offset_m - height)

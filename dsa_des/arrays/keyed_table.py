@@ -9,13 +9,10 @@ from dsa_des.arrays.types import BoolArray, IntArray
 
 
 class KeyedTable:
-    """Columns over things of some runs, made anew at every change.
+    """Columns (..., n) over things of some runs, made anew at every change.
 
-    Parameters
-    ----------
-    **columns : ndarray, shape (..., n)
-        The things are on the last axis; ``replica`` says of which run each is. A column is asked
-        for as an attribute.
+    The things are on the last axis; ``replica`` says of which run each is. A column is asked for as
+    an attribute.
     """
 
     def __init__(self, **columns: Any) -> None:

@@ -91,9 +91,9 @@ class RunTicks:
 
     def part(self, rows: IntArray) -> "RunTicks":
         """Return some of them, ascending, and remember where they are; none stands here twice."""
-        found = self.take(rows)
-        self._parts.append((found, rows))
-        return found
+        some = self.take(rows)
+        self._parts.append((some, rows))
+        return some
 
     def later(self, ticks: int | IntArray) -> "RunTicks":
         """Return instants of the same runs so much later."""

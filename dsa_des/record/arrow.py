@@ -102,25 +102,25 @@ def _in_order_of_appearance(text: Text) -> pa.DictionaryArray:
 
     What the dictionary of a row group holds then follows from its rows alone.
     """
-    first = _first_places(text.codes, len(text.names))
+    first = _first_rows(text.codes, len(text.names))
     used = np.flatnonzero(first < len(text.codes))
     used = used[np.argsort(first[used])]
     names = tuple(text.names[i] for i in used.tolist())
     if np.array_equal(used, np.arange(len(used))):
         return _dictionary(text.codes, names)
-    place = np.full(len(text.names) + 1, -1, dtype=np.int32)  # the last place is that of null
-    place[used] = np.arange(len(used))
-    return _dictionary(place[text.codes], names)
+    code_of = np.full(len(text.names) + 1, -1, dtype=np.int32)  # the last entry is that of null
+    code_of[used] = np.arange(len(used))
+    return _dictionary(code_of[text.codes], names)
 
 
-def _first_places(codes: AnyArray, names: int) -> IntArray:
+def _first_rows(codes: AnyArray, names: int) -> IntArray:
     """Return where each code stands first; the number of codes where it does not."""
     count = len(codes)
     if count and names <= _FEW_NAMES:
-        found = [codes == name for name in range(names)]
-        places = [int(hits.argmax()) if hits.any() else count for hits in found]
-        return np.array(places, dtype=np.int64)
-    first = np.full(names + 1, count)  # the last place is that of null
+        hits_of = [codes == name for name in range(names)]
+        rows = [int(hits.argmax()) if hits.any() else count for hits in hits_of]
+        return np.array(rows, dtype=np.int64)
+    first = np.full(names + 1, count)  # the last entry is that of null
     first[codes[::-1]] = np.arange(count - 1, -1, -1)
     return first[:-1]
 
@@ -129,12 +129,6 @@ class ParquetSink:
     """Writes each table to ``FOLDER/TABLE.parquet`` in row groups of a fixed size.
 
     The size is fixed so that the bytes do not depend on how the rows arrived.
-
-    Parameters
-    ----------
-    folder : Path
-    notes : Notes, optional
-        What the files say of themselves.
     """
 
     def __init__(self, folder: Path, notes: Notes | None = None) -> None:

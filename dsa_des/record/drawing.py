@@ -100,10 +100,10 @@ _kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=No
 @contextmanager
 def kept_figures() -> Iterator[dict[str, Any]]:
     """Keep what is drawn into files inside of this: the file's stem → matplotlib figure."""
-    found: dict[str, Any] = {}
-    token = _kept.set(found)
+    figures: dict[str, Any] = {}
+    token = _kept.set(figures)
     try:
-        yield found
+        yield figures
     finally:
         _kept.reset(token)
 
@@ -138,7 +138,7 @@ def drawing(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with matplotlib.rc_context(), warnings.catch_warnings():
-        # Names may hold letters that the font lacks, and be too long for their place.
+        # Names may hold letters that the font lacks, and be too long for their space.
         warnings.filterwarnings("ignore", message="(?s)Glyph .* missing from")
         warnings.filterwarnings("ignore", message=".* layout not applied")
         matplotlib.rcdefaults()
@@ -181,13 +181,7 @@ def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
 
 
 def plain_log_ticks(axis: Any) -> None:
-    """Put plain numbers on a log axis: 1, 2 and 5 of each decade where it spans few of them.
-
-    Parameters
-    ----------
-    axis : matplotlib.axis.Axis
-        Its limits are known.
-    """
+    """Put plain numbers on a log axis of known limits: 1, 2 and 5 of each of its few decades."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     low, high = axis.get_view_interval()

@@ -74,16 +74,7 @@ class Notes:
 def notes_of(
     messages: Iterable[type[Message]], scene_text: str, seed: int, ticks_per_s: int
 ) -> Notes:
-    """Return what the tables of a run say.
-
-    Parameters
-    ----------
-    messages : iterable of message types
-        What is recorded.
-    scene_text : str
-        The resolved scene.
-    seed, ticks_per_s : int
-    """
+    """Return what the tables of a run of these messages say, given its resolved scene."""
     meanings: dict[str, dict[str, Column]] = {}
     rows_of: dict[str, dict[str, str]] = {}
     for message in messages:

@@ -29,20 +29,15 @@ _MOST_NAMES = 30
 
 
 class DeclaredColumns:
-    """The tables of a run's messages with their columns, also those that are not wanted.
+    """The columns of a run's tables (by kind), also those that are not wanted.
 
-    Parameters
-    ----------
-    schemas : mapping
-        Table → column → kind.
-    leading : collection of str
-        Columns that the engine adds.
+    `leading` are those that the engine adds.
     """
 
     def __init__(self, schemas: Mapping[str, Schema], leading: Iterable[str]) -> None:
         self._columns = {table: frozenset(schema) for table, schema in schemas.items()}
         self._leading = frozenset(leading)
-        #: By block and table, the columns that were found to be declared.
+        #: By block and table, the columns that are known to be declared.
         self._sound: dict[tuple[str, str], tuple[str, ...]] = {}
 
     def check(self, block: str, table: str, columns: Iterable[str], message: str) -> None:
@@ -104,13 +99,9 @@ class NotRecordedError(Exception):
 class Recorder:
     """Gathers what blocks send and hands it on in canonical order.
 
-    Parameters
-    ----------
-    sinks : iterable of Sink
-    wanted : mapping, optional
-        Table name → columns to record; everything by default. What is not wanted costs nothing.
-    runs : int
-        How many runs of the scene are recorded for the same purpose, here and elsewhere.
+    `wanted` are the columns to record, by table, everything by default: what is not wanted costs
+    nothing. `runs` is how many runs of the scene are recorded for the same purpose, here and
+    elsewhere.
     """
 
     def __init__(
@@ -183,13 +174,7 @@ class Recorder:
             sink.open(self._schemas)
 
     def record(self, block: str, message: Message) -> None:
-        """Note a message that `block` has sent.
-
-        Raises
-        ------
-        ValueError
-            If the message holds a table or a column that no message of the run declares.
-        """
+        """Note a message that `block` has sent; ValueError for a column that none declares."""
         for listener in self.listeners:
             listener(block, message)
         wanted = self._pending.keys()
@@ -228,7 +213,7 @@ class Recorder:
                     self._pending[table].append((block, columns))
 
     def _together(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
-        """Return the tables of several messages; of them, the one that fails is found."""
+        """Return the tables of several messages; names the one that fails."""
         try:
             return self._checked(block, type(messages[0]).concatenate(messages))
         except Exception:
@@ -372,7 +357,7 @@ class _TextCodes:
 
     def __init__(self, column: str) -> None:
         self._column = column
-        self._place: dict[str, int] = {}
+        self._code: dict[str, int] = {}
         #: By identity of a tuple of names, which is kept so that the identity stays its own.
         self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
         self.names: tuple[str, ...] = ()
@@ -393,13 +378,13 @@ class _TextCodes:
         known = self._lookups.get(id(names))
         if known is not None and known[0] is names:
             return known[1]
-        places = [self._place.setdefault(name, len(self._place)) for name in names]
-        lookup = np.array([*places, -1], dtype=np.int32)
+        codes = [self._code.setdefault(name, len(self._code)) for name in names]
+        lookup = np.array([*codes, -1], dtype=np.int32)
         if len(self._lookups) > 1000:  # tuples made anew for every message
             self._lookups.clear()
         self._lookups[id(names)] = names, lookup
-        if len(self._place) > len(self.names):
-            self.names = tuple(self._place)
+        if len(self._code) > len(self.names):
+            self.names = tuple(self._code)
         return lookup
 
 

@@ -126,8 +126,8 @@ class Run:
     @property
     def summary(self) -> dict[str, Any]:
         """What the run came to, as ``dsa-des run --json`` prints it."""
-        found: dict[str, Any] = self.info.get("summary", {})
-        return found
+        summary: dict[str, Any] = self.info.get("summary", {})
+        return summary
 
     @cached_property
     def figures(self) -> dict[str, Any]:
@@ -170,9 +170,9 @@ def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Tab
         for item in wanted:
             values = other[item.name].take(rows)
             if item.name in table.column_names:
-                place = table.column_names.index(item.name)
+                index = table.column_names.index(item.name)
                 values = pc.coalesce(table[item.name], values)
-                table = table.set_column(place, item.remove_metadata(), values)
+                table = table.set_column(index, item.remove_metadata(), values)
             else:
                 table = table.append_column(item.remove_metadata(), values)
     return table
@@ -196,8 +196,8 @@ def _rows_of(table: "pa.Table", other: "pa.Table") -> IntArray:
     if not len(theirs):
         return np.full(count, -1, dtype=np.int64)
     order = np.argsort(theirs, kind="stable")
-    found = order[np.minimum(np.searchsorted(theirs[order], mine), len(theirs) - 1)]
-    return np.where(theirs[found] == mine, found, -1)
+    row = order[np.minimum(np.searchsorted(theirs[order], mine), len(theirs) - 1)]
+    return np.where(theirs[row] == mine, row, -1)
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:

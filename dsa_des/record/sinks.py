@@ -172,12 +172,8 @@ def _plain(values: Any) -> Any:
 class ObserverSink:
     """Passes rows on to observers.
 
-    Parameters
-    ----------
-    observers : iterable of Observer
-    notes : list of str, optional
-        An observer that raises is left out from then on, and a note of it added here, so that the
-        run goes on. Without a list the run ends.
+    With a list of `notes`, an observer that raises is left out from then on and noted there, so
+    that the run goes on; without one the run ends.
     """
 
     def __init__(self, observers: Iterable[Observer], notes: list[str] | None = None) -> None:

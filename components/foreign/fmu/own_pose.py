@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry import POSE_FIELDS
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.targets import RelativeTargets, TrafficStates, own_velocity
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
-_STATE_OF_OWN = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 
 
@@ -60,10 +60,10 @@ def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
     if isinstance(message, TrafficStates):
-        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in _STATE_OF_OWN]
+        found[: len(POSE)] = [getattr(message, f"own_{name}") for name in POSE_FIELDS]
         return found
     if message.believed is not None:
-        found[: len(POSE)] = [message.believed[name] for name in _STATE_OF_OWN]
+        found[: len(POSE)] = [message.believed[name] for name in POSE_FIELDS]
     if moves:
         state: IntArray = message.picture_tick
         time_s = state / wake.ticks_per_s
