@@ -5,7 +5,7 @@ import pytest
 
 import dsa_des
 from components.estimation.kalman import variance_of_what_is_new
-from components.messages.detections import LastingError, SensorOffer
+from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.optical.sensors import OpticalRangeBoundary
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
@@ -85,6 +85,22 @@ def test_rounding_has_in_common_at_least_what_two_looks_have(noise, moved):
     if moved == 0.0:
         assert found <= 1.65 * real + 1e-3  # pi² / 6 by the bound's making
     assert lasting.common([0], one.astype(int), variance, one, one + np.inf, one)[0, 0] == 0.0
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        LastingError(step=1.0),
+        *(LastingError(parts=(LastingPart(**{name: 0.1}),))
+          for name in ("variance", "across_m2", "share")),
+    ],
+)  # fmt: skip
+def test_what_errors_have_in_common_is_asked_of_sensors_whose_errors_last(error):
+    """Nothing is kept of the others, whose errors are all new; -1 is no sensor."""
+    offers = {"eye": SensorOffer(False, 1.0, lasting={}),
+              "radar": SensorOffer(False, 1.0, lasting={"elevation": error})}  # fmt: skip
+    lasting = LastingErrors.of(offers, ("eye", "radar"))
+    assert lasting.lasts[[0, 1, -1]].tolist() == [False, True, False] and lasting.sensors == 0b10
 
 
 class Silent(OpticalRangeBoundary):
