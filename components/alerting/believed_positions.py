@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations
-from components.alerting.received import OwnPoses, Received
+from components.alerting.received import OwnPoses, ReceivedRows
 from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
@@ -38,7 +38,7 @@ class BelievedPositions:
     def __init__(self, keep_s: float, targets: int) -> None:
         self._keep_s, self._targets = keep_s, targets
         #: East, north, up (targets, 3, n); NaN where a target was not seen.
-        self._seen = Received.none(time_s=(), position_m=(targets, 3))
+        self._seen = ReceivedRows.none(time_s=(), position_m=(targets, 3))
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in positions (n, targets, 3) at instants of their run, and when they came."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Deviations, largest
 from components.alerting.believed_positions import BelievedFlights
-from components.alerting.received import OwnPoses, Received
+from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.columns import ORIGIN, STATE
@@ -30,7 +30,7 @@ class EstimatedFlights:
 
     def __init__(self) -> None:
         #: Where the tracks of each row begin and how many there are.
-        self._rows = Received.none("begin", "count")
+        self._rows = ReceivedRows.none("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
         #: n) of latitude, longitude (deg) and height (m), of the instant ``time_s``.
         self._tracks = KeyedTable.empty(
@@ -139,7 +139,7 @@ class BelievedTracks:
     def __init__(self, targets: int) -> None:
         self._estimates = EstimatedFlights()
         #: Where the targets are: a track is named by the nearest.
-        self._true = Received.none(position_m=(targets, 3))
+        self._true = ReceivedRows.none(position_m=(targets, 3))
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in the tracks of a tracker."""

@@ -12,7 +12,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
 
-class Received(KeyedTable):
+class ReceivedRows(KeyedTable):
     """Rows that have come: those of each run (``replica``) together, by when they ``came``."""
 
     @classmethod
@@ -43,9 +43,9 @@ class OwnPoses:
 
     def __init__(self, ticks_per_s: int) -> None:
         self._per_s = ticks_per_s
-        self._poses = Received.none("tick", place=(3,), attitude=(3,))
+        self._poses = ReceivedRows.none("tick", place=(3,), attitude=(3,))
         #: Poses that were set aside.
-        self._old: list[Received] = []
+        self._old: list[ReceivedRows] = []
 
     @property
     def _made(self) -> RunTicks:
@@ -61,7 +61,7 @@ class OwnPoses:
             )
         )
 
-    def _keep(self, poses: Received) -> None:
+    def _keep(self, poses: ReceivedRows) -> None:
         # Of those that overtook each other on the way, the newest counts.
         newest = RunTicks(poses.replica, poses.tick).newest()
         self._poses = poses.with_columns(tick=newest.tick)
@@ -75,7 +75,7 @@ class OwnPoses:
         index = np.minimum(last_of_run(self._made, measured), self._poses.last(came))
         first = first_of_run(self._poses.instants, came.run)
         if self._old and bool((asked & (index <= first)).any()):
-            every = Received.joined([*self._old, self._poses])
+            every = ReceivedRows.joined([*self._old, self._poses])
             order = every.instants.order()
             self._keep(every if order is None else every.take(order))
             self._old = []

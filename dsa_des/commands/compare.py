@@ -21,7 +21,7 @@ from dsa_des.commands.study import (
     run_into,
     show_study,
 )
-from dsa_des.commands.what_changed import Pair, say_changes_along, say_what_changed
+from dsa_des.commands.what_changed import ConditionPair, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
@@ -162,7 +162,7 @@ def _compare_swap(
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
         for metric in tables.notable_results(results):
-            _farthest_apart(metric, Pair(tables, base, tables, rows), (own, str(value)))
+            _farthest_apart(metric, ConditionPair(tables, base, tables, rows), (own, str(value)))
     return [tables]
 
 
@@ -207,7 +207,7 @@ def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
-def _farthest_apart(metric: str, pair: Pair, names: tuple[str, str]) -> None:
+def _farthest_apart(metric: str, pair: ConditionPair, names: tuple[str, str]) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
     first, second = pair.values(metric)
     known = np.flatnonzero(~np.isnan(first - second))
@@ -250,12 +250,12 @@ def _compare(
              "unpaired interval"]  # fmt: skip
     lines: list[list[str]] = []
     theirs = dict(other.rows.each_place())
-    places: list[tuple[str, Pair]] = []
+    places: list[tuple[str, ConditionPair]] = []
     together: dict[str, list[tuple[Any, Any]]] = {}
     for at, rows in one.rows.each_place():
         if at not in theirs:
             continue
-        runs = Pair(one, rows, other, theirs[at])
+        runs = ConditionPair(one, rows, other, theirs[at])
         where = ", ".join(f"{n} = {short(v)}" for n, v in zip(one.rows.axes, at, strict=True))
         places.append((where, runs))
         names_of = [key[:-1] if one.rows.over else key for key in runs.keys]

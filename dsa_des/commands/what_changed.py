@@ -19,7 +19,7 @@ from dsa_des.text.safe_text import printable, shortened
 _MOST_PLACES, _MOST_NAMED = 12, 8
 
 
-class Pair:
+class ConditionPair:
     """The runs that two conditions have in common, by (encounter, replica)."""
 
     def __init__(self, one: Tables, rows: IntArray, other: Tables, others: IntArray) -> None:
@@ -87,7 +87,7 @@ class _Change:
 
 
 def say_what_changed(
-    names: tuple[str, str], places: Sequence[tuple[str, Pair]], results: Iterable[Result]
+    names: tuple[str, str], places: Sequence[tuple[str, ConditionPair]], results: Iterable[Result]
 ) -> None:
     """Say what changed from one condition to another.
 
@@ -147,7 +147,7 @@ def _brief(change: _Change) -> str:
     return f"{name} (only one of the two has it in {change.gone + change.come})"
 
 
-def _change(result: Result, pair: Pair) -> _Change:
+def _change(result: Result, pair: ConditionPair) -> _Change:
     before, after = pair.values(result.name)
     known = ~np.isnan(before) & ~np.isnan(after)
     changes = changes_of(before[known], after[known])
@@ -164,10 +164,10 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
         return
     axis, baseline = tables.baseline
     names_of = [shortened(name) for name in tables.rows.axes if name != axis]
-    by_value: dict[Any, list[tuple[str, Pair]]] = {}
+    by_value: dict[Any, list[tuple[str, ConditionPair]]] = {}
     for value, others, base, rows in tables.rows.against(axis, baseline):
         where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
-        pair = Pair(tables, base, tables, rows)
+        pair = ConditionPair(tables, base, tables, rows)
         by_value.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")

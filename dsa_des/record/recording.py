@@ -73,7 +73,7 @@ def _nearest_and_all(name: str, declared: Iterable[str]) -> str:
     return f"{asked} (declared: {shown or 'nothing'})"
 
 
-class _Group(NamedTuple):
+class _AlikeMessages(NamedTuple):
     """Messages of one block that differ in nothing but their rows, and the tables they fill."""
 
     block: str
@@ -121,8 +121,8 @@ class Recorder:
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
         #: What came since `_read`, and of it what more messages of a block may join.
-        self._groups: list[_Group] = []
-        self._open: dict[str, list[_Group]] = {}
+        self._groups: list[_AlikeMessages] = []
+        self._open: dict[str, list[_AlikeMessages]] = {}
         self._texts: dict[tuple[str, str], _TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
@@ -186,7 +186,7 @@ class Recorder:
             first = self._checked(block, message)
             if not (tables := frozenset(table for table, _ in first)):
                 return
-            group = _Group(block, tables, [], first)
+            group = _AlikeMessages(block, tables, [], first)
             self._groups.append(group)
             # Rows of one instant stay in the order in which their block sent them.
             still = [one for one in groups if one.tables.isdisjoint(tables)]

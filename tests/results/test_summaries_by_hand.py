@@ -7,7 +7,7 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from dsa_des.commands.what_changed import Pair, say_what_changed
+from dsa_des.commands.what_changed import ConditionPair, say_what_changed
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.statistics import difference
 from dsa_des.results.summary import compare_axis, summarise
@@ -81,7 +81,7 @@ EXACT = [0.3, 1e6, 7.0, 0.8]
 def said_of(first, second, capsys):
     runs = table(rate=[1] * 4 + [2] * 4, replica=[0, 1, 2, 3] * 2, x=[*first, *second])
     tables = SimpleNamespace(rows=rows_of_table(runs, ["rate"], []))
-    sides = Pair(tables, np.arange(4), tables, np.arange(4, 8))
+    sides = ConditionPair(tables, np.arange(4), tables, np.arange(4, 8))
     say_what_changed(("a", "b"), [("", sides)], [NUMBERED])
     return capsys.readouterr().out
 
