@@ -38,7 +38,6 @@ __all__ = [
     "Columns",
     "Message",
     "Text",
-    "by_output",
     "column",
     "columns",
     "columns_of",
@@ -318,23 +317,6 @@ class Message(_Found):
         raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
 
 
-def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
-    """Return what a block returned as messages by output name; a lone one goes to the only output.
-
-    TypeError if a lone message could go to several outputs.
-    """
-    if result is None:
-        return {}
-    if not isinstance(result, Message):
-        return result
-    if len(outputs) != 1:
-        raise TypeError(
-            f"returned one message but has {len(outputs)} outputs; return a dict of "
-            f"{', '.join(sorted(outputs)) or 'nothing'}"
-        )
-    return {outputs[0]: result}
-
-
 def _of(message: Message, name: str) -> str:
     return f"{type(message).__qualname__}.{name}"
 
@@ -377,8 +359,10 @@ def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> N
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:
-    if value is None or value.__class__ is np.ndarray:
-        return None if value is None else value[rows]
+    if value is None:
+        return None
+    if value.__class__ is np.ndarray:  # nearly all are, and looking for a method costs more
+        return value[rows]
     if isinstance(value, dict):
         return {key: _pick(item, rows) for key, item in value.items()}
     if hasattr(value, "take_rows"):

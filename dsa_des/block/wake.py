@@ -1,6 +1,6 @@
-"""One wake of a block: the instants it runs at and its inputs there."""
+"""One wake of a block: the instants it runs at, its inputs there and what it answers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.message import Message
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,3 +125,20 @@ class Wake:
     def arrivals(self, port: str) -> list[Arrivals]:
         """Return the new rows of each wire into `port`, sorted by source name."""
         return self._arrived.get(port, [])
+
+
+def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
+    """Return what a block returned as messages by output name; a lone one goes to the only output.
+
+    TypeError if a lone message could go to several outputs.
+    """
+    if result is None:
+        return {}
+    if not isinstance(result, Message):
+        return result
+    if len(outputs) != 1:
+        raise TypeError(
+            f"returned one message but has {len(outputs)} outputs; return a dict of "
+            f"{', '.join(sorted(outputs)) or 'nothing'}"
+        )
+    return {outputs[0]: result}

@@ -14,8 +14,8 @@ import numpy as np
 from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
-from dsa_des.block.message import STATIC, Message, by_output
-from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.block.message import STATIC, Message
+from dsa_des.block.wake import Arrivals, Wake, by_output
 from dsa_des.errors import RunRefused
 
 

@@ -136,9 +136,10 @@ class _OfKey(Effect):
         value = getattr(block, self.key)
         if self.key == "delay_s" and block.delay_scans:
             return Verdict(True, f"delay is {block.delay_scans} scans")
-        if self.key == "processor":
-            named = "not given" if value is None else repr(value)
-            return Verdict(value is not None, f"{self.key} is {named}")
+        if value is None:
+            return Verdict(False, f"{self.key} is not given")
+        if isinstance(value, str):
+            return Verdict(True, f"{self.key} is {value!r}")
         return Verdict(bool(value), f"{self.key} is {float(value):g}")
 
 

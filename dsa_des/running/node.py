@@ -24,8 +24,8 @@ from dsa_des.arrays.run_ticks import (
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
-from dsa_des.block.message import Message, by_output
-from dsa_des.block.wake import Wake
+from dsa_des.block.message import Message
+from dsa_des.block.wake import Wake, by_output
 from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
