@@ -32,12 +32,14 @@ def replicas_of(scene: Any, *changes: Mapping[str, Any]) -> list[Any]:
 def same_as_alone(scenes: Sequence[Any], **options: Any) -> Simulation:
     """Run scenes in lock step, check each against a run of its own, and return the simulation."""
     simulation, together = tables_of(list(scenes), **options)
-    assert sum(table.num_rows for table in together.values()) > 0
+    rows = 0
     for number, scene in enumerate(scenes):
         for name, alone in tables_of(scene, len(scenes))[1].items():
             mine = pc.equal(together[name]["replica"], number)
             got = together[name].filter(mine).drop_columns(["replica"]).combine_chunks()
             assert got.equals(alone), (number, name)
+            rows += alone.num_rows
+    assert rows == sum(table.num_rows for table in together.values()) > 0
     return simulation
 
 
