@@ -158,7 +158,7 @@ def test_replicas_that_record_other_columns_run_as_they_do_alone(first):
     scene = load_scene(FIRST_LIGHT, duration_s="2", sets=["blocks.radar.enabled=false"])
     replicas = [Replica(1, {"blocks.radar.beam_sweep": sweeps}) for sweeps in (first, not first)]
     with pytest.raises(NotInLockStep, match="block radar records something else"):
-        recorded(lock_step, [scene_of(scene, replica) for replica in replicas])
+        tables_of([scene_of(scene, replica) for replica in replicas])
     swept = []
     for replica, together in zip(replicas, run_replicas(scene, replicas), strict=True):
         (alone,) = run_replicas(scene, [replica])
