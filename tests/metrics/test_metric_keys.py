@@ -72,6 +72,13 @@ def test_of_targets_that_are_seen_at_once_the_nearest_is_the_first():
         assert found[f"first_detection_range_m.{name}"] == pytest.approx(near_m, abs=0.02)
 
 
+def test_who_is_never_detected_has_no_first_detection():
+    blind = chain({**SENSORS, "eye": {**SENSORS["eye"], "threshold": 1e9}})
+    found = measured(blind, {"metric": "first_detection", "sensors": ["radar", "eye"]})
+    assert (found["detected.radar"], found["detected.eye"]) == (1, 0)
+    assert np.isnan([found[f"first_detection_{what}.eye"] for what in ("time_s", "range_m")]).all()
+
+
 @covers("target", "sensors", of=("[metric detection_share]",))
 def test_shares_of_looks_that_detect():
     """The radar hears the nearer target only, the camera looks at both."""
