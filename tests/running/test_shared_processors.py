@@ -85,16 +85,14 @@ def test_drawn_service_times_stay_in_their_spread_and_follow_the_seed(lab):
 
 def test_drawn_service_times_are_each_blocks_own(lab):
     def times(*blocks):
-        scans = {name: f"Pulse; scan_rate_hz = 2; {PIPELINE}" for name in blocks}
+        scans = dict.fromkeys(blocks, f"Pulse; scan_rate_hz = 2; {PIPELINE}")
         wires = [f'"{name} -> sink"' for name in blocks]
         path = lab.write({**scans, "sink": "Join"}, wires, duration_s=5)
         table = "\n[processors.gpu]\nservice_s = 0.01\nservice_spread_s = 0.1\n"
         path.write_text(path.read_text() + table)
-        done = outcomes(lab.run(path))
-        taken = [round(row["tick"] * 1e-9 - row["started_s"], 9) for row in done]
-        return [
-            [t for t, row in zip(taken, done, strict=True) if row["block"] == b] for b in blocks
-        ]
+        found = lab.run(path)
+        done = [outcomes(found, block) for block in blocks]
+        return [[round(row["tick"] * 1e-9 - row["started_s"], 9) for row in each] for each in done]
 
     one, other = times("alpha", "zeta")
     assert len(one) == len(other) == 10 and not set(one) & set(other)
