@@ -245,8 +245,9 @@ class Roster:
         if "keys" in self.__dict__:
             return self.keys[targets]
         keys, known = self._keys_so_far
-        new = np.unique(targets[~known[targets]])
-        if len(new):
+        missing = targets[~known[targets]]
+        if len(missing):
+            new = np.unique(missing)
             keys[new] = target_keys(tuple(self.names[i] for i in new.tolist()))
             known[new] = True
         return keys[targets]
