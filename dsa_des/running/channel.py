@@ -52,7 +52,7 @@ class Channel:
         self._waiting: deque[Rows] = deque()
         #: What was collected; the last row of each run is held.
         self._passed: list[Rows] = []
-        #: First arrival of every message pushed since `state` or `set_state`.
+        #: First arrival of every message pushed since `watch`.
         self._pushed: list[int] | None = None
 
     def hold(self, message: Message, tick: int) -> None:
@@ -64,17 +64,19 @@ class Channel:
         self._passed = [(RunTicks(held.run, np.full(count, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
-        """Return what waits and what is held, for `set_state`; note pushes from now on."""
-        self._pushed = []
+        """Return what waits and what is held, for `set_state`."""
         return tuple(self._waiting), tuple(self._passed)
 
     def set_state(self, state: tuple[Any, Any]) -> None:
         """Go back to a state that `state` gave."""
         self._waiting, self._passed = deque(state[0]), list(state[1])
+
+    def watch(self) -> None:
+        """Take note from now on of when what is pushed arrives."""
         self._pushed = []
 
     def earliest_pushed(self) -> int | None:
-        """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
+        """Return the first arrival of what was pushed since `watch`, or None."""
         return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
