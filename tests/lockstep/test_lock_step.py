@@ -174,6 +174,22 @@ def test_a_block_that_never_runs_has_its_say():
         assert culled[0] != culled[1]
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_replicas_that_record_other_columns_run_as_they_do_alone(first):
+    """A radar that is off asks for nothing, sweeping or not; but a sweep has columns of its own."""
+    scene = load_scene(FIRST_LIGHT, duration_s="2", sets=["blocks.radar.enabled=false"])
+    replicas = [Replica(1, {"blocks.radar.beam_sweep": sweeps}) for sweeps in (first, not first)]
+    with pytest.raises(NotInLockStep, match="block radar records something else"):
+        recorded(lock_step, [scene_of(scene, replica) for replica in replicas])
+    swept = []
+    for replica, together in zip(replicas, run_replicas(scene, replicas), strict=True):
+        (alone,) = run_replicas(scene, [replica])
+        columns = {table: list(values) for table, values in together.tables.items()}
+        assert columns == {table: list(values) for table, values in alone.tables.items()}
+        swept.append("own_lat_deg" in columns["detections"])
+    assert swept == [first, not first]
+
+
 def test_a_block_that_never_runs_reports():
     scene = load_scene(FIRST_LIGHT, duration_s="5")
     for key in ("radar", "eo", "ir"):
