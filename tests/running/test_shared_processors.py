@@ -144,8 +144,8 @@ def test_late_messages_overtake_and_nothing_depends_on_the_window(lab):
 
 
 BAD = [
-    ("jitter_s = -1", "jitter_s must be 0 or greater"),
-    ("drop_probability = 1.5", "drop_probability must be a number from 0 to 1"),
+    ("jitter_s = -1", "wires[0].jitter_s = -1: must be 0 or greater"),
+    ("drop_probability = 1.5", "wires[0].drop_probability = 1.5: must be a number from 0 to 1"),
     ("drop_probabilty = 0.5", "did you mean 'drop_probability'"),
 ]
 
@@ -162,5 +162,8 @@ def test_bad_processors_are_named(lab):
     text = " | ".join(map(str, lab.problems(path)))
     assert "did you mean 'gpu'" in text
     assert "processors.gpu.when_busy = 'sleep'" in text and "'drop_oldest'" in text
+    path.write_text(path.read_text().partition("\n[processors.gpu]")[0])
+    (problem,) = lab.problems(path)
+    assert "the scene has no such processor; [processors.gpo] would declare it" in str(problem)
     path = scene(lab, service="0")
     assert "must be greater than 0" in str(lab.problems(path)[0])
