@@ -50,6 +50,22 @@ def test_drawn_service_times_stay_in_their_spread_and_follow_the_seed(lab):
     assert ages != [row["age_s"] for row in outcomes(lab.run(path, seed=4))]
 
 
+def test_drawn_service_times_are_each_blocks_own(lab):
+    def times(*blocks):
+        scans = dict.fromkeys(blocks, f"Pulse; scan_rate_hz = 2; {PIPELINE}")
+        wires = [f'"{name} -> sink"' for name in blocks]
+        path = lab.write({**scans, "sink": "Join"}, wires, duration_s=5)
+        table = "\n[processors.gpu]\nservice_s = 0.01\nservice_spread_s = 0.1\n"
+        path.write_text(path.read_text() + table)
+        found = lab.run(path)
+        done = [outcomes(found, block) for block in blocks]
+        return [[round(row["tick"] * 1e-9 - row["started_s"], 9) for row in each] for each in done]
+
+    one, other = times("alpha", "zeta")
+    assert len(one) == len(other) == 10 and not set(one) & set(other)
+    assert times("zeta") == [other]
+
+
 def faulty(lab, options, duration_s=50):
     return lab.write(
         {"radar": "Pulse; scan_rate_hz = 20", "sink": "Relay"},
@@ -71,8 +87,8 @@ def test_late_messages_overtake_and_nothing_depends_on_the_window(lab):
 
 
 BAD = [
-    ("jitter_s = -1", "jitter_s must be 0 or greater"),
-    ("drop_probability = 1.5", "drop_probability must be a number from 0 to 1"),
+    ("jitter_s = -1", "wires[0].jitter_s = -1: must be 0 or greater"),
+    ("drop_probability = 1.5", "wires[0].drop_probability = 1.5: must be a number from 0 to 1"),
     ("drop_probabilty = 0.5", "did you mean 'drop_probability'"),
 ]
 
@@ -89,5 +105,8 @@ def test_bad_processors_are_named(lab):
     text = " | ".join(map(str, lab.problems(path)))
     assert "did you mean 'gpu'" in text
     assert "processors.gpu.when_busy = 'sleep'" in text and "'drop_oldest'" in text
+    path.write_text(path.read_text().partition("\n[processors.gpu]")[0])
+    (problem,) = lab.problems(path)
+    assert "the scene has no such processor; [processors.gpo] would declare it" in str(problem)
     path = scene(lab, service="0")
     assert "must be greater than 0" in str(lab.problems(path)[0])
