@@ -243,7 +243,7 @@ a radar at 1 Hz and two cameras, one of them late; two straight flights. Times a
 alone in a single run, where a step's fixed cost counts most ([in lock step](performance.md#track-updates)
 an update is far cheaper). Errors are the distance of the nearest confirmed track; the last rung of
 each ladder is the reference, which is not the truth either. Two flights of 20 s tell what
-rungs cost; they are too short to tell which is better. [What they mean](tracking.md#what-filters-association-and-late-looks-cost).
+rungs cost; they are too short to tell which is better. [What they mean](tracking.md#cost-of-filters-association-and-late-looks).
 
 {trackers}
 """
