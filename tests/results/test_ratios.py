@@ -197,7 +197,7 @@ def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
         w = np.repeat(random.choice([1.0, 3.0], 700), 3)
         found = paired_ratio(
             n, m, w, cluster=np.repeat(np.arange(700), 3),
-            method="gamma" if method == "t" else method, resamples=50,
+            method="gamma" if method == "t" else method, resamples=300,
         )  # fmt: skip
         kept += found.interval[0] <= truth <= found.interval[1]
     # What one event more would be is a whole cluster to the gammas: a little too wide.
