@@ -43,7 +43,7 @@ def as_numbers(name: str, value: ArrayLike) -> FloatArray:
 
 def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> None:
     """Raise a ValueError naming the first bad element, if there is one."""
-    if np.any(bad):
+    if np.count_nonzero(bad):
         first = float(np.broadcast_to(array, np.shape(bad))[bad].flat[0])
         # In full where six digits would show another number, as 1 for 1.0000001 pulses.
         short = f"{first:g}"

@@ -6,6 +6,7 @@ target cannot close in by more than their two largest speeds allow. What a row h
 its own epoch and so does not depend on the window that it is in.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,7 +104,8 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
         start: FloatArray = piece * length
         half = 0.5 * length
         middle = start + half
-        range_m = ranges_m(own.each(run[target], middle), targets.each(target, middle))
+        states = own.each(run[target], middle), targets.each(target, middle)
+        range_m = ranges_m(*(state.arrays()[:3] for state in states))
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
@@ -126,12 +128,9 @@ def _too_many(run: IntArray, of_run: int) -> BoolArray:
     return too_many[run]
 
 
-def ranges_m(here: TrajectoryState, there: TrajectoryState) -> FloatArray:
-    """Return the ranges from some states to others, broadcast, m."""
-    _, _, range_m = line_of_sight(
-        here.lat_deg, here.lon_deg, here.alt_m, there.lat_deg, there.lon_deg, there.alt_m,
-        validate=False,
-    )  # fmt: skip
+def ranges_m(here: Iterable[FloatArray], there: Iterable[FloatArray]) -> FloatArray:
+    """Return the ranges from some positions (lat_deg, lon_deg, alt_m) to others, broadcast, m."""
+    _, _, range_m = line_of_sight(*here, *there, validate=False)
     return range_m
 
 
@@ -149,6 +148,8 @@ def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearInt
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
+# Where targets are as so many epochs begin is kept, or as so many cells are: a run goes back.
+_MOST_EPOCHS, _MOST_CELLS = 64, 65_536
 # Steering keeps the speed to 1e-4 unless another one is commanded.
 _OWN_SPEED_MARGIN = 1.05
 
@@ -169,6 +170,10 @@ class SteeredCulling:
         # The last epoch that is known of each run, and ranges at its start.
         self._last: IntArray = np.full(len(own), -1, dtype=np.int64)
         self._range_m: FloatArray = np.zeros_like(self._targets_mps)
+        # Positions of targets as epochs begin, and which epochs, each by its number modulo room.
+        room = max(1, min(_MOST_EPOCHS, _MOST_CELLS // max(1, len(targets))))
+        self._known: IntArray = np.full((len(own), room), -1, dtype=np.int64)
+        self._position: FloatArray = np.empty((3, *self._known.shape, runs[1]))
 
     @staticmethod
     def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
@@ -181,11 +186,13 @@ class SteeredCulling:
         """Take note that the ownships of some runs fly on otherwise than was known."""
         self._last[run] = -1
 
-    def near(self, own: SteeredFleet, run: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may be in reach at each row, (rows, targets), of ownships as they
-        are steered by now; rows are in order of run.
+    def near(
+        self, own: SteeredFleet, run: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, BoolArray]:
+        """Return the states of ownships as they are steered by now at each row, and which targets
+        may be in reach, (rows, targets); rows are in order of run.
         """
-        width = self._targets_mps.shape[1]
+        rows = len(time_s)
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
         fastest = np.maximum(own.fastest_by(run, time_s), self._own_mps[run])
         begins = np.ones(len(run), dtype=bool)
@@ -195,13 +202,29 @@ class SteeredCulling:
         of, number = run[first], epoch[first]
         range_m = self._range_m[of]
         new = np.flatnonzero(self._last[of] != number)
+        begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
+        # One call for rows and epochs: a steered flight has parts to go through.
+        here = own.each(np.concatenate([run, begun]), np.concatenate([time_s, start_s])).arrays()
         if len(new):
-            begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
-            target = (begun[:, np.newaxis] * width + np.arange(width)).reshape(-1)
-            there = self._targets.each(target, np.repeat(start_s, width))
-            here = own.each(begun, start_s).reshaped((len(new), 1))
-            range_m[new] = ranges_m(here, there.reshaped((len(new), width)))
+            at_start = (values[rows:, np.newaxis] for values in here[:3])
+            range_m[new] = ranges_m(at_start, self._at_start(begun, number[new]))
         self._last[of], self._range_m[of] = number, range_m
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
-        return np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
+        near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
+        return TrajectoryState(*(values[:rows] for values in here)), near
+
+    def _at_start(self, run: IntArray, epoch: IntArray) -> FloatArray:
+        """Return the positions (3, n, targets) of the targets of runs as epochs (n,) begin."""
+        index = epoch % self._known.shape[1]
+        position = self._position[:, run, index]
+        new = np.flatnonzero(self._known[run, index] != epoch)
+        if len(new):
+            run, epoch, index = run[new], epoch[new], index[new]
+            shape = len(new), position.shape[2]
+            target = (run[:, np.newaxis] * shape[1] + np.arange(shape[1])).reshape(-1)
+            start_s = np.repeat(epoch * self.epoch_s[run], shape[1])
+            there = self._targets.each(target, start_s).reshaped(shape)
+            position[:, new] = there.arrays()[:3]
+            self._known[run, index], self._position[:, run, index] = epoch, position[:, new]
+        return position

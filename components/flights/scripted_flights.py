@@ -35,6 +35,7 @@ LONGEST_FLIGHT_S = 1e12
 MOST_ALT_M = 1e6
 """No flight starts farther above or below the ellipsoid."""
 
+_BY_KIND = [FORMULAS[kind] for kind in KINDS]
 _STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
 
 
@@ -194,6 +195,7 @@ class ScriptedFleet(Fleet):
         legs holds those of that kind, in their order.
         """
         self._names, self._between_s, self._fixed_rad = names, between_s, fixed_rad
+        self._some_fixed = not np.isnan(fixed_rad).all()
         self._until_s = np.minimum(between_s[1], between_s[0] + LONGEST_FLIGHT_S)
         self._counts, self._legs, self._kind, self._tables = counts, legs, kinds, tables
         self._find = PieceSearch(legs[0], counts)
@@ -282,34 +284,35 @@ class ScriptedFleet(Fleet):
 
     def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the leg that each of all flights is on at a time, and since when, s."""
-        start_s, until_s = self._between_s[0][aircraft], self._until_s[aircraft]
+        start_s, until_s = self._between_s[0].take(aircraft), self._until_s.take(aircraft)
         elapsed = np.where(time_s > start_s, time_s, start_s)
         elapsed = np.where(elapsed < until_s, elapsed, until_s) - start_s
         leg = self._find(aircraft, elapsed)
-        elapsed -= self._find.starts_s[leg]
+        elapsed -= self._find.starts_s.take(leg)
         return leg, elapsed
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         leg, elapsed = self._legs_at(aircraft, time_s)
-        lat, lon, alt, yaw = (np.empty(len(aircraft)) for _ in range(4))
-        for kind, formula in enumerate(FORMULAS.values()):
-            if kind not in self._tables:
-                continue
-            chosen: slice | IntArray = slice(None)
-            if len(self._tables) > 1:
-                chosen = np.flatnonzero(self._kind[leg] == kind)
-            table = self._tables[kind].take(self._slot[leg[chosen]], axis=1)
-            values = formula(table, np.ascontiguousarray(elapsed[chosen]))
-            for out, value in zip((lat, lon, alt, yaw), values, strict=True):
-                out[chosen] = value
-        derived = (yaw, self._legs[1][leg], self._legs[2][leg])
-        attitude = [
-            np.where(np.isnan(given[aircraft]), angle, given[aircraft])
-            for given, angle in zip(self._fixed_rad, derived, strict=True)
-        ]
+        kinds, slot = self._kind.take(leg), self._slot.take(leg)
+        in_use = np.flatnonzero(np.bincount(kinds)).tolist()
+        if len(in_use) == 1:
+            kind = in_use[0]
+            lat, lon, alt, yaw = _BY_KIND[kind](self._tables[kind].take(slot, axis=1), elapsed)
+        else:
+            lat, lon, alt, yaw = moved = tuple(np.empty(len(leg)) for _ in range(4))
+            for kind in in_use:
+                chosen = np.flatnonzero(kinds == kind)
+                table = self._tables[kind].take(slot[chosen], axis=1)
+                values = _BY_KIND[kind](table, elapsed[chosen])
+                for out, value in zip(moved, values, strict=True):
+                    out[chosen] = value
+        pitch, roll = self._legs[1].take(leg), self._legs[2].take(leg)
+        if self._some_fixed:
+            fixed = self._fixed_rad.take(aircraft, axis=1)
+            yaw, pitch, roll = np.where(np.isnan(fixed), (yaw, pitch, roll), fixed)
         first_s, last_s = self._between_s
-        present = (time_s >= first_s[aircraft]) & (time_s <= last_s[aircraft])
-        return TrajectoryState(lat, lon, alt, attitude[0], attitude[1], attitude[2], present)
+        present = (time_s >= first_s.take(aircraft)) & (time_s <= last_s.take(aircraft))
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return single aircraft's speeds over ground (n,), each at a time (n,) of its own."""
@@ -337,7 +340,7 @@ class ScriptedFleet(Fleet):
             derived = np.stack((np.full(len(of), np.nan), *self._legs[1:3, legs]))
             groups.append(
                 _Group(
-                    FORMULAS[KINDS[kind]],
+                    _BY_KIND[kind],
                     members,
                     self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
@@ -375,7 +378,7 @@ class _Group:
             for out, values in zip(moving, self.formula(self.table, inside), strict=True):
                 out[block] = values
             np.logical_and(t >= start_s, t <= end_s, out=present[block])
-        fixed_yaw, pitch, roll = (np.broadcast_to(angle, shape) for angle in self.attitude)
+        fixed_yaw, pitch, roll = np.broadcast_to(self.attitude[:, np.newaxis], (3, *shape))
         if self.yaw_is_fixed.any():
             yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

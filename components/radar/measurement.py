@@ -218,6 +218,8 @@ class MeasuredStrength(Effect[Strengthening]):
 
 def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
     """Return which of some cells are among the chosen ones."""
+    if isinstance(chosen, slice):  # one model for all
+        return np.arange(len(cells))
     inside = np.zeros(count, dtype=bool)
     inside[chosen] = True
     return np.flatnonzero(inside[cells])

@@ -28,7 +28,7 @@ def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
 
 def near(culling, own, times):
     """Return which targets may be in reach of one ownship at times, (times, targets)."""
-    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)
+    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)[1]
 
 
 @pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])

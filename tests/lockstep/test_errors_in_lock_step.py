@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from same_runs import replicas_of, same_as_alone
 
 from dsa_des.library.scenes import load_scene
 from dsa_des.record.recording import Recorder
@@ -33,8 +34,8 @@ def recorded(of, **options):
 
 
 @pytest.mark.parametrize("more", [[], SWEEP])
-def test_replicas_together_and_alone(lock, more):
-    simulation = lock.same_as_alone(lock.replicas_of(scene(*more), {}, {}, {}))
+def test_replicas_together_and_alone(more):
+    simulation = same_as_alone(replicas_of(scene(*more), {}, {}, {}))
     assert not simulation.timeline.split
 
 

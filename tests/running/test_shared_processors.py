@@ -83,6 +83,22 @@ def test_drawn_service_times_stay_in_their_spread_and_follow_the_seed(lab):
     assert ages != [row["age_s"] for row in outcomes(lab.run(path, seed=4))]
 
 
+def test_drawn_service_times_are_each_blocks_own(lab):
+    def times(*blocks):
+        scans = dict.fromkeys(blocks, f"Pulse; scan_rate_hz = 2; {PIPELINE}")
+        wires = [f'"{name} -> sink"' for name in blocks]
+        path = lab.write({**scans, "sink": "Join"}, wires, duration_s=5)
+        table = "\n[processors.gpu]\nservice_s = 0.01\nservice_spread_s = 0.1\n"
+        path.write_text(path.read_text() + table)
+        found = lab.run(path)
+        done = [outcomes(found, block) for block in blocks]
+        return [[round(row["tick"] * 1e-9 - row["started_s"], 9) for row in each] for each in done]
+
+    one, other = times("alpha", "zeta")
+    assert len(one) == len(other) == 10 and not set(one) & set(other)
+    assert times("zeta") == [other]
+
+
 def test_latency_delays_a_blocks_messages_and_keeps_its_window(lab):
     path = lab.write(
         {"radar": "Pulse; scan_rate_hz = 4; latency_s = 0.1", "sink": "Relay"},

@@ -1,7 +1,5 @@
 """The table ``looks``: what was looked at and not detected stands there too."""
 
-import math
-
 import crooked
 import numpy as np
 import pytest
@@ -105,18 +103,6 @@ def test_a_look_at_what_gives_no_echo_has_no_snr_and_no_chance(kind):
     assert {(row["snr_db"], row["confidence"]) for row in near} == {(None, None)}
     assert {row["detection_probability"] or 0.0 for row in near} == {0.0}
     assert far and all(row["snr_db"] is not None for row in far)
-
-
-@pytest.mark.parametrize("options", [{"window": 1}, {"window": 5}, {"simulate_everything": True}])
-def test_looks_do_not_depend_on_windows_or_on_what_is_culled(options):
-    far = {**crooked.DIVING, "name": "far", "east_m": 90_000.0}
-    sensors = {"radar": {**FADING, "scan_rate_hz": 4, "range_km": 8}, "eye": SEES_ALL}
-    del sensors["eye"]
-    scene = chain(sensors, targets=[crooked.DIVING, far], duration_s=2, record=ON)
-    plain, other = tables(scene), tables(scene, **options)
-    assert plain["looks"] == other["looks"]
-    assert [row["evaluated"] for row in plain["looks"].to_pylist()[:2]] == [True, False]
-    assert math.isfinite(plain["looks"]["true_range_m"][0].as_py())
 
 
 def test_a_value_of_neither_kind_is_one_problem():
