@@ -74,8 +74,11 @@ def finite(name: str, value: ArrayLike) -> FloatArray:
 
 def common_shape(**arrays: FloatArray) -> tuple[int, ...]:
     """Return the shape that the named arrays broadcast to."""
+    shapes_of = {array.shape for array in arrays.values()}
+    if len(shapes_of) == 1:  # the usual case, without NumPy's call
+        return shapes_of.pop()
     try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return np.broadcast_shapes(*shapes_of)
     except ValueError as error:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(f"the shapes do not broadcast together: {shapes}") from error

@@ -6,14 +6,13 @@ target cannot close in by more than their two largest speeds allow. What a row h
 its own epoch and so does not depend on the window that it is in.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from components.flights.fleet import Fleet
 from components.flights.many_flights import SteeredFleet
-from components.geometry import TrajectoryState, line_of_sight
+from components.geometry import TrajectoryState, slant_range_m
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5
@@ -105,7 +104,7 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
         half = 0.5 * length
         middle = start + half
         states = own.each(run[target], middle), targets.each(target, middle)
-        range_m = ranges_m(*(state.arrays()[:3] for state in states))
+        range_m = slant_range_m(*(values for state in states for values in state.arrays()[:3]))
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
@@ -128,12 +127,6 @@ def _too_many(run: IntArray, of_run: int) -> BoolArray:
     return too_many[run]
 
 
-def ranges_m(here: Iterable[FloatArray], there: Iterable[FloatArray]) -> FloatArray:
-    """Return the ranges from some positions (lat_deg, lon_deg, alt_m) to others, broadcast, m."""
-    _, _, range_m = line_of_sight(*here, *there, validate=False)
-    return range_m
-
-
 def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearIntervals:
     order = np.lexsort((start_s, target))
     target, start_s, end_s = target[order], start_s[order], end_s[order]
@@ -148,7 +141,7 @@ def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearInt
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
-# Where targets are as so many epochs begin is kept, or as so many cells are: a run goes back.
+# Targets are moved for so many epochs at once, or as many as are so many cells: a run goes back.
 _MOST_EPOCHS, _MOST_CELLS = 64, 65_536
 # Steering keeps the speed to 1e-4 unless another one is commanded.
 _OWN_SPEED_MARGIN = 1.05
@@ -157,23 +150,24 @@ _OWN_SPEED_MARGIN = 1.05
 class SteeredCulling:
     """The targets near ownships that are steered, one in each run, by epochs of time.
 
-    `own` flies as before it is steered; `targets` are as many in each run, one run after the other.
+    `own` flies as before it is steered; `targets` are as many in each run, one run after the other;
+    nothing is asked about after `end_s`.
     """
 
-    def __init__(self, own: Fleet, targets: Fleet, reach_m: float) -> None:
-        self._own_mps, self._targets, self._reach_m = own.max_speeds_mps, targets, reach_m
+    def __init__(self, own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> None:
+        self._own_mps, self._targets = own.max_speeds_mps, targets
+        self._reach_m, self._end_s = reach_m, end_s
         runs = len(own), len(targets) // len(own)
         self._targets_mps: FloatArray = targets.max_speeds_mps.reshape(runs)
         fastest = self._closing_mps(self._targets_mps, self._own_mps).max(axis=1, initial=1e-3)
         #: How long an epoch lasts around each ownship.
         self.epoch_s: FloatArray = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
-        # The last epoch that is known of each run, and ranges at its start.
-        self._last: IntArray = np.full(len(own), -1, dtype=np.int64)
-        self._range_m: FloatArray = np.zeros_like(self._targets_mps)
-        # Positions of targets as epochs begin, and which epochs, each by its number modulo room.
+        # Ranges and positions of targets as epochs begin, and of which epochs they are known, each
+        # by its number modulo room.
         room = max(1, min(_MOST_EPOCHS, _MOST_CELLS // max(1, len(targets))))
-        self._known: IntArray = np.full((len(own), room), -1, dtype=np.int64)
-        self._position: FloatArray = np.empty((3, *self._known.shape, runs[1]))
+        self._known: IntArray = np.full((2, len(own), room), -1, dtype=np.int64)
+        self._range_m: FloatArray = np.empty((len(own), room, runs[1]))
+        self._position: FloatArray = np.empty((3, *self._range_m.shape))
 
     @staticmethod
     def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
@@ -182,9 +176,10 @@ class SteeredCulling:
             (targets_mps + own_mps[:, np.newaxis] * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
         )
 
-    def forget(self, run: IntArray) -> None:
-        """Take note that the ownships of some runs fly on otherwise than was known."""
-        self._last[run] = -1
+    def forget(self, run: int, time_s: float) -> None:
+        """Take note that the ownship of a run flies otherwise than was known from a time on."""
+        known = self._known[0, run]
+        known[known * self.epoch_s[run] >= time_s] = -1
 
     def near(
         self, own: SteeredFleet, run: IntArray, time_s: FloatArray
@@ -200,15 +195,17 @@ class SteeredCulling:
         begins[1:] |= fastest[1:] != fastest[:-1]
         first = np.flatnonzero(begins)
         of, number = run[first], epoch[first]
-        range_m = self._range_m[of]
-        new = np.flatnonzero(self._last[of] != number)
+        index = number % self._range_m.shape[1]
+        range_m = self._range_m[of, index]
+        new = np.flatnonzero(self._known[0, of, index] != number)
         begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
         # One call for rows and epochs: a steered flight has parts to go through.
         here = own.each(np.concatenate([run, begun]), np.concatenate([time_s, start_s])).arrays()
         if len(new):
             at_start = (values[rows:, np.newaxis] for values in here[:3])
-            range_m[new] = ranges_m(at_start, self._at_start(begun, number[new]))
-        self._last[of], self._range_m[of] = number, range_m
+            range_m[new] = slant_range_m(*at_start, *self._at_start(begun, number[new]))
+            self._known[0, begun, index[new]] = number[new]
+            self._range_m[begun, index[new]] = range_m[new]
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
         near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
@@ -216,15 +213,27 @@ class SteeredCulling:
 
     def _at_start(self, run: IntArray, epoch: IntArray) -> FloatArray:
         """Return the positions (3, n, targets) of the targets of runs as epochs (n,) begin."""
-        index = epoch % self._known.shape[1]
-        position = self._position[:, run, index]
-        new = np.flatnonzero(self._known[run, index] != epoch)
-        if len(new):
-            run, epoch, index = run[new], epoch[new], index[new]
-            shape = len(new), position.shape[2]
-            target = (run[:, np.newaxis] * shape[1] + np.arange(shape[1])).reshape(-1)
-            start_s = np.repeat(epoch * self.epoch_s[run], shape[1])
-            there = self._targets.each(target, start_s).reshaped(shape)
-            position[:, new] = there.arrays()[:3]
-            self._known[run, index], self._position[:, run, index] = epoch, position[:, new]
+        _, _, room, width = self._position.shape
+        position, left = np.empty((3, len(run), width)), np.arange(len(run))
+        while len(left):
+            of, index = run[left], epoch[left] % room
+            known = self._known[1, of, index] == epoch[left]
+            position[:, left[known]] = self._position[:, of[known], index[known]]
+            left = left[~known]
+            if len(left):
+                self._move_targets(run[left], epoch[left])
         return position
+
+    def _move_targets(self, run: IntArray, epoch: IntArray) -> None:
+        """Learn where targets are from the first epoch of each run on, as many as there is room."""
+        of, first = np.unique(run, return_index=True)
+        _, _, room, width = self._position.shape
+        number = epoch[first, np.newaxis] + np.arange(room)
+        start_s = np.minimum(number * self.epoch_s[of, np.newaxis], self._end_s)
+        target = of[:, np.newaxis, np.newaxis] * width + np.arange(width)
+        target = np.broadcast_to(target, (*number.shape, width)).reshape(-1)
+        there = self._targets.each(target, np.repeat(start_s, width))
+        place = of[:, np.newaxis], number % room
+        self._known[1][place] = number
+        for position, values in zip(self._position, there.arrays(), strict=False):
+            position[place] = values.reshape(*number.shape, width)

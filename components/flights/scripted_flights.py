@@ -28,6 +28,7 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
+from dsa_des.arrays.column_values import constant
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
@@ -162,22 +163,7 @@ class ScriptedFleet(Fleet):
     """Scripted flights: columns over flights, and over all their legs laid end to end."""
 
     def __init__(self, flights: Sequence[ScriptedTrajectory]) -> None:
-        segments = [segment for flight in flights for segment in flight.segments]
-        kinds = np.array([KINDS.index(s.kind) for s in segments], dtype=np.int64)
-        fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]
-        legs = [(s.start_s, s.pitch_rad, s.roll_rad, s.speed_mps) for s in segments]
-        self._set(
-            [flight.name for flight in flights],
-            np.array([(f.start_time_s, f.end_time_s) for f in flights]).reshape(-1, 2).T.copy(),
-            np.array(fixed).reshape(-1, 3).T.copy(),
-            np.array([len(flight.segments) for flight in flights], dtype=np.int64),
-            np.array(legs).reshape(-1, 4).T.copy(),
-            kinds,
-            {
-                kind: np.stack([segments[i].parameters for i in np.flatnonzero(kinds == kind)], -1)
-                for kind in np.bincount(kinds).nonzero()[0].tolist()  # np.unique imports np.ma
-            },
-        )
+        self._set(*_columns_of(flights))
 
     def _set(
         self,
@@ -213,17 +199,15 @@ class ScriptedFleet(Fleet):
         fleet._set(*columns)
         return fleet
 
-    @classmethod
-    def joined(cls, one: ScriptedFleet, other: ScriptedFleet) -> ScriptedFleet:
-        """Return the flights of two fleets that are no subsets, `other` after `one`."""
-        both = (one, other)
-        names = ("_between_s", "_fixed_rad", "_counts", "_legs", "_kind")
-        columns = [np.concatenate([getattr(f, name) for f in both], axis=-1) for name in names]
-        tables = {
-            kind: np.concatenate([f._tables[kind] for f in both if kind in f._tables], axis=-1)
-            for kind in one._tables | other._tables
-        }
-        return cls.of_columns([*one._names, *other._names], *columns, tables)
+    def with_flights(self, flights: Sequence[ScriptedTrajectory]) -> ScriptedFleet:
+        """Return a fleet, which is no subset, with more flights at its end."""
+        names, *others, tables = _columns_of(flights)
+        mine = (self._between_s, self._fixed_rad, self._counts, self._legs, self._kind)
+        columns = [np.concatenate(both, axis=-1) for both in zip(mine, others, strict=True)]
+        for kind, table in self._tables.items():
+            known = [table, tables[kind]] if kind in tables else [table]
+            tables[kind] = np.concatenate(known, axis=-1)
+        return self.of_columns([*self._names, *names], *columns, tables)
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
@@ -351,6 +335,26 @@ class ScriptedFleet(Fleet):
         return groups, np.flatnonzero((kinds != _STRAIGHT) & (kinds != _HOLD))
 
 
+def _columns_of(flights: Sequence[ScriptedTrajectory]) -> tuple[Any, ...]:
+    """Return the columns of a fleet; see `ScriptedFleet._set`."""
+    segments = [segment for flight in flights for segment in flight.segments]
+    kinds = [KINDS.index(s.kind) for s in segments]
+    fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]
+    legs = [(s.start_s, s.pitch_rad, s.roll_rad, s.speed_mps) for s in segments]
+    tables: dict[int, Any] = {kind: [] for kind in sorted(set(kinds))}
+    for kind, segment in zip(kinds, segments, strict=True):
+        tables[kind].append(segment.parameters)
+    return (
+        [flight.name for flight in flights],
+        np.array([(f.start_time_s, f.end_time_s) for f in flights]).reshape(-1, 2).T.copy(),
+        np.array(fixed).reshape(-1, 3).T.copy(),
+        np.array([len(flight.segments) for flight in flights], dtype=np.int64),
+        np.array(legs).reshape(-1, 4).T.copy(),
+        np.array(kinds, dtype=np.int64),
+        {kind: np.stack(rows, axis=-1) for kind, rows in tables.items()},
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Group:
     """Flights of one leg each that share a formula: one array expression."""
@@ -366,7 +370,7 @@ class _Group:
         """Return the group's states, (times, flights); angles that never change, once for all."""
         start_s, end_s, until_s = self.times_s
         shape = len(times), len(start_s)
-        moving = lat, lon, alt, yaw = tuple(np.empty(shape) for _ in range(4))
+        moving: list[FloatArray] = []
         present = np.empty(shape, dtype=bool)
         rows = max(1, CELLS_AT_ONCE // len(start_s))
         for first in range(0, len(times), rows):
@@ -375,10 +379,19 @@ class _Group:
             inside = np.maximum(t, start_s)
             np.minimum(inside, until_s, out=inside)
             inside -= start_s
-            for out, values in zip(moving, self.formula(self.table, inside), strict=True):
-                out[block] = values
+            now = self.formula(self.table, inside)
+            # Of flights that keep their altitude one row of them is for all times.
+            moving = moving or [
+                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
+                for v in now
+            ]
+            for out, values in zip(moving, now, strict=True):
+                if out.flags.writeable:
+                    out[block] = values
             np.logical_and(t >= start_s, t <= end_s, out=present[block])
-        fixed_yaw, pitch, roll = np.broadcast_to(self.attitude[:, np.newaxis], (3, *shape))
-        if self.yaw_is_fixed.any():
+        lat, lon, alt, yaw = moving or np.empty((4, *shape))
+        fixed_yaw, *others = self.attitude
+        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
+        if np.count_nonzero(self.yaw_is_fixed):
             yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

@@ -183,12 +183,12 @@ class TrafficSource(Component):
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
         if not culls or not math.isfinite(reach_m):
             return
+        end_s = float(self.context.duration_s) + lasts_s
         if not self.context.producers:
-            end_s = float(self.context.duration_s) + lasts_s
             intervals = near_intervals(flights.own, flights.targets, reach_m, end_s)
             self._flown = replace(self._flown, intervals=intervals)
         elif lasts_s == 0.0:
-            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m)
+            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m, end_s)
 
     def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
@@ -287,7 +287,8 @@ class TrafficSource(Component):
         own, known = steered(self._flown.own, due, wake, run)
         self._flown = replace(self._flown, own=own)
         if self._epochs is not None:
-            self._epochs.forget(np.array([one.run for one in due], dtype=np.int64))
+            for one in due:
+                self._epochs.forget(one.run, one.tick / wake.ticks_per_s)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, own)
         return known
