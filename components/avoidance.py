@@ -202,9 +202,9 @@ class TurnAway(Component):
             near |= np.isnan(tracks.range_m)
         row = tracks.row_of_entries
         manoeuvres: dict[int, Manoeuvre] = {}
-        for index in np.unique(row[near]).tolist():
-            tick = int(wake.ticks[index])
-            run = int(wake.run[index])
+        rows = np.flatnonzero(np.bincount(row[near]))
+        instants = wake.ticks[rows].tolist(), wake.run[rows].tolist()
+        for index, tick, run in zip(rows.tolist(), *instants, strict=True):
             if tick < self._free_from.get(run, 0):
                 continue
             entries = np.flatnonzero(near & (row == index))

@@ -225,23 +225,20 @@ def flown_from(
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     flown = []
-    base_s = np.ptp(times_around_s(time_s), axis=1).tolist()
+    chords = _chords(around, time_s) if any(one is None for one in before) else []
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
         position = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
         if earlier is None:
-            north, east = _chord(around, row)
-            along = float(north[1] - north[0]), float(east[1] - east[0])
-            heading_deg = math.degrees(math.atan2(along[1], along[0]))
-            speed_mps = math.hypot(*along) / base_s[row]
-            plan = SteeringPlan(
-                (), (), _own_climb((high - low) / base_s[row], manoeuvre), (), speed_mps
-            )
+            north_m, east_m, base_s = chords[row]
+            heading_deg = math.degrees(math.atan2(east_m, north_m))
+            speed_mps = math.hypot(north_m, east_m) / base_s
+            plan = SteeringPlan((), (), _own_climb((high - low) / base_s, manoeuvre), (), speed_mps)
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
             )
-            rate_rad_s = turned_rad / base_s[row]
+            rate_rad_s = turned_rad / base_s
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             elapsed_s = at_s - earlier.start_time_s
@@ -257,12 +254,16 @@ def flown_from(
     return flown
 
 
-def _chord(around: TrajectoryState, row: int) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of the chord seen from its middle, so that the track is the one there."""
-    positions = around.lat_deg[row], around.lon_deg[row], around.alt_m[row]
-    middle, ends = [part[1:2] for part in positions], [part[[0, 2]] for part in positions]
+def _chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
+    """Return the way from before to after each time, north and east, m, and how long it takes, s.
+
+    Its ends are seen from its middle, so that the track is the one there.
+    """
+    positions = around.lat_deg, around.lon_deg, around.alt_m
+    middle, ends = [part[:, 1:2] for part in positions], [part[:, [0, 2]] for part in positions]
     north, east, _ = line_of_sight_ned(*middle, *ends)
-    return north, east
+    ways = north[:, 1] - north[:, 0], east[:, 1] - east[:, 0]
+    return np.stack([*ways, np.ptp(times_around_s(time_s), axis=1)], axis=-1).tolist()
 
 
 def _turned(turns: Pieces, elapsed_s: float) -> float:
