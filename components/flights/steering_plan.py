@@ -224,10 +224,6 @@ def flown_from(
     `around` says where each would be without it, (n, 3), at `times_around_s`. Parts of an
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
-    middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
-    # Ends of the chord seen from its middle, so that the track is the one there.
-    ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
-    north, east, _ = line_of_sight_ned(*middle, *ends)
     flown = []
     base_s = np.ptp(times_around_s(time_s), axis=1).tolist()
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
@@ -235,7 +231,8 @@ def flown_from(
         low, here, high = around.alt_m[row].tolist()
         position = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
         if earlier is None:
-            along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
+            north, east = _chord(around, row)
+            along = float(north[1] - north[0]), float(east[1] - east[0])
             heading_deg = math.degrees(math.atan2(along[1], along[0]))
             speed_mps = math.hypot(*along) / base_s[row]
             plan = SteeringPlan(
@@ -258,6 +255,14 @@ def flown_from(
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
         flown.append(_flown_from(name, position, heading_deg, at_s, plan))
     return flown
+
+
+def _chord(around: TrajectoryState, row: int) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the chord seen from its middle, so that the track is the one there."""
+    positions = around.lat_deg[row], around.lon_deg[row], around.alt_m[row]
+    middle, ends = [part[1:2] for part in positions], [part[[0, 2]] for part in positions]
+    north, east, _ = line_of_sight_ned(*middle, *ends)
+    return north, east
 
 
 def _turned(turns: Pieces, elapsed_s: float) -> float:

@@ -349,6 +349,7 @@ def read_processors(
     for name, block in blocks.items():
         wanted = block.options.processor
         if wanted is not None and wanted not in tables:
-            message = f"the scene has no such processor{did_you_mean(wanted, tables)}"
+            declared = did_you_mean(wanted, tables) or f"; [processors.{wanted}] would declare it"
+            message = f"the scene has no such processor{declared}"
             scene_file.report(("blocks", name, "processor"), message, str(wanted))
     return {name: processor for name, processor in read.items() if processor is not None}

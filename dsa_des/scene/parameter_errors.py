@@ -138,6 +138,7 @@ def explain(
             message = re.sub("a valid boolean(, unable.*)?", "true or false", message)
             message = re.sub(r"a valid dictionary.*", "a table", message)
             message = re.sub("a valid (list|tuple)", "a list", message)
+            message = re.sub("^String should have at least 1 .*", "must not be empty", message)
             if item["type"] == "literal_error":
                 names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
                 close = nearest(str(item["input"]), names)

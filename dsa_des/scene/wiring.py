@@ -111,7 +111,7 @@ def read_wires(
         try:
             hops = _hops(entry)
         except _WireError as error:
-            scene.report(key, str(error), *error.value)
+            scene.report((*key, *error.key), str(error), *error.value)
             unsure.update(classes)  # its target is unknown
             continue
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
@@ -134,8 +134,11 @@ def read_wires(
 
 
 class _WireError(Exception):
-    def __init__(self, message: str, *value: Any) -> None:
+    """What is wrong with a wire, or with one `option` of it."""
+
+    def __init__(self, message: str, *value: Any, option: str | None = None) -> None:
         self.value = value
+        self.key = () if option is None else (option,)
         super().__init__(message)
 
 
@@ -166,9 +169,10 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
     if "delay" in entry:
         match = _SCANS.fullmatch(str(entry["delay"]).strip())
         if not match or not match[1].strip("0"):
-            raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
+            raise _WireError('must read "1 scan" or "N scans"', entry["delay"], option="delay")
         if len(match[1]) > 9 or int(match[1]) > _MOST_SCANS:
-            raise _WireError(f"delay must be at most {_MOST_SCANS:,} scans", entry["delay"])
+            limit = f"must be at most {_MOST_SCANS:,} scans"
+            raise _WireError(limit, entry["delay"], option="delay")
         options["delay_scans"] = int(match[1])
     for key in ("delay_s", "jitter_s"):
         if key in entry:
@@ -176,12 +180,13 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
     if "drop_probability" in entry:
         share = entry["drop_probability"]
         if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
-            raise _WireError("drop_probability must be a number from 0 to 1", share)
+            raise _WireError("must be a number from 0 to 1", share, option="drop_probability")
         options["drop_probability"] = float(share)
     if "holds" in entry:
         holds = entry["holds"]
         if holds != "nothing" and not isinstance(holds, dict):
-            raise _WireError("holds must be 'nothing' or a table of the message's fields", holds)
+            allowed = "must be 'nothing' or a table of the message's fields"
+            raise _WireError(allowed, holds, option="holds")
         options["holds"] = holds
     return options
 
@@ -190,9 +195,9 @@ def _seconds(key: str, value: Any) -> Fraction:
     try:
         seconds = parse_rational(value)
     except ValueError as error:
-        raise _WireError(f"{key} {error}", value) from None
+        raise _WireError(str(error), value, option=key) from None
     if seconds < 0:
-        raise _WireError(f"{key} must be 0 or greater", value)
+        raise _WireError("must be 0 or greater", value, option=key)
     return seconds
 
 

@@ -1,7 +1,5 @@
 """The table ``looks``: what was looked at and not detected stands there too."""
 
-import math
-
 import crooked
 import numpy as np
 import pytest
@@ -90,18 +88,6 @@ def test_a_curve_of_pd_from_a_folder_lies_within_the_bounds_of_the_model():
         assert n >= 400 and low <= hit[inside].sum() <= high
         curve.append(mean)
     assert curve[0] > 0.9 and curve[-1] < 0.3 and curve == sorted(curve, reverse=True)
-
-
-@pytest.mark.parametrize("options", [{"window": 1}, {"window": 5}, {"simulate_everything": True}])
-def test_looks_do_not_depend_on_windows_or_on_what_is_culled(options):
-    far = {**crooked.DIVING, "name": "far", "east_m": 90_000.0}
-    sensors = {"radar": {**FADING, "scan_rate_hz": 4, "range_km": 8}, "eye": SEES_ALL}
-    del sensors["eye"]
-    scene = chain(sensors, targets=[crooked.DIVING, far], duration_s=2, record=ON)
-    plain, other = tables(scene), tables(scene, **options)
-    assert plain["looks"] == other["looks"]
-    assert [row["evaluated"] for row in plain["looks"].to_pylist()[:2]] == [True, False]
-    assert math.isfinite(plain["looks"]["true_range_m"][0].as_py())
 
 
 def test_a_value_of_neither_kind_is_one_problem():

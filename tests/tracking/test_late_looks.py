@@ -93,22 +93,6 @@ def test_one_step_is_near_what_working_on_all_again_gives(kind):
     assert apart["one_step"] < 0.02 * apart["drop"]
 
 
-@pytest.mark.parametrize("late", ["drop", "one_step", "rerun"])
-def test_late_looks_change_no_byte_by_window_or_company(late):
-    one = scene(*LATE, f"blocks.tracker.late='{late}'", duration_s="2.5")
-    _, alone = tracked(Simulation, one)
-    for window in (1, 9):
-        assert tracked(Simulation, one, window=window)[1].equals(alone)
-    scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(3 if late == "rerun" else 2)]
-    each = [alone, *(tracked(Simulation, single)[1] for single in scenes[1:])]
-    for window in (None, 30) if late == "rerun" else (30,):
-        _, together = tracked(lock_step, scenes, window=window)
-        for number, expected in enumerate(each):
-            mine = together.filter(pc.equal(together["replica"], number))
-            mine = mine.drop_columns(["replica"]).combine_chunks()
-            assert mine.equals(expected), (window, number)
-
-
 def test_looks_older_than_the_lag_are_left_out_and_counted():
     def left_out(*sets):
         simulation, table = tracked(Simulation, scene(*LATE, *sets, duration_s="2"))
