@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 import dsa_des
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import Pairs, PairSampler, set_of_pairs
 from components.formats.set_file import write_set
 from components.visual.acquisition import VISUAL_RANGE_DEPTH, closing_opportunity, round_share
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.seen_in_time import Eyes, shares_unseen
 from docs.make.published.volumes import VOLUMES, violates
