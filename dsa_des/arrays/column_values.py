@@ -98,10 +98,11 @@ def repeats(values: AnyArray, one: AnyArray) -> bool:
 
 
 def constant(value: Any, rows: int, kind: Any) -> AnyArray:
-    """Return a column that holds the same in all rows: one value, seen `rows` times."""
+    """Return a column that holds the same in all rows: one value or array, seen `rows` times."""
     one = np.array(value, dtype=kind)
     one.flags.writeable = False
-    column: AnyArray = np.ndarray((rows,), one.dtype, buffer=one, strides=(0,))
+    shape, strides = (rows, *one.shape), (0, *one.strides)
+    column: AnyArray = np.ndarray(shape, one.dtype, buffer=one, strides=strides)
     return column
 
 

@@ -66,6 +66,12 @@ def test_company_changes_no_byte(every_tracker):
     same_as_alone(replicas_of(every_tracker, {}, {}), window=40)
 
 
+def test_boxes_about_gates_change_no_byte(every_tracker, monkeypatch):
+    known = tracks_of(every_tracker)
+    monkeypatch.setattr("components.tracking.gating._FEW_PAIRS", 0)
+    assert tracks_of(every_tracker).equals(known)
+
+
 def tracks_of(scene):
     return tables_of(scene)[1]["state_tracks"]
 
