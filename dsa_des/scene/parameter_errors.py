@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import SchemaValidator
 
 from dsa_des.block.component import Parameters, as_written
-from dsa_des.errors import Disagreements, Problem, did_you_mean, nearest
+from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 
@@ -126,6 +126,8 @@ def explain(
         elif not item["loc"] and item["type"] == "value_error":
             texts = all_disagreements(model, item)
             problems += [_refused(scene_file, at, text, item["input"]) for text in texts]
+        elif isinstance(text := str(item.get("ctx", {}).get("error")), Lines):
+            problems.append(_refused(scene_file, at, text, item["input"]))
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)
