@@ -98,6 +98,13 @@ def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, A
     return blocks, sections, duration
 
 
+#: Keys of a scene that are no changes of its replicas, and why not.
+_THE_SAME = {
+    "seed": "cannot be drawn: every replica has a seed of its own, of the study's",
+    "wires": "cannot be drawn: wires are the same in all replicas, and can be an axis",
+}
+
+
 def _each_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
     """Make one change after the other; `SceneError` says what is wrong with each."""
     problems: list[Problem] = []
@@ -115,7 +122,8 @@ def _each_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, 
             else:
                 known = [f"blocks.{name}" for name in blocks] + [*sections, "duration_s"]
                 hint = did_you_mean(".".join(map(str, path[:2])), known)
-                problems.append(_problem(scene, key, f"is no key of this scene{hint}", value))
+                why = _THE_SAME.get(str(path[0]), f"is no key of this scene{hint}")
+                problems.append(_problem(scene, key, why, value))
         except ValidationError as error:
             file = SceneFile(scene.path, {})
             for problem in explain(file, (), key, BlockOptions, error):
