@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from components.messages.columns import POSE as POSE_COLUMNS
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import UsageError
 from dsa_des.record.run_folder import Run, with_columns_of_rows
@@ -21,9 +22,7 @@ _STATE = (
 )  # fmt: skip
 OWNSHIP = "ownship"
 #: What a pose is made of, as recorded with what was measured.
-POSE = (
-    "own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad", "own_roll_rad",
-)  # fmt: skip
+POSE = tuple(POSE_COLUMNS)
 # Greater than any position, speed or time of a run.
 _LARGEST = 1e10
 

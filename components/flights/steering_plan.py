@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.flights.attitude import STANDARD_GRAVITY_MPS2
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
@@ -143,7 +143,7 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     rate_rad_s = manoeuvre.rate_rad_s
     if manoeuvre.bank_rad:
         slowest_mps = max(speed_mps, _SLOWEST_BANKED_MPS)
-        rate_rad_s = STANDARD_GRAVITY_MPS2 * math.tan(manoeuvre.bank_rad) / slowest_mps
+        rate_rad_s = STANDARD_GRAVITY_M_S2 * math.tan(manoeuvre.bank_rad) / slowest_mps
     rate_deg_s = math.copysign(math.degrees(rate_rad_s), manoeuvre.turn_rad)
     angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
     rolling: Pieces = ()
@@ -162,10 +162,10 @@ def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
     -g / (v p) ln cos(p t). The first piece is longer where the turn would hardly show in it.
     """
-    per_rad = speed_mps * roll_rad_s / STANDARD_GRAVITY_MPS2
+    per_rad = speed_mps * roll_rad_s / STANDARD_GRAVITY_M_S2
     if not per_rad:
         return ()
-    full_rad = math.atan(rate_rad_s * speed_mps / STANDARD_GRAVITY_MPS2)
+    full_rad = math.atan(rate_rad_s * speed_mps / STANDARD_GRAVITY_M_S2)
     lasts_s = min(full_rad, math.acos(math.exp(-angle_rad * per_rad))) / roll_rad_s
     ends_s = [lasts_s * k / _ROLL_PIECES for k in range(_ROLL_PIECES + 1)]
     turned_rad = [-math.log(math.cos(roll_rad_s * end_s)) / per_rad for end_s in ends_s]

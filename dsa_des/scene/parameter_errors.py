@@ -108,7 +108,8 @@ def explain(
             instead = None if inside else getattr(model, "former", {}).get(name)
             allowed = _sibling_names(model, item["loc"])
             hint = f"; {instead}" if instead else did_you_mean(name, allowed)
-            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
+            kind = "parameter" if key else "key"
+            problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
         elif length := _list_length(model, item):
             given = _at(scene_file, at)
             problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
@@ -134,6 +135,8 @@ def explain(
             message = message.replace(
                 "a valid number, unable to parse string as a number", "a number"
             )
+            message = message.replace("a valid string", "text")
+            message = re.sub("a valid integer(, unable.*)?", "a whole number", message)
             message = re.sub("a valid boolean(, unable.*)?", "true or false", message)
             message = re.sub(r"a valid dictionary.*", "a table", message)
             message = re.sub("a valid (list|tuple)", "a list", message)
@@ -251,7 +254,7 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
 
 def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
     """Return the names allowed where `loc` points, following nested models as far as they go."""
-    names = list(model.model_fields)
+    names = [field.alias or name for name, field in model.model_fields.items()]
     for part in loc[:-1]:
         field = model.model_fields.get(part) if isinstance(part, str) else None
         if field is not None:
