@@ -1,11 +1,14 @@
 """Looks that come late, in scenes whose cameras' messages take their time."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pyarrow.compute as pc
 import pytest
 from same_runs import tables_of
 
 import dsa_des
+from components.tracking.out_of_sequence import plan_of_late, straight_plan
 from docs.make.track_consistency import (
     NEARLY,
     NOISY,
@@ -107,6 +110,23 @@ def test_looks_older_than_the_lag_are_left_out_and_counted():
     assert most > some > 0
     assert left_out("blocks.tracker.late='drop'") > some
     assert left_out() == left_out("blocks.tracker.lag_s=0.31") == 0
+
+
+@pytest.mark.parametrize("rerun", [False, True])
+def test_a_look_as_late_as_the_lag_still_counts_and_no_later_one(rerun):
+    """Ticks 0, 10 and 20 came in time; what is as old as the lag is worked on, and remembered."""
+    looks = SimpleNamespace(
+        tick=np.array([0, 10, 20, 10, 9]), sensors=np.array([1, 1, 1, 2, 2]), row=np.arange(5)
+    )
+    plan, left_out, kept = plan_of_late(looks, np.zeros(5, dtype=int), 0, 10, rerun=rerun)
+    assert left_out == [4] and set(plan.look.tolist()) == {0, 1, 2, 3}
+    assert kept == ([1, 3, 2] if rerun else [1, 2])
+
+
+def test_where_late_looks_are_left_out_one_of_the_newest_instant_is_not_late():
+    looks = SimpleNamespace(tick=np.array([20, 19, 25, 25]), row=np.arange(4))
+    plan, left_out = straight_plan(looks, np.zeros(4, dtype=int), np.array([20]))
+    assert plan.look.tolist() == [0, 2, 3] and left_out == [1]
 
 
 def test_looks_of_the_future_wait_and_are_counted():
