@@ -245,8 +245,9 @@ class Roster:
         if "keys" in self.__dict__:
             return self.keys[targets]
         keys, known = self._keys_so_far
-        new = np.unique(targets[~known[targets]])
-        if len(new):
+        there = known[targets]
+        if np.count_nonzero(there) < there.size:
+            new = np.unique(targets[~there])
             keys[new] = target_keys(tuple(self.names[i] for i in new.tolist()))
             known[new] = True
         return keys[targets]

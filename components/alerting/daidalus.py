@@ -142,45 +142,45 @@ class DaidalusAlerting(Component):
         times = asked.tick / wake.ticks_per_s
         own = self._own.states(asked, self._over_s)
         flights = self._belief.flights(asked, times, own, self._own)
-        known, relative = flights.known, [np.ravel(part) for part in flights.relative]
-        bounds = None
-        if flights.deviations is not None:
-            deviations = Deviations(*(np.ravel(part) for part in flights.deviations))
-            bounds = margins(self._configuration, deviations, np.hypot(*relative[:2]))
+        known = flights.known
+        row, column = known.nonzero()
+        relative = tuple(part[row, column] for part in flights.relative)
+        wrong = flights.deviations and Deviations(*(part[row] for part in flights.deviations))
+        bounds = wrong and margins(self._configuration, wrong, np.hypot(*relative[:2]))
         scan = np.arange(len(asked)) if flights.scan is None else flights.scan
-        pairs = AlertPairs(tuple(relative), self._own_flights(own, scan, known.shape), bounds)
-        times_s, due, early = levels_without_memory(self._configuration, self._alerter, pairs)
+        pairs = AlertPairs(relative, _own_flights(own, scan[row]), bounds)
+        times_s, *now_due = levels_without_memory(self._configuration, self._alerter, pairs)
+        # Memory is asked of all, also of those that are not known now.
         columns = known.shape[1]
-        each = np.repeat(scan, columns)
-        number = np.tile(np.arange(columns), len(known))
+        entry = row * columns + column
+        due, early = np.zeros((2, known.size, times_s.shape[1]), dtype=bool)
+        due[entry], early[entry] = now_due
+        each = scan.repeat(columns)
         level = self._memory.levels(
             asked.run[each],
-            number if flights.number is None else flights.number,
+            np.tile(np.arange(columns), len(known)) if flights.number is None else flights.number,
             times[each],
             due,
             early,
             known.ravel(),
         )
         self._forget(asked, times, wake)
-        row, column = np.nonzero(known)
-        entry = row * columns + column
         lookahead_s = self._configuration["lookahead_time"]
-        result = separation(relative, lookahead_s, np.full(known.size, np.nan))
-        times_s = np.where(np.isfinite(times_s), times_s, np.nan)[entry]
+        result = separation(relative, lookahead_s, np.full(len(row), np.nan))
+        times_s = np.where(np.isfinite(times_s), times_s, np.nan)
         numbered = range(1, len(self._alerter.levels) + 1)
-        wrong = {} if flights.deviations is None else flights.deviations._asdict()
         return AlertLevels(
             asked.tick,
             offsets_of(scan[row], len(asked)),
             column if flights.target is None else flights.target,
             level[entry],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
-            result.time_to_closest_s[entry],
-            result.miss_horizontal_m[entry],
-            result.miss_vertical_m[entry],
+            result.time_to_closest_s,
+            result.miss_horizontal_m,
+            result.miss_vertical_m,
             {} if flights.number is None else {"track": flights.number},
-            {name: np.ravel(part)[entry] for name, part in wrong.items()},
-            {name: part[entry] for name, part in zip(_RELATIVE, relative, strict=True)},
+            {} if wrong is None else wrong._asdict(),
+            dict(zip(_RELATIVE, relative, strict=True)),
             own,
             self._roster,
             run=asked.run,
@@ -196,11 +196,10 @@ class DaidalusAlerting(Component):
         since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
         self._own.set_aside(since, wake, late_sights=self._source != "estimates")
 
-    def _own_flights(
-        self, own: Mapping[str, FloatArray], scan: IntArray, shape: tuple[int, ...]
-    ) -> State:
-        """Return the ownship's flight beside every target, in its own plane."""
-        zero = np.zeros(shape)
-        motion = (np.nan_to_num(own[name])[scan] for name in _OWN_MOTION)
-        alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
-        return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
+
+def _own_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:
+    """Return the ownship's flight at some scans, in its own plane."""
+    motion = np.array([own[name][scan] for name in _OWN_MOTION])
+    motion[np.isnan(motion)] = 0.0
+    zero = np.zeros(len(scan))
+    return State(zero, zero, *motion)

@@ -62,9 +62,9 @@ class OwnPoses:
         )
 
     def _keep(self, poses: ReceivedRows) -> None:
-        # Of those that overtook each other on the way, the newest counts.
+        # One that a newer one overtook on the way tells nothing any more.
         newest = RunTicks(poses.replica, poses.tick).newest()
-        self._poses = poses.with_columns(tick=newest.tick)
+        self._poses = poses.take(poses.tick >= newest.tick)
 
     def have_come(self, asked: RunTicks) -> BoolArray:
         """Return whether any has come by some instants."""

@@ -43,7 +43,7 @@ def as_numbers(name: str, value: ArrayLike) -> FloatArray:
 
 def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> None:
     """Raise a ValueError naming the first bad element, if there is one."""
-    if np.any(bad):
+    if np.count_nonzero(bad):
         first = float(np.broadcast_to(array, np.shape(bad))[bad].flat[0])
         # In full where six digits would show another number, as 1 for 1.0000001 pulses.
         short = f"{first:g}"
@@ -74,8 +74,11 @@ def finite(name: str, value: ArrayLike) -> FloatArray:
 
 def common_shape(**arrays: FloatArray) -> tuple[int, ...]:
     """Return the shape that the named arrays broadcast to."""
+    shapes_of = {array.shape for array in arrays.values()}
+    if len(shapes_of) == 1:  # the usual case, without NumPy's call
+        return shapes_of.pop()
     try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return np.broadcast_shapes(*shapes_of)
     except ValueError as error:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(f"the shapes do not broadcast together: {shapes}") from error

@@ -9,7 +9,7 @@ import numpy as np
 
 from components.display.recorded_rows import Detected
 from components.display.symbols import by_target, evenly
-from components.geometry import line_of_sight, line_of_sight_ned
+from components.geometry import line_of_sight_ned, slant_range_m
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.running.simulation import Simulation
@@ -113,10 +113,9 @@ class Flights:
         if target.name in self._closest_s:
             times = np.union1d(times, [self._closest_s[target.name]])
         state, own = target.at(times), self._source.own.at(times)
-        _, _, range_m = line_of_sight(
-            own.lat_deg, own.lon_deg, own.alt_m, state.lat_deg, state.lon_deg, state.alt_m,
-            validate=False,
-        )  # fmt: skip
+        range_m = slant_range_m(
+            own.lat_deg, own.lon_deg, own.alt_m, state.lat_deg, state.lon_deg, state.alt_m
+        )
         range_m = np.where(own.present & state.present, range_m, np.nan)
         return Track(target.name, times, *self._map(state), range_m, _altitude(state))
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.geometry import line_of_sight
+from components.geometry import slant_range_m
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.keyed_table import KeyedTable
@@ -73,8 +73,8 @@ class ClosestApproachPassed(Component):
             return None
         own = states.own_lat_deg, states.own_lon_deg, states.own_alt_m
         lat_deg, lon_deg, alt_m = (values[:, np.newaxis] for values in own)
-        _, _, range_m = line_of_sight(
-            lat_deg, lon_deg, alt_m, states.lat_deg, states.lon_deg, states.alt_m, validate=False
+        range_m = slant_range_m(
+            lat_deg, lon_deg, alt_m, states.lat_deg, states.lon_deg, states.alt_m
         )
         starts = wake.instants.first_of_each
         numbers = wake.run[starts]

@@ -92,7 +92,7 @@ def cholesky(matrix: FloatArray) -> FloatArray:
 
 def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return root⁻¹ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
-    result = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    result = np.empty((*right.shape[:-1], root.shape[-1]))
     for i in range(len(root)):
         value = right[i]
         for k in range(i):
@@ -104,7 +104,7 @@ def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
 def solve_upper(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return root⁻ᵀ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
     size = len(root)
-    result = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    result = np.empty((*right.shape[:-1], root.shape[-1]))
     for i in range(size - 1, -1, -1):
         value = right[i]
         for k in range(i + 1, size):

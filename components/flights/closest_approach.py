@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.flights.fleet import PieceSearch
-from components.geometry import line_of_sight
+from components.geometry import slant_range_m
 from dsa_des.arrays.types import FloatArray, IntArray
 
 # -- the times at which distances are compared; none are ever laid out in full: a flight of a month
@@ -173,10 +173,9 @@ def closest_approaches(
 
 def _apart(own: Any, other: Any) -> tuple[FloatArray, Any]:
     """Return slant ranges between two states, and whether both are there."""
-    _, _, range_m = line_of_sight(
-        own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
-        validate=False,
-    )  # fmt: skip
+    range_m = slant_range_m(
+        own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
+    )
     return range_m, own.present & other.present
 
 

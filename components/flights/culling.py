@@ -12,7 +12,7 @@ import numpy as np
 
 from components.flights.fleet import Fleet
 from components.flights.many_flights import SteeredFleet
-from components.geometry import TrajectoryState, line_of_sight
+from components.geometry import TrajectoryState, slant_range_m
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5
@@ -103,7 +103,8 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
         start: FloatArray = piece * length
         half = 0.5 * length
         middle = start + half
-        range_m = ranges_m(own.each(run[target], middle), targets.each(target, middle))
+        states = own.each(run[target], middle), targets.each(target, middle)
+        range_m = slant_range_m(*(values for state in states for values in state.arrays()[:3]))
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
@@ -126,15 +127,6 @@ def _too_many(run: IntArray, of_run: int) -> BoolArray:
     return too_many[run]
 
 
-def ranges_m(here: TrajectoryState, there: TrajectoryState) -> FloatArray:
-    """Return the ranges from some states to others, broadcast, m."""
-    _, _, range_m = line_of_sight(
-        here.lat_deg, here.lon_deg, here.alt_m, there.lat_deg, there.lon_deg, there.alt_m,
-        validate=False,
-    )  # fmt: skip
-    return range_m
-
-
 def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearIntervals:
     order = np.lexsort((start_s, target))
     target, start_s, end_s = target[order], start_s[order], end_s[order]
@@ -149,6 +141,8 @@ def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearInt
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
+# Targets are moved for so many epochs at once, or as many as are so many cells: a run goes back.
+_MOST_EPOCHS, _MOST_CELLS = 64, 65_536
 # Steering keeps the speed to 1e-4 unless another one is commanded.
 _OWN_SPEED_MARGIN = 1.05
 
@@ -156,19 +150,24 @@ _OWN_SPEED_MARGIN = 1.05
 class SteeredCulling:
     """The targets near ownships that are steered, one in each run, by epochs of time.
 
-    `own` flies as before it is steered; `targets` are as many in each run, one run after the other.
+    `own` flies as before it is steered; `targets` are as many in each run, one run after the other;
+    nothing is asked about after `end_s`.
     """
 
-    def __init__(self, own: Fleet, targets: Fleet, reach_m: float) -> None:
-        self._own_mps, self._targets, self._reach_m = own.max_speeds_mps, targets, reach_m
+    def __init__(self, own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> None:
+        self._own_mps, self._targets = own.max_speeds_mps, targets
+        self._reach_m, self._end_s = reach_m, end_s
         runs = len(own), len(targets) // len(own)
         self._targets_mps: FloatArray = targets.max_speeds_mps.reshape(runs)
         fastest = self._closing_mps(self._targets_mps, self._own_mps).max(axis=1, initial=1e-3)
         #: How long an epoch lasts around each ownship.
         self.epoch_s: FloatArray = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
-        # The last epoch that is known of each run, and ranges at its start.
-        self._last: IntArray = np.full(len(own), -1, dtype=np.int64)
-        self._range_m: FloatArray = np.zeros_like(self._targets_mps)
+        # Ranges and positions of targets as epochs begin, and of which epochs they are known, each
+        # by its number modulo room.
+        room = max(1, min(_MOST_EPOCHS, _MOST_CELLS // max(1, len(targets))))
+        self._known: IntArray = np.full((2, len(own), room), -1, dtype=np.int64)
+        self._range_m: FloatArray = np.empty((len(own), room, runs[1]))
+        self._position: FloatArray = np.empty((3, *self._range_m.shape))
 
     @staticmethod
     def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
@@ -177,15 +176,18 @@ class SteeredCulling:
             (targets_mps + own_mps[:, np.newaxis] * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
         )
 
-    def forget(self, run: IntArray) -> None:
-        """Take note that the ownships of some runs fly on otherwise than was known."""
-        self._last[run] = -1
+    def forget(self, run: int, time_s: float) -> None:
+        """Take note that the ownship of a run flies otherwise than was known from a time on."""
+        known = self._known[0, run]
+        known[known * self.epoch_s[run] >= time_s] = -1
 
-    def near(self, own: SteeredFleet, run: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return which targets may be in reach at each row, (rows, targets), of ownships as they
-        are steered by now; rows are in order of run.
+    def near(
+        self, own: SteeredFleet, run: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, BoolArray]:
+        """Return the states of ownships as they are steered by now at each row, and which targets
+        may be in reach, (rows, targets); rows are in order of run.
         """
-        width = self._targets_mps.shape[1]
+        rows = len(time_s)
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
         fastest = np.maximum(own.fastest_by(run, time_s), self._own_mps[run])
         begins = np.ones(len(run), dtype=bool)
@@ -193,15 +195,45 @@ class SteeredCulling:
         begins[1:] |= fastest[1:] != fastest[:-1]
         first = np.flatnonzero(begins)
         of, number = run[first], epoch[first]
-        range_m = self._range_m[of]
-        new = np.flatnonzero(self._last[of] != number)
+        index = number % self._range_m.shape[1]
+        range_m = self._range_m[of, index]
+        new = np.flatnonzero(self._known[0, of, index] != number)
+        begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
+        # One call for rows and epochs: a steered flight has parts to go through.
+        here = own.each(np.concatenate([run, begun]), np.concatenate([time_s, start_s])).arrays()
         if len(new):
-            begun, start_s = of[new], number[new] * self.epoch_s[of[new]]
-            target = (begun[:, np.newaxis] * width + np.arange(width)).reshape(-1)
-            there = self._targets.each(target, np.repeat(start_s, width))
-            here = own.each(begun, start_s).reshaped((len(new), 1))
-            range_m[new] = ranges_m(here, there.reshaped((len(new), width)))
-        self._last[of], self._range_m[of] = number, range_m
+            at_start = (values[rows:, np.newaxis] for values in here[:3])
+            range_m[new] = slant_range_m(*at_start, *self._at_start(begun, number[new]))
+            self._known[0, begun, index[new]] = number[new]
+            self._range_m[begun, index[new]] = range_m[new]
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
-        return np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
+        near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
+        return TrajectoryState(*(values[:rows] for values in here)), near
+
+    def _at_start(self, run: IntArray, epoch: IntArray) -> FloatArray:
+        """Return the positions (3, n, targets) of the targets of runs as epochs (n,) begin."""
+        _, _, room, width = self._position.shape
+        position, left = np.empty((3, len(run), width)), np.arange(len(run))
+        while len(left):
+            of, index = run[left], epoch[left] % room
+            known = self._known[1, of, index] == epoch[left]
+            position[:, left[known]] = self._position[:, of[known], index[known]]
+            left = left[~known]
+            if len(left):
+                self._move_targets(run[left], epoch[left])
+        return position
+
+    def _move_targets(self, run: IntArray, epoch: IntArray) -> None:
+        """Learn where targets are from the first epoch of each run on, as many as there is room."""
+        of, first = np.unique(run, return_index=True)
+        _, _, room, width = self._position.shape
+        number = epoch[first, np.newaxis] + np.arange(room)
+        start_s = np.minimum(number * self.epoch_s[of, np.newaxis], self._end_s)
+        target = of[:, np.newaxis, np.newaxis] * width + np.arange(width)
+        target = np.broadcast_to(target, (*number.shape, width)).reshape(-1)
+        there = self._targets.each(target, np.repeat(start_s, width))
+        place = of[:, np.newaxis], number % room
+        self._known[1][place] = number
+        for position, values in zip(self._position, there.arrays(), strict=False):
+            position[place] = values.reshape(*number.shape, width)

@@ -130,10 +130,10 @@ class PieceSearch:
 
     def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
         """Return the last piece that starts at or before a time, or the first one."""
-        low, high = self.first[aircraft], self.last[aircraft]
+        low, high = self.first.take(aircraft), self.last.take(aircraft)
         for _ in range(self._steps):
             middle = (low + high + 1) // 2
-            begun = self.starts_s[middle] <= time_s
+            begun = self.starts_s.take(middle) <= time_s
             low = np.where(begun, middle, low)
             high = np.where(begun, high, np.maximum(middle - 1, low))
         return low

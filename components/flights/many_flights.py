@@ -148,11 +148,12 @@ class SteeredFleet(Fleet):
         """Return which (n,) are before their first manoeuvre, which after, and in which part."""
         if not self._flown:
             return np.arange(len(time_s)), _NOBODY, _NOBODY
-        part = (self._start_s[aircraft] <= time_s[:, np.newaxis]).sum(axis=1)
+        part = (self._start_s.take(aircraft, axis=0) <= time_s[:, np.newaxis]).sum(axis=1)
         if known is not None:
             part = np.minimum(part, known)
-        after = np.flatnonzero(part)
-        return np.flatnonzero(part == 0), after, self._part[aircraft[after], part[after] - 1]
+        after = part.nonzero()[0]
+        own = _NOBODY if len(after) == len(part) else np.flatnonzero(part == 0)
+        return own, after, self._part[aircraft[after], part[after] - 1]
 
     @property
     def max_speeds_mps(self) -> FloatArray:
@@ -204,7 +205,7 @@ class SteeredFleet(Fleet):
         ]
         new = flown_from("ownship", around, time_s, manoeuvres, before)
         fleet = copy(self)
-        fleet._parts = ScriptedFleet.joined(self._parts, ScriptedFleet(new))
+        fleet._parts = self._parts.with_flights(new)
         index = self.manoeuvre_count[ownship]
         room = len(self), int(int(index.max()) + 2 > self._start_s.shape[1])
         fleet._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)

@@ -22,7 +22,7 @@ from components.flights.sampled_segments import evaluate_segments, fit_segments,
 from components.geometry import (
     TrajectoryState,
     Vector,
-    line_of_sight,
+    slant_range_m,
     wrap_heading_rad,
     wrap_longitude_deg,
 )
@@ -321,9 +321,7 @@ def _mean_speed_bound(
     if len(time_s) < 2:
         return np.zeros(lat_deg.shape[1:])
     at = slice(None, -1), slice(1, None)
-    _, _, step_m = line_of_sight(
-        *(column[rows] for rows in at for column in (lat_deg, lon_deg, alt_m)), validate=False
-    )
+    step_m = slant_range_m(*(column[rows] for rows in at for column in (lat_deg, lon_deg, alt_m)))
     duration = np.diff(time_s).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
     # Chords are shorter than paths on the ground by far less than one per cent.
     bound: FloatArray = 1.01 * np.max(step_m / duration, axis=0)

@@ -28,6 +28,7 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
+from dsa_des.arrays.column_values import constant
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
@@ -35,6 +36,7 @@ LONGEST_FLIGHT_S = 1e12
 MOST_ALT_M = 1e6
 """No flight starts farther above or below the ellipsoid."""
 
+_BY_KIND = [FORMULAS[kind] for kind in KINDS]
 _STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
 
 
@@ -161,22 +163,7 @@ class ScriptedFleet(Fleet):
     """Scripted flights: columns over flights, and over all their legs laid end to end."""
 
     def __init__(self, flights: Sequence[ScriptedTrajectory]) -> None:
-        segments = [segment for flight in flights for segment in flight.segments]
-        kinds = np.array([KINDS.index(s.kind) for s in segments], dtype=np.int64)
-        fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]
-        legs = [(s.start_s, s.pitch_rad, s.roll_rad, s.speed_mps) for s in segments]
-        self._set(
-            [flight.name for flight in flights],
-            np.array([(f.start_time_s, f.end_time_s) for f in flights]).reshape(-1, 2).T.copy(),
-            np.array(fixed).reshape(-1, 3).T.copy(),
-            np.array([len(flight.segments) for flight in flights], dtype=np.int64),
-            np.array(legs).reshape(-1, 4).T.copy(),
-            kinds,
-            {
-                kind: np.stack([segments[i].parameters for i in np.flatnonzero(kinds == kind)], -1)
-                for kind in np.bincount(kinds).nonzero()[0].tolist()  # np.unique imports np.ma
-            },
-        )
+        self._set(*_columns_of(flights))
 
     def _set(
         self,
@@ -194,6 +181,7 @@ class ScriptedFleet(Fleet):
         legs holds those of that kind, in their order.
         """
         self._names, self._between_s, self._fixed_rad = names, between_s, fixed_rad
+        self._some_fixed = not np.isnan(fixed_rad).all()
         self._until_s = np.minimum(between_s[1], between_s[0] + LONGEST_FLIGHT_S)
         self._counts, self._legs, self._kind, self._tables = counts, legs, kinds, tables
         self._find = PieceSearch(legs[0], counts)
@@ -211,17 +199,15 @@ class ScriptedFleet(Fleet):
         fleet._set(*columns)
         return fleet
 
-    @classmethod
-    def joined(cls, one: ScriptedFleet, other: ScriptedFleet) -> ScriptedFleet:
-        """Return the flights of two fleets that are no subsets, `other` after `one`."""
-        both = (one, other)
-        names = ("_between_s", "_fixed_rad", "_counts", "_legs", "_kind")
-        columns = [np.concatenate([getattr(f, name) for f in both], axis=-1) for name in names]
-        tables = {
-            kind: np.concatenate([f._tables[kind] for f in both if kind in f._tables], axis=-1)
-            for kind in one._tables | other._tables
-        }
-        return cls.of_columns([*one._names, *other._names], *columns, tables)
+    def with_flights(self, flights: Sequence[ScriptedTrajectory]) -> ScriptedFleet:
+        """Return a fleet, which is no subset, with more flights at its end."""
+        names, *others, tables = _columns_of(flights)
+        mine = (self._between_s, self._fixed_rad, self._counts, self._legs, self._kind)
+        columns = [np.concatenate(both, axis=-1) for both in zip(mine, others, strict=True)]
+        for kind, table in self._tables.items():
+            known = [table, tables[kind]] if kind in tables else [table]
+            tables[kind] = np.concatenate(known, axis=-1)
+        return self.of_columns([*self._names, *names], *columns, tables)
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
@@ -282,34 +268,35 @@ class ScriptedFleet(Fleet):
 
     def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the leg that each of all flights is on at a time, and since when, s."""
-        start_s, until_s = self._between_s[0][aircraft], self._until_s[aircraft]
+        start_s, until_s = self._between_s[0].take(aircraft), self._until_s.take(aircraft)
         elapsed = np.where(time_s > start_s, time_s, start_s)
         elapsed = np.where(elapsed < until_s, elapsed, until_s) - start_s
         leg = self._find(aircraft, elapsed)
-        elapsed -= self._find.starts_s[leg]
+        elapsed -= self._find.starts_s.take(leg)
         return leg, elapsed
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         leg, elapsed = self._legs_at(aircraft, time_s)
-        lat, lon, alt, yaw = (np.empty(len(aircraft)) for _ in range(4))
-        for kind, formula in enumerate(FORMULAS.values()):
-            if kind not in self._tables:
-                continue
-            chosen: slice | IntArray = slice(None)
-            if len(self._tables) > 1:
-                chosen = np.flatnonzero(self._kind[leg] == kind)
-            table = self._tables[kind].take(self._slot[leg[chosen]], axis=1)
-            values = formula(table, np.ascontiguousarray(elapsed[chosen]))
-            for out, value in zip((lat, lon, alt, yaw), values, strict=True):
-                out[chosen] = value
-        derived = (yaw, self._legs[1][leg], self._legs[2][leg])
-        attitude = [
-            np.where(np.isnan(given[aircraft]), angle, given[aircraft])
-            for given, angle in zip(self._fixed_rad, derived, strict=True)
-        ]
+        kinds, slot = self._kind.take(leg), self._slot.take(leg)
+        in_use = np.flatnonzero(np.bincount(kinds)).tolist()
+        if len(in_use) == 1:
+            kind = in_use[0]
+            lat, lon, alt, yaw = _BY_KIND[kind](self._tables[kind].take(slot, axis=1), elapsed)
+        else:
+            lat, lon, alt, yaw = moved = tuple(np.empty(len(leg)) for _ in range(4))
+            for kind in in_use:
+                chosen = np.flatnonzero(kinds == kind)
+                table = self._tables[kind].take(slot[chosen], axis=1)
+                values = _BY_KIND[kind](table, elapsed[chosen])
+                for out, value in zip(moved, values, strict=True):
+                    out[chosen] = value
+        pitch, roll = self._legs[1].take(leg), self._legs[2].take(leg)
+        if self._some_fixed:
+            fixed = self._fixed_rad.take(aircraft, axis=1)
+            yaw, pitch, roll = np.where(np.isnan(fixed), (yaw, pitch, roll), fixed)
         first_s, last_s = self._between_s
-        present = (time_s >= first_s[aircraft]) & (time_s <= last_s[aircraft])
-        return TrajectoryState(lat, lon, alt, attitude[0], attitude[1], attitude[2], present)
+        present = (time_s >= first_s.take(aircraft)) & (time_s <= last_s.take(aircraft))
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return single aircraft's speeds over ground (n,), each at a time (n,) of its own."""
@@ -337,7 +324,7 @@ class ScriptedFleet(Fleet):
             derived = np.stack((np.full(len(of), np.nan), *self._legs[1:3, legs]))
             groups.append(
                 _Group(
-                    FORMULAS[KINDS[kind]],
+                    _BY_KIND[kind],
                     members,
                     self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
@@ -346,6 +333,26 @@ class ScriptedFleet(Fleet):
                 )
             )
         return groups, np.flatnonzero((kinds != _STRAIGHT) & (kinds != _HOLD))
+
+
+def _columns_of(flights: Sequence[ScriptedTrajectory]) -> tuple[Any, ...]:
+    """Return the columns of a fleet; see `ScriptedFleet._set`."""
+    segments = [segment for flight in flights for segment in flight.segments]
+    kinds = [KINDS.index(s.kind) for s in segments]
+    fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]
+    legs = [(s.start_s, s.pitch_rad, s.roll_rad, s.speed_mps) for s in segments]
+    tables: dict[int, Any] = {kind: [] for kind in sorted(set(kinds))}
+    for kind, segment in zip(kinds, segments, strict=True):
+        tables[kind].append(segment.parameters)
+    return (
+        [flight.name for flight in flights],
+        np.array([(f.start_time_s, f.end_time_s) for f in flights]).reshape(-1, 2).T.copy(),
+        np.array(fixed).reshape(-1, 3).T.copy(),
+        np.array([len(flight.segments) for flight in flights], dtype=np.int64),
+        np.array(legs).reshape(-1, 4).T.copy(),
+        np.array(kinds, dtype=np.int64),
+        {kind: np.stack(rows, axis=-1) for kind, rows in tables.items()},
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +370,7 @@ class _Group:
         """Return the group's states, (times, flights); angles that never change, once for all."""
         start_s, end_s, until_s = self.times_s
         shape = len(times), len(start_s)
-        moving = lat, lon, alt, yaw = tuple(np.empty(shape) for _ in range(4))
+        moving: list[FloatArray] = []
         present = np.empty(shape, dtype=bool)
         rows = max(1, CELLS_AT_ONCE // len(start_s))
         for first in range(0, len(times), rows):
@@ -372,10 +379,19 @@ class _Group:
             inside = np.maximum(t, start_s)
             np.minimum(inside, until_s, out=inside)
             inside -= start_s
-            for out, values in zip(moving, self.formula(self.table, inside), strict=True):
-                out[block] = values
+            now = self.formula(self.table, inside)
+            # Of flights that keep their altitude one row of them is for all times.
+            moving = moving or [
+                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
+                for v in now
+            ]
+            for out, values in zip(moving, now, strict=True):
+                if out.flags.writeable:
+                    out[block] = values
             np.logical_and(t >= start_s, t <= end_s, out=present[block])
-        fixed_yaw, pitch, roll = (np.broadcast_to(angle, shape) for angle in self.attitude)
-        if self.yaw_is_fixed.any():
+        lat, lon, alt, yaw = moving or np.empty((4, *shape))
+        fixed_yaw, *others = self.attitude
+        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
+        if np.count_nonzero(self.yaw_is_fixed):
             yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

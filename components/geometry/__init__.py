@@ -67,6 +67,7 @@ from components.geometry.ellipsoid import (
     line_of_sight_ned,
     north_east_up,
     radii_of_curvature,
+    slant_range_m,
     spherical_from_enu,
 )
 from components.geometry.field_of_view import FieldOfView, rising_sector, sector_width_rad

@@ -75,6 +75,25 @@ def line_of_sight(
     return azimuth, elevation, slant_range
 
 
+def slant_range_m(
+    own_lat_deg: npt.ArrayLike,
+    own_lon_deg: npt.ArrayLike,
+    own_alt_m: npt.ArrayLike,
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+) -> FloatArray:
+    """Find the slant range of a target alone, to the bit that of `line_of_sight`.
+
+    Arguments are those of `line_of_sight`, in bounds: their values are not checked.
+    """
+    arrays, shape = positions(own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False)
+    with np.errstate(under="ignore"):
+        north, east, up = north_east_up(*arrays)
+        (range_m,) = shaped(shape, np.sqrt(north * north + east * east + up * up))
+    return range_m
+
+
 def line_of_sight_ned(
     own_lat_deg: npt.ArrayLike,
     own_lon_deg: npt.ArrayLike,

@@ -175,7 +175,9 @@ class Strength:
         snr = np.empty(len(detected))
         for crossing, part in block.crossings_of(cells, detected):
             for model, chosen in block.models_in_use(cells):
-                some = part[_within(detected[part], chosen, len(cells))]
+                some = part
+                if not isinstance(chosen, slice):  # else one model for all
+                    some = part[_within(detected[part], chosen, len(cells))]
                 output = 1.0 + measured_snr(
                     tail[some],
                     mean[some],
@@ -216,7 +218,7 @@ class MeasuredStrength(Effect[Strengthening]):
         return Verdict(True, "a radar measures strength as it measures places")
 
 
-def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
+def _within(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
     """Return which of some cells are among the chosen ones."""
     inside = np.zeros(count, dtype=bool)
     inside[chosen] = True

@@ -54,20 +54,23 @@ def counted(
     Only where something `hides` targets are hidden ones looked for. Which of the culled ones the
     arrays hold, as absent, depends on the window that they came in: what is counted does not.
     """
-    if len(reason) == 1:  # one pass instead of one for each reason
-        count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
-        of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
+    rows, targets = reason.shape
+    if rows == 1 or targets > _FEW_COLUMNS:  # one pass instead of one for each reason
+        codes = len(SKIP_REASONS) + 1
+        cell = reason * np.int64(rows) + np.arange(rows)[:, np.newaxis]
+        count = np.bincount(cell.reshape(-1), minlength=codes * rows).reshape(codes, rows)
+        of = {code: count[code] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
         of = {
             code: _per_row(reason == code)
             for code in (EVALUATE, *SKIP_REASONS.values())
             if hides or code != HIDDEN
         }
-        of.setdefault(HIDDEN, _of_each(0, len(reason)))
+        of.setdefault(HIDDEN, _of_each(0, rows))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    left_out = on_roster - reason.shape[1]
+    left_out = on_roster - targets
     if culled is None:
-        culled = _of_each(left_out, len(reason))
+        culled = _of_each(left_out, rows)
     else:
         skipped["absent"] = skipped["absent"] + (left_out - culled)
     skipped[CULLED] = culled
@@ -75,11 +78,9 @@ def counted(
 
 
 def _per_row(mask: BoolArray) -> IntArray:
-    """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
-    if not mask.any():
+    """Return how many are true in each row of few columns: ten times as fast as their sum."""
+    if not np.count_nonzero(mask):
         return _of_each(0, len(mask))
-    if mask.shape[1] > _FEW_COLUMNS:
-        return mask.sum(axis=1)
     total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column

@@ -207,10 +207,11 @@ def behind_terrain(
     Notes
     -----
     Between two points the bilinear ground can rise above the higher of them by no more than its
-    slope times half their distance. Rays that come so near to the ground are looked at again,
-    sixteen times as finely and where they cross rows and columns of nodes. In a cell the ground is
-    a parabola along the ray, so that one may be taken for free although up to 0.0005 ·
-    `largest_step_m` of ground stand in it (`miss_bound_m`), never for hidden where none does.
+    slope times half their distance, and a ray can sink by its sag. Rays that come so near to the
+    ground are looked at again, sixteen times as finely and where they cross rows and columns of
+    nodes. In a cell the ground is a parabola along the ray, so that one may be taken for free
+    although ground stands in it up to `miss_bound_m`, 0.0005 · `largest_step_m` where nodes lie
+    close; never for hidden where none does.
     """
     rays = rays_between(own, other, refraction)
     first, last = rays.below(raster.highest_m + offset_m)
@@ -231,8 +232,13 @@ def behind_terrain(
 def miss_bound_m(raster: ElevationRaster) -> float:
     """Return how high ground may stand in a ray that is taken for free, at most."""
     # Second derivative 2 · twist, twist at most twice the largest step; an eighth of the squared
-    # distance of points a thirty-second of a cell apart.
-    return 4.0 / 8.0 / 32.0**2 * raster.largest_step_m
+    # distance of points a thirty-second of a cell apart. The same of the Earth's curvature.
+    return 4.0 / 8.0 / 32.0**2 * raster.largest_step_m + _sag_between_m(raster) / len(_COMB) ** 2
+
+
+def _sag_between_m(raster: ElevationRaster) -> float:
+    """Return how far a ray sinks towards level ground between two points, at most."""
+    return float((0.5 * raster.spacing_m) ** 2 / (8.0 * MEAN_RADIUS_M))
 
 
 def _meets_ground(
@@ -253,7 +259,8 @@ def _meets_ground(
     stands = _stands_m(rays, ray, share, raster, offset_m)
     met: BoolArray = np.logical_or.reduceat(stands > _GRAZING_M, ends - number)
     # Where it is a near thing, once more with a finer comb around the points that were near.
-    near = np.flatnonzero((stands > -_COARSE * raster.largest_step_m) & ~np.repeat(met, number))
+    nearest_m = _COARSE * raster.largest_step_m + _sag_between_m(raster)
+    near = np.flatnonzero((stands > -nearest_m) & ~np.repeat(met, number))
     for start in range(0, len(near), _POINTS_AT_ONCE // len(_COMB)):
         some = near[start : start + _POINTS_AT_ONCE // len(_COMB)]
         piece = (last[ray[some]] - first[ray[some]]) / count[ray[some]]

@@ -21,6 +21,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # So many pairs are looked at together.
 _MOST_PAIRS = 1 << 20
+# So few pairs are all gated at once: a box first would cost more.
+_FEW_PAIRS = 64
 # The square of a box's width by that of the gate in it: who is in the gate must not depend on it.
 _WIDER = 1.1
 # Nearer to the vertical azimuths say nothing.
@@ -62,15 +64,17 @@ def gated_pairs(
     direction = None
     some_angle_only = bool((~part.ranged).any())
     spread = _PairVariance(rules, part, pose, scans)
-    for code in np.flatnonzero(np.bincount(batch.code)).tolist():
-        mine = np.flatnonzero(batch.code == code)
+    for code in np.bincount(batch.code).nonzero()[0].tolist():
+        mine = (batch.code == code).nonzero()[0]
         # What an angle-only track expects of a range says nothing: there the direction decides.
         for ranged in (True, False) if some_angle_only and code & 1 else (None,):
             kind, rows = kind_of(0 if ranged is False else code)
             moments = rules.estimator.expect(kind, part.estimates(), pose)
             # Moments of sigma points are means over them: not where the state itself is seen.
             direction = moments[0].expected[:2] if moments[0].left_over is None else None
-            track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread)
+            # The box of a kind that tells of errors is not about its gate, and decides itself.
+            few = 0 if code & TELLS else _FEW_PAIRS
+            track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread, few)
             if ranged is not None:
                 chosen = part.ranged[track] == ranged
                 track, entry = track[chosen], entry[chosen]
@@ -135,11 +139,19 @@ def _near(
     batch: LookBatch,
     mine: IntArray,
     spread: "_PairVariance",
+    few: int,
 ) -> tuple[IntArray, IntArray]:
-    """Return pairs of one look whose angles and range lie in a box about the gate."""
+    """Return pairs of one look whose angles and range lie in a box about the gate.
+
+    Up to so `few` pairs are all returned.
+    """
     counts = np.bincount(of, minlength=len(batch.look))
-    first = np.cumsum(counts) - counts
-    many = counts[batch.of[mine]]
+    look = batch.of[mine]
+    many, first = counts[look], (counts.cumsum() - counts)[look]
+    so_far = many.cumsum()
+    if so_far[-1] <= few:
+        entry, track = _all_pairs(many, first)
+        return track, mine[entry]
     threshold = gate_threshold(rules.widest_gate, kind.size)
     cells = batch.detection[mine]
     measured = _picked(batch.scans.measured, rows[:3], cells)
@@ -147,12 +159,10 @@ def _near(
     boxes = [_box(one, variance, threshold, spread.most) for one in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
-    part = np.cumsum(many) // _MOST_PAIRS
+    part = so_far // _MOST_PAIRS
     for begin, end in _parts(part):
-        size = many[begin:end]
-        entry = np.repeat(np.arange(begin, end), size)
-        start = np.cumsum(size) - size
-        track = np.arange(len(entry)) - np.repeat(start - first[batch.of[mine[begin:end]]], size)
+        entry, track = _all_pairs(many[begin:end], first[begin:end])
+        entry += begin
         kept = [_inside(*box, measured, entry, track) for box in boxes]
         near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
         tracks.append(track[near])
@@ -160,6 +170,13 @@ def _near(
     if len(tracks) == 1:
         return tracks[0], entries[0]
     return np.concatenate(tracks), np.concatenate(entries)
+
+
+def _all_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the entry and the track of each pair: so many tracks an entry, from a first one."""
+    entry = np.arange(len(many)).repeat(many)
+    before = many.cumsum() - many
+    return entry, np.arange(len(entry)) - (before - first).repeat(many)
 
 
 class _PairVariance:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Self
 
 import numpy as np
@@ -135,8 +136,8 @@ class LookBatch:
         """Return some looks, given the kinds of all detections and the poses of all looks."""
         first = scans.offsets[look]
         counts = scans.offsets[look + 1] - first
-        of = np.repeat(np.arange(len(look)), counts)
-        detection = np.arange(len(of)) + (first - (np.cumsum(counts) - counts))[of]
+        of = np.arange(len(look)).repeat(counts)
+        detection = np.arange(len(of)) + (first - (counts.cumsum() - counts))[of]
         return cls(scans, look, replica, detection, of, codes[detection], poses)
 
     @property
@@ -154,6 +155,7 @@ class LookBatch:
         return self.poses.take(self.look[of])
 
 
+@cache
 def kind_of(code: int) -> tuple[Kind, list[int]]:
     """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
     kind = Kind(bool(code & 1), bool(code & 2), bool(code & 4))

@@ -37,7 +37,7 @@ def step(
     Tracks of replicas that do not look stay as they are.
     """
     replica = batch.replica
-    of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+    of = np.minimum(replica.searchsorted(store.replica), len(replica) - 1)
     here = replica[of] == store.replica
     parts = [] if here.all() else [store.take(~here)]
     alive = here & (store.status != DELETED)
@@ -106,7 +106,7 @@ def late_step(
     have a detection that such a track would have had.
     """
     replica, tick = batch.replica, batch.tick
-    of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+    of = np.minimum(replica.searchsorted(store.replica), len(replica) - 1)
     here = replica[of] == store.replica
     now, of = store.take(here & (store.status != DELETED)), of[here & (store.status != DELETED)]
     parts = [store.take(~here)]

@@ -131,7 +131,7 @@ def tracks_after(
 
     Columns ``look`` and ``row`` are the last look that was worked on, and the row of the wake.
     """
-    index = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+    index = np.minimum(replica.searchsorted(store.replica), len(replica) - 1)
     mine = replica[index] == store.replica
     index = index[mine]
     return store.take(mine).with_columns(look=looks[index], row=rows[index])
@@ -143,10 +143,10 @@ _UNSHOWN = {"history", "looks", "misses", "misdetections", "seen", "seen_tick"}
 
 def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
     """Return what is shown of all tracks by row; component by component, which stays in caches."""
-    parts = [part.columns for part in reported if len(part)] or [reported[0].columns]
+    parts = [part.columns for part in reported]
     row = np.concatenate([part["row"] for part in parts])
-    if len(parts) == 1 and not bool((row[1:] < row[:-1]).any()):
-        return TrackStore(**parts[0])
+    if not bool((row[1:] < row[:-1]).any()):
+        return TrackStore.joined(reported)
     order = np.argsort(row, kind="stable")
     columns = {}
     for name in parts[0].keys() - _UNSHOWN:

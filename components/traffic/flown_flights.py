@@ -62,12 +62,17 @@ class FlownFlights:
         return int(self.own.manoeuvre_count.sum())
 
     def own_at(
-        self, run: IntArray, time_s: FloatArray, known: IntArray | None = None
+        self,
+        run: IntArray,
+        time_s: FloatArray,
+        known: IntArray | None = None,
+        state: TrajectoryState | None = None,
     ) -> TrajectoryState:
         """Return the states of the ownships of runs (n,), each at a time (n,) of its own, by the
-        first `known` of their manoeuvres, or all.
+        first `known` of their manoeuvres, or all; `state` is what is known of them but for the
+        wind.
         """
-        state = self.own.each(run, time_s, known)
+        state = self.own.each(run, time_s, known) if state is None else state
         for crabbing in self.crabbing:
             speed_mps = self.own.ground_speeds_mps(run, time_s, known)
             state = crabbing(state, speed_mps, self.own.fixed_attitudes_rad(run, time_s, known))

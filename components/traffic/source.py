@@ -183,12 +183,12 @@ class TrafficSource(Component):
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
         if not culls or not math.isfinite(reach_m):
             return
+        end_s = float(self.context.duration_s) + lasts_s
         if not self.context.producers:
-            end_s = float(self.context.duration_s) + lasts_s
             intervals = near_intervals(flights.own, flights.targets, reach_m, end_s)
             self._flown = replace(self._flown, intervals=intervals)
         elif lasts_s == 0.0:
-            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m)
+            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m, end_s)
 
     def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
@@ -256,8 +256,7 @@ class TrafficSource(Component):
         run = no_runs(len(wake)) if len(self._flown.own) == 1 else wake.run
         time_s = wake.time_s
         known = self._steer(wake, run)
-        own = self._flown.own_at(run, time_s)
-        columns, near = self._near(run, time_s)
+        own, columns, near = self._near(run, time_s)
         states = self._targets_at(run, columns, time_s)
         present = states.present & own.present[:, np.newaxis]
         culled = None
@@ -288,28 +287,34 @@ class TrafficSource(Component):
         own, known = steered(self._flown.own, due, wake, run)
         self._flown = replace(self._flown, own=own)
         if self._epochs is not None:
-            self._epochs.forget(np.array([one.run for one in due], dtype=np.int64))
+            for one in due:
+                self._epochs.forget(one.run, one.tick / wake.ticks_per_s)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, own)
         return known
 
-    def _near(self, run: IntArray, time_s: FloatArray) -> tuple[IntArray, BoolArray | None]:
-        """Return which targets may come in reach, and when (rows, targets); None for always."""
+    def _near(
+        self, run: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, IntArray, BoolArray | None]:
+        """Return the ownship's state, which targets may come in reach, and when (rows, targets);
+        None for always.
+        """
         flown, lasts_s, columns = self._flown, self._look.lasts_s, self._all_columns
         if self._epochs is not None:
-            near = self._epochs.near(flown.own, run, time_s)
+            own, near = self._epochs.near(flown.own, run, time_s)
             if len(flown.own) == 1:
                 columns = np.flatnonzero(near.any(axis=0))
-            return columns, near[:, columns]
+            return flown.own_at(run, time_s, state=own), columns, near[:, columns]
+        own = flown.own_at(run, time_s)
         if flown.intervals is None:
-            return columns, None
+            return own, columns, None
         if len(flown.own) == 1:
             columns = flown.intervals.during(float(time_s.min()), float(time_s.max()) + lasts_s)
-            return columns, flown.intervals.near(columns, time_s, lasts_s)
+            return own, columns, flown.intervals.near(columns, time_s, lasts_s)
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
         times = np.repeat(time_s, len(columns))
         near = flown.intervals.holds(each, times, times + lasts_s)
-        return columns, near.reshape(len(time_s), len(columns))
+        return own, columns, near.reshape(len(time_s), len(columns))
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""

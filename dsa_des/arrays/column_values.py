@@ -67,8 +67,7 @@ def in_seconds(values: Any) -> Any:
 
 def nothing_in(rows: int) -> AnyArray:
     """Return a float64 column that is null in all rows: one NaN, seen `rows` times."""
-    column: AnyArray = np.ndarray((rows,), np.float64, buffer=_NAN, strides=(0,))
-    return column
+    return _NANS[:rows]
 
 
 def is_empty(values: Any) -> bool:
@@ -99,10 +98,11 @@ def repeats(values: AnyArray, one: AnyArray) -> bool:
 
 
 def constant(value: Any, rows: int, kind: Any) -> AnyArray:
-    """Return a column that holds the same in all rows: one value, seen `rows` times."""
+    """Return a column that holds the same in all rows: one value or array, seen `rows` times."""
     one = np.array(value, dtype=kind)
     one.flags.writeable = False
-    column: AnyArray = np.ndarray((rows,), one.dtype, buffer=one, strides=(0,))
+    shape, strides = (rows, *one.shape), (0, *one.strides)
+    column: AnyArray = np.ndarray(shape, one.dtype, buffer=one, strides=strides)
     return column
 
 
@@ -138,3 +138,5 @@ _MANY = 64
 
 _NAN = np.full((), np.nan)
 _NAN.flags.writeable = False
+#: As often as a column may have rows: a slice of it is made in no time.
+_NANS: AnyArray = np.ndarray((1 << 40,), np.float64, buffer=_NAN, strides=(0,))

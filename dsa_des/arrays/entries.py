@@ -14,7 +14,7 @@ def offsets_of(row: IntArray, rows: int) -> IntArray:
     gaps = np.empty(count + 1, dtype=np.int64)
     gaps[0], gaps[-1] = row[0] + 1, rows - row[-1]
     np.subtract(row[1:], row[:-1], out=gaps[1:-1])
-    return np.repeat(np.arange(count + 1), gaps)
+    return np.arange(count + 1).repeat(gaps)
 
 
 def cells_of(mask: BoolArray) -> tuple[IntArray, IntArray]:
@@ -32,7 +32,7 @@ def row_of_entries(offsets: IntArray) -> IntArray:
     """Return the row of each entry; where none has two, much faster than repeating them."""
     counts = offsets[1:] - offsets[:-1]
     if counts.max(initial=0) > 1:
-        return np.repeat(np.arange(len(counts)), counts)
+        return np.arange(len(counts)).repeat(counts)
     return (counts > 0).nonzero()[0]
 
 

@@ -16,15 +16,25 @@ class KeyedTable:
     """
 
     def __init__(self, **columns: Any) -> None:
-        self.columns = columns
-        # As attributes too: a look-up of a missing one takes many times as long.
-        self.__dict__.update(columns)
+        self.__dict__ = columns
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(name)
 
     def __len__(self) -> int:
-        return len(self.columns["replica"])
+        return len(self.__dict__["replica"])
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """All of them by name."""
+        return self.__dict__
+
+    @classmethod
+    def of_columns(cls, columns: dict[str, Any]) -> Self:
+        """Return a table of a dict of columns, which it keeps."""
+        table = object.__new__(cls)
+        table.__dict__ = columns
+        return table
 
     @classmethod
     def empty(
@@ -32,7 +42,9 @@ class KeyedTable:
     ) -> Self:
         """Return no things, of columns of some types; `shapes` are those before the last axis."""
         shapes = shapes or {}
-        return cls(**{n: np.empty((*shapes.get(n, ()), 0), dtype=t) for n, t in types.items()})
+        return cls.of_columns(
+            {n: np.empty((*shapes.get(n, ()), 0), dtype=t) for n, t in types.items()}
+        )
 
     def take(self, which: IntArray | BoolArray) -> Self:
         """Return some of them."""
@@ -41,12 +53,12 @@ class KeyedTable:
                 return self
             which = which.nonzero()[0]
         if len(which) == 0:
-            return type(self)(**{name: v[..., :0] for name, v in self.columns.items()})
-        return type(self)(**{name: v.take(which, axis=-1) for name, v in self.columns.items()})
+            return self.of_columns({name: v[..., :0] for name, v in self.__dict__.items()})
+        return self.of_columns({name: v.take(which, -1) for name, v in self.__dict__.items()})
 
     def with_columns(self, **columns: Any) -> Self:
         """Return the same things with other values."""
-        return type(self)(**{**self.columns, **columns})
+        return self.of_columns({**self.__dict__, **columns})
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -55,7 +67,9 @@ class KeyedTable:
         if len(filled) == 1:
             return filled[0]
         names = filled[0].columns
-        return cls(**{n: np.concatenate([p.columns[n] for p in filled], axis=-1) for n in names})
+        return cls.of_columns(
+            {n: np.concatenate([p.columns[n] for p in filled], axis=-1) for n in names}
+        )
 
     def in_order(self) -> Self:
         """Return them by run, and in their order in it."""
@@ -65,7 +79,7 @@ class KeyedTable:
 
     def _only_of(self, runs: IntArray) -> bool:
         """Whether all, which is in order, is of one run, the only one of some: the usual case."""
-        replica = self.columns["replica"]
+        replica = self.replica
         return bool(len(replica) and replica[0] == replica[-1] == runs[0] == runs[-1])
 
     def of(self, runs: IntArray) -> Self:
@@ -88,7 +102,7 @@ class KeyedTable:
         columns = {name: values.copy() for name, values in new.columns.items()}
         for name, values in columns.items():
             values[..., here] = old.columns[name]
-        return type(self)(**columns)
+        return self.of_columns(columns)
 
 
 def turns(keys: IntArray) -> list[IntArray]:

@@ -20,6 +20,8 @@ _ZERO.flags.writeable = False
 _ZEROS: IntArray = np.ndarray((1 << 40,), np.int64, buffer=_ZERO, strides=(0,))
 # Keys stay below this.
 _MOST = 1 << 62
+# Of fewer rows a search costs less than to look whether they are the same.
+_MANY = 64
 # A tick has at least so many bits of a key (two hours of ns either way), so that the keys that an
 # array of instants keeps serve whatever it is compared with.
 _LEAST_BITS = 44
@@ -84,8 +86,10 @@ class RunTicks:
 
     def take(self, rows: slice | IntArray | BoolArray) -> "RunTicks":
         """Return some of them."""
-        if isinstance(rows, slice) and rows.indices(len(self)) == (0, len(self), 1):
-            return self
+        if isinstance(rows, slice):
+            count = len(self.tick)
+            if rows.indices(count) == (0, count, 1):
+                return self
         tick = self.tick[rows]
         return RunTicks(no_runs(len(tick)) if says_no_runs(self.run) else self.run[rows], tick)
 
@@ -101,12 +105,13 @@ class RunTicks:
 
     def at_most(self, end: int) -> int:
         """Return how many there are before a tick, where all are of one run."""
-        return len(self) if self.tick[-1] < end else int(np.searchsorted(self.tick, end))
+        return len(self.tick) if self.tick[-1] < end else int(self.tick.searchsorted(end))
 
     @property
     def one_run(self) -> bool:
         """Whether all, which are in order, are of one run."""
-        return says_no_runs(self.run) or len(self) == 0 or bool(self.run[0] == self.run[-1])
+        run = self.run
+        return says_no_runs(run) or len(run) == 0 or bool(run[0] == run[-1])
 
     @property
     def last_of_each(self) -> IntArray:
@@ -121,7 +126,9 @@ class RunTicks:
     @property
     def first_of_each(self) -> IntArray:
         """The position of the first instant of each run."""
-        return np.append(0, self.last_of_each[:-1] + 1)[: len(self)]
+        if len(self) == 0 or self.one_run:
+            return np.zeros(min(1, len(self)), dtype=np.int64)
+        return np.append(0, self.last_of_each[:-1] + 1)
 
     def order(self) -> IntArray | None:
         """Return what puts them in order, those of one instant as they stand; None if they are."""
@@ -150,7 +157,10 @@ class RunTicks:
 
 def _one_run(parts: Sequence[RunTicks]) -> bool:
     """Whether all parts, which are in order, are of the same run."""
-    if all(says_no_runs(part.run) for part in parts):
+    for part in parts:
+        if part.run.base is not _ZERO:
+            break
+    else:
         return True
     filled = [part.run for part in parts if len(part)]
     return not filled or all(run[0] == filled[0][0] == run[-1] for run in filled)
@@ -225,7 +235,10 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
 
 def _positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
     """Return where a part's instants are, if it is known to be one."""
-    return next((positions for one, positions in instants._parts if one is part), None)
+    for one, positions in instants._parts:
+        if one is part:
+            return positions
+    return None
 
 
 def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
@@ -235,19 +248,20 @@ def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
 
 def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
     """Return what `last_of_run` does, and whether each is known to be one of the instants."""
-    if len(instants) == 0:
-        return np.full(len(asked), -1, dtype=np.int64), False
+    there, count = len(instants.tick), len(asked.tick)
+    if there == 0:
+        return np.full(count, -1, dtype=np.int64), False
     if instants.tick is asked.tick and instants.run is asked.run:
-        return np.arange(len(asked)), True
+        return np.arange(count), True
     if (known := _positions(instants, asked)) is not None:
         return known, True
     one_run = _one_run((instants, asked))
     known_keys, keys = (instants.tick, asked.tick) if one_run else _keys(instants, asked)[0]
     # As for blocks that run at the same instants; a search would take a tenth of a whole run.
-    same = len(instants) == len(asked) and bool((known_keys == keys).all())
+    same = there == count >= _MANY and bool((known_keys == keys).all())
     if same and bool((keys[1:] > keys[:-1]).all()):
-        return np.arange(len(asked)), True
-    positions = np.searchsorted(known_keys, keys, side="right") - 1
+        return np.arange(count), True
+    positions = known_keys.searchsorted(keys, side="right") - 1
     if not one_run:
         other = instants.run[positions] != asked.run
         if other.any():
@@ -278,11 +292,11 @@ def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     Where its run has none so late it is the position behind the run's last one.
     """
     if _one_run((instants, asked)):
-        return np.searchsorted(instants.tick, asked.tick)
+        return instants.tick.searchsorted(asked.tick)
     keys, _ = _keys(instants, asked)
-    return np.searchsorted(keys[0], keys[1])
+    return keys[0].searchsorted(keys[1])
 
 
 def first_of_run(instants: RunTicks, run: IntArray) -> IntArray:
     """Return the position of the first instant of some runs."""
-    return np.searchsorted(instants.run, run)
+    return instants.run.searchsorted(run)

@@ -1,6 +1,7 @@
 """The union of arrays that are in order, and where their values lie in it."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +19,9 @@ def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
     take ten times as long here. A search for the positions afterwards was measured to take six
     times as long as the sort.
     """
+    first = arrays[0]
+    if len(first) == 1 and all(len(array) == 1 and array[0] == first[0] for array in arrays):
+        return first, [np.zeros(1, dtype=np.int64) for _ in arrays]
     joined: Any = np.concatenate(arrays)
     order = joined.argsort(kind="stable")
     values: _Array = joined.take(order)
@@ -32,5 +36,5 @@ def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
     else:
         position[order] = new.cumsum() - 1
         values = values[new]
-    ends = np.cumsum([len(array) for array in arrays]).tolist()
+    ends = accumulate(map(len, arrays))
     return values, [position[end - len(a) : end] for a, end in zip(arrays, ends, strict=True)]

@@ -53,6 +53,7 @@ __all__ = [
 #: Numbers and truth values; no objects, no text.
 _NUMBERS = frozenset("biuf")
 
+_ARRAYS = {np.ndarray}
 #: Row, entry and static fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {}
 #: What each class records by its fields.
@@ -371,6 +372,8 @@ def _pick(value: Any, rows: slice | IntArray) -> Any:
 
 
 def _join(values: list[Any], counts: list[int]) -> Any:
+    if {*map(type, values)} == _ARRAYS:  # nearly all are
+        return np.concatenate(values)
     known = next((value for value in values if value is not None), None)
     if known is None:
         return None

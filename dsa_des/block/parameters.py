@@ -22,7 +22,7 @@ from pydantic import (
 
 from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.files.input_files import resolve_home
-from dsa_des.time.clock import ClockSpec, parse_rational
+from dsa_des.time.clock import MOST_JITTER, ClockSpec, parse_rational
 
 #: Numbers without a unit below: products of several, and their squares, are still finite.
 LARGEST = 1e30
@@ -174,7 +174,10 @@ class ClockedParameters(Parameters):
         default=Fraction(0), le=1_000_000, description="Error of the scan rate, parts per million."
     )
     jitter_s: float = Field(
-        default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."
+        default=0.0,
+        ge=0,
+        description="Standard deviation of scan instants about their grid, s; "
+        f"none is moved by more than {MOST_JITTER:g} of the time between scans.",
     )
 
     def clock_spec(self) -> ClockSpec:

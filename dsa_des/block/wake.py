@@ -1,6 +1,6 @@
 """One wake of a block: the instants it runs at, its inputs there and what it answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -114,7 +114,7 @@ class Wake:
         message, rows = held
         count = len(rows)
         whole = len(message) == count and rows[0] == 0 and rows[-1] == count - 1
-        if whole and (count == 1 or bool(np.all(rows[1:] > rows[:-1]))):
+        if whole and (count == 1 or bool((rows[1:] > rows[:-1]).all())):
             return message
         if rows[0] < 0:
             if rows[-1] < 0:
@@ -127,7 +127,7 @@ class Wake:
         return self._arrived.get(port, [])
 
 
-def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
+def by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Message]:
     """Return what a block returned as messages by output name; a lone one goes to the only output.
 
     TypeError if a lone message could go to several outputs.
@@ -141,4 +141,4 @@ def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
             f"returned one message but has {len(outputs)} outputs; return a dict of "
             f"{', '.join(sorted(outputs)) or 'nothing'}"
         )
-    return {outputs[0]: result}
+    return {next(iter(outputs)): result}

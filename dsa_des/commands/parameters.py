@@ -3,6 +3,7 @@
 import types
 import typing
 from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -67,10 +68,14 @@ def _type_name(annotation: Any) -> str:
         return " or ".join(_type_name(a) for a in arguments if a is not type(None))
     if origin is typing.Literal:
         return " | ".join(str(value) for value in arguments)
+    if origin is tuple and arguments[-1] is Ellipsis:
+        return f"list of {_type_name(arguments[0])}"
     if origin is tuple:
         return f"[{', '.join(_type_name(a) for a in arguments)}]"
     if origin is not None:
         return f"{origin.__name__} of {', '.join(_type_name(a) for a in arguments)}"
+    if is_dataclass(annotation):  # what was read from a file that a scene names
+        return "path"
     names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     return names.get(annotation, getattr(annotation, "__name__", str(annotation)).lower())
 

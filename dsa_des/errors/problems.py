@@ -6,6 +6,7 @@ all. An exception inside a block becomes a `BlockFailure` that says which block,
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import date, time
 from difflib import get_close_matches
 from typing import Any
 
@@ -79,7 +80,10 @@ class Lines(str):
 
 
 def shown_value(value: Any) -> str:
-    """Return how a value is shown in a message: as Python writes it, cut off where it is long."""
+    """Return how a value is shown in a message: as Python writes it, cut off where it is long.
+
+    Dates and times, which only TOML has, are shown as TOML writes them.
+    """
     if isinstance(value, str):
         # Cut before it is quoted: a long text is not copied.
         return shortened(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
@@ -97,6 +101,8 @@ def shown_value(value: Any) -> str:
                 return shortened(text, MOST_OF_A_VALUE)
         text += "," if isinstance(value, tuple) and len(value) == 1 else ""
         return shortened(text + right, MOST_OF_A_VALUE)
+    if isinstance(value, date | time):
+        return value.isoformat()
     return shortened(repr(value), MOST_OF_A_VALUE)
 
 

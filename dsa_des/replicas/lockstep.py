@@ -156,7 +156,9 @@ class Replicas(Timeline):
         return make
 
     def _check_same_word(self, face: Component, component: Component) -> None:
-        """Refuse an instance that asks or offers its neighbours something else than the first."""
+        """Refuse an instance that asks, offers or records something else than the first."""
+        if [*component.records()] != [*face.records()]:
+            raise NotInLockStep(f"block {face.name} records something else in some replica")
         for port in face.inputs:
             if component.request(port) != face.request(port):
                 raise NotInLockStep(f"block {face.name} asks for something else in some replica")

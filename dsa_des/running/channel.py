@@ -52,7 +52,7 @@ class Channel:
         self._waiting: deque[Rows] = deque()
         #: What was collected; the last row of each run is held.
         self._passed: list[Rows] = []
-        #: First arrival of every message pushed since `state` or `set_state`.
+        #: First arrival of every message pushed since `watch`.
         self._pushed: list[int] | None = None
 
     def hold(self, message: Message, tick: int) -> None:
@@ -64,17 +64,19 @@ class Channel:
         self._passed = [(RunTicks(held.run, np.full(count, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
-        """Return what waits and what is held, for `set_state`; note pushes from now on."""
-        self._pushed = []
+        """Return what waits and what is held, for `set_state`."""
         return tuple(self._waiting), tuple(self._passed)
 
     def set_state(self, state: tuple[Any, Any]) -> None:
         """Go back to a state that `state` gave."""
         self._waiting, self._passed = deque(state[0]), list(state[1])
+
+    def watch(self) -> None:
+        """Take note from now on of when what is pushed arrives."""
         self._pushed = []
 
     def earliest_pushed(self) -> int | None:
-        """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
+        """Return the first arrival of what was pushed since `watch`, or None."""
         return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
@@ -117,8 +119,12 @@ class Channel:
 
     def next_arrivals(self, end: int) -> RunTicks:
         """Return when rows arrive before `end` that were not collected yet."""
-        arriving = [arrivals.take(self._due(arrivals, end)) for arrivals, _ in self._waiting]
-        arriving = [part for part in arriving if len(part)]
+        arriving = []
+        for arrivals, _ in self._waiting:
+            due = self._due(arrivals, end)
+            part = arrivals.take(slice(due) if isinstance(due, int) else due)
+            if len(part.tick):
+                arriving.append(part)
         if not arriving:
             return RunTicks.none()
         if self._faults is None and 1 in (len(arriving), len(self._runs.going)):
@@ -129,17 +135,19 @@ class Channel:
         """Return a tick before which nothing arrives of what waits."""
         return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
-    def _due(self, arrivals: RunTicks, end: int) -> slice | BoolArray:
-        """Return which rows arrive before `end`."""
+    def _due(self, arrivals: RunTicks, end: int) -> int | BoolArray:
+        """Return how many rows arrive before `end`, or which, if they are not the first ones."""
         if len(self._runs.going) == 1:
-            return slice(arrivals.at_most(end))
+            return arrivals.at_most(end)
         if end >= self._runs.run_ticks:
-            return slice(None)
+            return len(arrivals)
         due = arrivals.tick < end
-        return slice(None) if due.all() else due
+        return len(arrivals) if due.all() else due
 
     def collect(self, end: int) -> Rows | None:
         """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
+        if not self._waiting:
+            return None
         taken: list[Rows] = []
         left: deque[Rows] = deque()
         one, first = self._runs.count == 1, self._runs.going.start
@@ -148,21 +156,20 @@ class Channel:
             if not one and arrivals.run[-1] < first:
                 continue  # of a run that has ended before they came
             due = self._due(arrivals, end)
-            if not isinstance(due, slice):
+            if not isinstance(due, int):
                 rows, others = np.flatnonzero(due), np.flatnonzero(~due)
                 if len(rows):
                     taken.append((arrivals.take(rows), message.take(rows)))
                 left.append((arrivals.take(others), message.take(others)))
                 continue
-            count = len(arrivals) if due.stop is None else due.stop
-            start = len(message) - len(arrivals)
-            if count == len(arrivals):
-                taken.append((arrivals, message.take(slice(start, None))))
+            start = len(message.tick) - len(arrivals.tick)
+            if due == len(arrivals.tick):
+                taken.append((arrivals, message.take(slice(start, None)) if start else message))
                 continue
-            if count:
-                part = message.take(slice(start, start + count))
-                taken.append((arrivals.take(slice(count)), part))
-            left.append((arrivals.take(slice(count, None)), message))
+            if due:
+                part = message.take(slice(start, start + due))
+                taken.append((arrivals.take(slice(due)), part))
+            left.append((arrivals.take(slice(due, None)), message))
             if self._faults is None and one:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
@@ -201,13 +208,14 @@ class Channel:
 
     def _pass(self, new: Rows, end: int) -> None:
         """Take note of rows of which every run that asked holds one."""
+        if self._runs.count == 1:
+            self._passed = [new]
+            return
         if self._of_all(new[0]):  # nothing older is held by any run that goes
             stop = self._runs.going.stop
             self._passed = [part for part in self._passed if part[0].run[-1] >= stop]
         self._passed.append(new)
-        if len(self._passed) > _MOST_PASSED or (
-            self._runs.count > 1 and end >= self._runs.run_ticks
-        ):
+        if len(self._passed) > _MOST_PASSED or end >= self._runs.run_ticks:
             self._remember(end)
 
     def _of_all(self, arrivals: RunTicks) -> bool:
@@ -240,9 +248,11 @@ def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
 
 def _lasts(arrivals: RunTicks, message: Message) -> Rows:
     """Return the last row of each run."""
+    if len(arrivals) == 1:
+        return arrivals, message
     if arrivals.one_run:
-        rows = slice(len(message) - 1, len(message))
-        return arrivals.take(slice(len(arrivals) - 1, len(arrivals))), message.take(rows)
+        last = slice(len(arrivals) - 1, None)
+        return arrivals.take(last), message.take(last)
     lasts = arrivals.last_of_each
     return arrivals.take(lasts), message.take(lasts)
 

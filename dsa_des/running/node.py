@@ -99,6 +99,10 @@ class Node:
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
+    @cached_property
+    def _trigger_wires(self) -> list[Channel]:
+        return [wire for port in self._trigger_ports for wire in self.channels.get(port, ())]
+
     @property
     def wires(self) -> list[Channel]:
         """The wires into all inputs."""
@@ -194,9 +198,7 @@ class Node:
         if self.on_demand:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
-        ticks += [
-            wire.none_before() for p in self._trigger_ports for wire in self.channels.get(p, ())
-        ]
+        ticks += [wire.none_before() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
     def _end_in(self, window: Window) -> int:
@@ -223,12 +225,8 @@ class Node:
         else:
             instants = self._demanded(start, end) if self.on_demand else RunTicks.none()
             scans = _no_scans(len(instants))
-        arrivals = [
-            channel.next_arrivals(end)
-            for port in self._trigger_ports
-            for channel in self.channels.get(port, [])
-        ]
-        if any(map(len, arrivals)):
+        arrivals = [wire.next_arrivals(end) for wire in self._trigger_wires]
+        if any(len(part.tick) for part in arrivals):
             own, numbers = instants, scans
             instants = _all_of([own, *arrivals])
             scans = _no_scans(len(instants))
@@ -239,7 +237,7 @@ class Node:
         if runs.early:
             kept = runs.before_ends(instants)
             instants, scans = instants.take(kept), scans[kept]
-        if len(instants):
+        if len(instants.tick):
             self._run(instants, scans, end)
 
     @cached_property
@@ -293,7 +291,7 @@ class Node:
         `ran` are the instants that it ran at; it sets out at `leaves`, where that is later.
         """
         outputs = self.component.outputs
-        for port, message in by_output(result, tuple(outputs)).items():
+        for port, message in by_output(result, outputs).items():
             declared = outputs.get(port)
             if declared is None:
                 raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
@@ -302,7 +300,7 @@ class Node:
                     f"output {port!r} is declared to send {declared.message.__name__}, "
                     f"not {type(message).__name__}"
                 )
-            if len(message) == 0:
+            if len(message.tick) == 0:
                 continue
             message.check()
             message = _of_their_runs(port, message, ran)
@@ -336,7 +334,7 @@ class Node:
 
 def _all_of(parts: Sequence[RunTicks]) -> RunTicks:
     """Return the instants of all parts."""
-    filled = [part for part in parts if len(part)]
+    filled = [part for part in parts if len(part.tick)]
     if len(filled) > 1:
         return union(filled)
     return filled[0] if filled else RunTicks.none()

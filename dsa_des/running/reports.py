@@ -1,6 +1,6 @@
 """What a scene gives to note before it runs, and the plug-ins that report on a run."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,6 +15,7 @@ from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shortened
+from dsa_des.time.clock import MOST_JITTER
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
@@ -28,7 +29,7 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     """Return what there is to note of a scene that is set up, but for what it acknowledges.
 
     First what was done to it that its files do not show, then keys that change nothing, then what
-    its blocks have to say of their own values.
+    its blocks and their times have to say of their own values.
     """
     scene = simulation.scene
     notes = notes_of_loading(scene)
@@ -38,7 +39,25 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         notes += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+        notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
     return _unacknowledged(scene, [*notes, *_slowed(simulation)])
+
+
+def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:
+    """Say which times of a block let it do nothing in this run, or something else than is said."""
+    scene, ends_s = simulation.scene, simulation.duration_s
+    component = simulation.components[name]
+    spec = component.clock_of(component.p)
+    if spec is not None and spec.offset_s >= ends_s:
+        yield f"offset_s is {float(spec.offset_s):g}: it never scans in {float(ends_s):g} s"
+    if spec is not None and spec.jitter_s > MOST_JITTER / 3 * spec.period_s:
+        yield (
+            f"jitter_s is {spec.jitter_s:g}: scans keep within {MOST_JITTER:g} of the time between "
+            f"them, {float(MOST_JITTER * spec.period_s):g} s, so that their order stays"
+        )
+    latency_s = scene.blocks[name].options.latency_s
+    if latency_s >= ends_s:
+        yield f"latency_s is {float(latency_s):g}: nothing it sends arrives in {float(ends_s):g} s"
 
 
 def _slowed(simulation: Simulation) -> list[str]:

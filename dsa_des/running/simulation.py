@@ -37,6 +37,7 @@ from dsa_des.running.processors import Processing
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Failure, Rewinder, RunningBlock, Window, Windows
 from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import MAX_TICK
 
 #: Up to so many scans a run that failed in a window is run again, to say at which of them.
 _MOST_SCANS_AGAIN = 20_000
@@ -209,7 +210,12 @@ class Simulation:
             node.start()
 
     def _next_instant(self, tick: int, ahead: int) -> int:
-        return min(node.none_before(tick, ahead) for node in self.nodes.values())
+        soonest = MAX_TICK
+        for node in self.nodes.values():
+            soonest = min(soonest, node.none_before(tick, ahead))
+            if soonest <= tick:
+                break  # as most often
+        return soonest
 
     def _check_ends(self) -> None:
         """Refuse what ends its run where messages wait for a processor: they would be lost."""

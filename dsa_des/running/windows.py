@@ -166,6 +166,11 @@ class Rewinder:
         self._channels = [channel for _, channel in into]
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
+    def watch(self) -> None:
+        """Take note from now on of what comes back."""
+        for channel in self._feedback:
+            channel.watch()
+
     def mark(self) -> None:
         """Remember how everything is now."""
         self._states = [_copied(vars(thing)) for thing in self._things]
@@ -181,9 +186,10 @@ class Rewinder:
             channel.set_state(wire)
         if self._recorder is not None and self._recorded is not None:
             self._recorder.rewind(self._recorded)
+        self.watch()
 
     def came_back(self) -> int | None:
-        """Return when the first message arrives that came back since `mark` or `restore`."""
+        """Return when the first message arrives that came back since `watch` or `restore`."""
         ticks = [channel.earliest_pushed() for channel in self._feedback]
         return min((tick for tick in ticks if tick is not None), default=None)
 
@@ -203,17 +209,23 @@ class RewindingWindows(Windows):
         self._careful = False  # whether they run no farther than the rest, after a failure
 
     def next(self) -> Window | None:
-        """Return what was right of the last window, or a new one that may be undone."""
+        """Return what was right of the last window, or a new one.
+
+        It may be undone if it is longer than the horizon, or blocks run ahead in it.
+        """
         if self._right is not None or self.start >= self.end_tick:
             return self._right
-        self._rewinder.mark()
         length = max(self._length or self._small(), self._least)
         end = self.end_after(min(length, self.longest_ticks))
         ahead = end if self._careful else self.end_after(self.longest_ticks)
         if self._ahead > self.start:
             # A window does not reach beyond what is there of them.
             end, ahead = min(end, self._ahead), self.start
-        return Window(self.start, end, ahead, True)
+        provisional = max(end - self._horizon, ahead) > self.start
+        if provisional:
+            self._rewinder.mark()
+        self._rewinder.watch()
+        return Window(self.start, end, ahead, provisional)
 
     def commit(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
@@ -224,7 +236,7 @@ class RewindingWindows(Windows):
             self._rewinder.restore()
             self._right, self._careful = None, True
             return None
-        if self._right is None and failure is not None:
+        if self._right is None and failure is not None and window.provisional:
             if early < window.end or len(failure.ticks) > 1:
                 # What failed may never have happened: look less far.
                 self._rewinder.restore()

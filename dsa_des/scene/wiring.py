@@ -93,19 +93,17 @@ class Wire:
 def read_wires(
     scene: SceneFile,
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
-    unsure: set[str] | None = None,
+    unsure: set[str],
 ) -> list[Wire]:
-    """Return the wires of a scene, sorted; what is wrong is added to `problems`.
+    """Return the wires of a scene, sorted; what is wrong with them is reported.
 
     Wires of blocks whose class is None, not known, are not judged. `unsure` receives the blocks
     that a faulty wire meant to feed.
     """
     entries = scene.data.get("wires", [])
     if not isinstance(entries, list):
-        problems.append(scene.problem(("wires",), "must be a list of wires", entries))
-        if unsure is not None:
-            unsure.update(classes)  # its targets are unknown
+        scene.report(("wires",), "must be a list of wires", entries)
+        unsure.update(classes)  # its targets are unknown
         return []
     wires: list[Wire] = []
     for position, entry in enumerate(entries):
@@ -113,9 +111,8 @@ def read_wires(
         try:
             hops = _hops(entry)
         except _WireError as error:
-            problems.append(scene.problem(key, str(error), *error.value))
-            if unsure is not None:
-                unsure.update(classes)  # its target is unknown
+            scene.report((*key, *error.key), str(error), *error.value)
+            unsure.update(classes)  # its target is unknown
             continue
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
@@ -128,17 +125,20 @@ def read_wires(
                 wire = None
             if wire is not None:
                 wires.append(wire)
-            elif unsure is not None:
+            else:
                 name = target.partition(".")[0]
                 unsure.add(name if name in classes else nearest(name, classes) or name)
-        problems += of_wire
-    _two_writers(scene, wires, classes, problems)
+        scene.problems += of_wire
+    _two_writers(scene, wires, classes)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
 
 class _WireError(Exception):
-    def __init__(self, message: str, *value: Any) -> None:
+    """What is wrong with a wire, or with one `option` of it."""
+
+    def __init__(self, message: str, *value: Any, option: str | None = None) -> None:
         self.value = value
+        self.key = () if option is None else (option,)
         super().__init__(message)
 
 
@@ -169,9 +169,10 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
     if "delay" in entry:
         match = _SCANS.fullmatch(str(entry["delay"]).strip())
         if not match or not match[1].strip("0"):
-            raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
+            raise _WireError('must read "1 scan" or "N scans"', entry["delay"], option="delay")
         if len(match[1]) > 9 or int(match[1]) > _MOST_SCANS:
-            raise _WireError(f"delay must be at most {_MOST_SCANS:,} scans", entry["delay"])
+            limit = f"must be at most {_MOST_SCANS:,} scans"
+            raise _WireError(limit, entry["delay"], option="delay")
         options["delay_scans"] = int(match[1])
     for key in ("delay_s", "jitter_s"):
         if key in entry:
@@ -179,12 +180,13 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
     if "drop_probability" in entry:
         share = entry["drop_probability"]
         if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
-            raise _WireError("drop_probability must be a number from 0 to 1", share)
+            raise _WireError("must be a number from 0 to 1", share, option="drop_probability")
         options["drop_probability"] = float(share)
     if "holds" in entry:
         holds = entry["holds"]
         if holds != "nothing" and not isinstance(holds, dict):
-            raise _WireError("holds must be 'nothing' or a table of the message's fields", holds)
+            allowed = "must be 'nothing' or a table of the message's fields"
+            raise _WireError(allowed, holds, option="holds")
         options["holds"] = holds
     return options
 
@@ -193,9 +195,9 @@ def _seconds(key: str, value: Any) -> Fraction:
     try:
         seconds = parse_rational(value)
     except ValueError as error:
-        raise _WireError(f"{key} {error}", value) from None
+        raise _WireError(str(error), value, option=key) from None
     if seconds < 0:
-        raise _WireError(f"{key} must be 0 or greater", value)
+        raise _WireError("must be 0 or greater", value, option=key)
     return seconds
 
 
@@ -241,7 +243,6 @@ def _two_writers(
     scene: SceneFile,
     wires: list[Wire],
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
 ) -> None:
     writers: dict[tuple[str, str], list[Wire]] = {}
     for wire in wires:
@@ -251,10 +252,10 @@ def _two_writers(
         if len(set(ends)) < len(ends):
             twice = sorted(end for end, count in Counter(ends).items() if count > 1)
             message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
-            problems.append(scene.problem(("wires",), message))
+            scene.report(("wires",), message)
         elif len(result) > 1 and not classes[target].inputs[input_name].many:
             message = f"{target}.{input_name} has {len(result)} writers: {', '.join(sorted(ends))}"
-            problems.append(scene.problem(("wires",), message))
+            scene.report(("wires",), message)
 
 
 def with_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:

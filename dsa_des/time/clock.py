@@ -18,6 +18,8 @@ from dsa_des.arrays.types import IntArray
 NANOSECONDS = 10**9
 # Ticks are kept in int64 arrays; one bit is left for sums of two ticks.
 MAX_TICK = 2**62
+#: How far jitter moves a scan at most, in times between scans: scans keep their order.
+MOST_JITTER = 0.45
 # Digits of an exact number's numerator and denominator. Fractions are whole numbers of any size,
 # and "1e-9999999" is one of ten million digits that every sum would carry along.
 _MOST_DIGITS = 60
@@ -79,7 +81,8 @@ def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
 class ClockSpec:
     """What a scene says of a clock: rate in Hz, offset in s, rate error in ppm, jitter in s.
 
-    `jitter_s` is the standard deviation of the scan instants about their grid.
+    `jitter_s` is the standard deviation of the scan instants about their grid, before they are cut
+    at `MOST_JITTER`.
     """
 
     rate_hz: Fraction
@@ -103,7 +106,7 @@ class ScanClock:
     Scan k is at ``offset + k * period``, exactly. A clock with a rate error runs at
     ``rate * (1 + ppm * 1e-6)``; its instants are rounded once each to the nearest tick (never
     accumulated), so the error stays below half a tick for ever. Jitter adds a keyed normal draw,
-    cut at 0.45 period so that scans keep their order, and rounded once; a jittered first scan
+    cut at `MOST_JITTER` so that scans keep their order, and rounded once; a jittered first scan
     never falls before tick 0.
 
     `jitter_draw` gives standard normal draws keyed by the scan numbers given to it; with
@@ -131,9 +134,12 @@ class ScanClock:
         self.period = period
         self._whole, rest = divmod(period.numerator, period.denominator)
         self._rest, self._denominator = rest, period.denominator
+        self._two_periods = 2 * period.numerator
         self._jitter_draw = jitter_draw if spec.jitter_s > 0 or always_draws else None
         self._jitter_ticks = spec.jitter_s * ticks_per_s
-        self._jitter_limit = 0.45 * float(period)
+        self._jitter_limit = MOST_JITTER * float(period)
+        #: How far jitter moves a scan off its grid at most, ticks.
+        self._margin = 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
 
     def _grid(self, scans: IntArray) -> IntArray:
         ticks: IntArray = self.offset + scans * self._whole
@@ -170,22 +176,15 @@ class ScanClock:
 
     def first_scan_at_or_after(self, tick: int) -> int:
         """Return the number of the first scan (not below 0) whose grid instant is >= tick."""
-        # Python integers, which neither round nor overflow; Fractions took ten times as long.
-        periods = (tick - self.offset) * self.period.denominator // self.period.numerator
-        guess = max(0, periods - 1)
-        while self._grid_tick(guess) < tick:
-            guess += 1
-        return guess
+        # Half a tick before it or later, in Python integers, which neither round nor overflow;
+        # Fractions took ten times as long.
+        half_ticks = 2 * (tick - self.offset) - 1
+        return max(0, -(-half_ticks * self._denominator // self._two_periods))
 
     def _grid_tick(self, scan: int) -> int:
         """Return one grid instant in Python integers, which cannot overflow."""
         r, d = self._rest, self._denominator
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
-
-    @property
-    def _margin(self) -> int:
-        """How far jitter moves a scan off its grid at most, ticks."""
-        return 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
 
     def none_before(self, tick: int) -> int:
         """Return a tick such that no scan that is not before `tick` is before it."""

@@ -48,6 +48,7 @@ class RunClock:
         self._going = range(0)  # those whose scans are kept in `_last` and `_read`
         self._last: tuple[int, int, Scans] = (0, -1, (_NONE, RunTicks.none()))
         self._read = _NOTHING
+        self._none = (0, -1)  # no scan from the first of these ticks on lies before the second
 
     @property
     def first(self) -> ScanClock:
@@ -65,8 +66,12 @@ class RunClock:
 
     def none_before(self, tick: int) -> int:
         """Return a tick, not before this one, before which no run has a scan from this one on."""
-        clock = self._clocks[0]
-        return max(tick, clock.none_before(tick)) if self._runs.count == 1 else tick
+        if self._runs.count > 1:
+            return tick
+        # Who asks goes on in time, and what was found holds up to there.
+        if not self._none[0] <= tick <= self._none[1]:
+            self._none = tick, self._clocks[0].none_before(tick)
+        return max(tick, self._none[1])
 
     def before(self, scans: IntArray, run: IntArray) -> IntArray:
         """Return when the scan before each was, in ticks of its run; -1 before the first."""

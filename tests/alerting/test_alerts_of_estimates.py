@@ -90,6 +90,17 @@ def test_windows_change_no_byte(tmp_path, monkeypatch):
     assert len({row["target"] for row in at_once}) >= 4
 
 
+def test_a_pose_that_a_newer_one_overtook_tells_nothing(tmp_path):
+    """The ownship's velocity is that of its newest two poses, however they came."""
+    shaken = scene(tmp_path)
+    shaken["wires"].remove("traffic -> alerting")
+    shaken["wires"].append({"from": "traffic", "to": "alerting", "jitter_s": 0.9})
+    times = {row["time_s"]: row["time_to_level_1_s"] for row in rows(run(shaken), "alerts")}
+    assert list(times) == [row["time_s"] for row in rows(run(scene(tmp_path)), "alerts")]
+    for time_s, wanted in ((t, entry_s(truth(t), 900.0)) for t in times if t >= 3.0):
+        assert times[time_s] == pytest.approx(wanted, abs=0.5)
+
+
 def test_tracks_and_sights_at_once_are_refused(tmp_path):
     both = scene(tmp_path)
     both["wires"].append("fusion -> alerting")

@@ -18,6 +18,13 @@ def test_every_value_once_and_where_it_lies(seed: int) -> None:
         assert [values[place].tolist() for place in places] == [part.tolist() for part in parts]
 
 
+@pytest.mark.parametrize("parts", [[7], [7, 7], [7, 7, 7], [7, 7, 5]])
+def test_single_values_alike_are_one(parts: list[int]) -> None:
+    values, places = sorted_union([np.array([part]) for part in parts])
+    assert values.tolist() == sorted(set(parts)) and values.dtype == np.int64
+    assert [values[place].tolist() for place in places] == [[part] for part in parts]
+
+
 @pytest.mark.parametrize("runs", [1, 3])
 def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
     random = np.random.default_rng(runs)

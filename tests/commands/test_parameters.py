@@ -1,6 +1,8 @@
-"""Units of keys, as the reference and ``dsa-des components`` say them."""
+"""Units and types of keys, as the reference and ``dsa-des components`` say them."""
 
 from components.aircraft.aircraft import Aircraft
+from components.environment.tables import Terrain
+from components.sensor.acquisition import AcquisitionRange
 from components.surveillance.active import ActiveParameters
 from dsa_des.commands.parameters import parameter_rows
 
@@ -19,3 +21,12 @@ def test_a_name_that_ends_like_a_unit_need_not_have_one():
 def test_other_units_are_those_of_the_names():
     assert units(ActiveParameters)["offset_s"] == "s"
     assert "Hz" in units(ActiveParameters).values()
+
+
+def test_types_are_said_as_a_scene_writes_them():
+    def types(model):
+        return {name.strip(): kind for name, kind, *_ in parameter_rows(model)}
+
+    assert types(Aircraft)["rcs_table"] == types(Terrain)["raster"] == "path"
+    assert types(ActiveParameters)["azimuth_deg"] == "[number, number]"
+    assert types(AcquisitionRange)["azimuth_deg"] == "list of number"

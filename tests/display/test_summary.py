@@ -1,13 +1,11 @@
 """Running summaries, against columns written by hand and against the recorded tables."""
 
 import json
-import math
 
 import numpy as np
-import pytest
 
 import dsa_des
-from components.display.summary import FusedSummary, SensorSummary
+from components.display.summary import SensorSummary
 from components.display.terminal import outcome_lines, unseen_lines
 from dsa_des.block.message import Text
 
@@ -61,15 +59,6 @@ def sensors_of(pieces, sensors=NAMES):
     return observer.result()["sensors"]
 
 
-def test_first_and_last_are_the_nearest_of_their_instant():
-    result = sensors_of([("detections", detections(SEEN))])
-    assert result["radar"]["detections"] == 5
-    assert result["radar"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
-    assert result["radar"]["last_detection"] == {"time_s": 3.0, "range_m": 700.0, "target": "a"}
-    assert result["eo"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
-    assert result["eo"]["last_detection"] == {"time_s": 3.0, "range_m": 300.0, "target": "c"}
-
-
 def test_scans_are_counted_with_what_was_skipped():
     rows = [("eo", 0, 2, 1), ("radar", 0, 3, 0), ("eo", 5, 1, 2), ("eo", 10, 0, 3)]
     result = sensors_of([("scans", scans(rows))])
@@ -82,15 +71,6 @@ def test_scans_are_counted_with_what_was_skipped():
         "range": 6,
         "culled": 0,
     }
-
-
-@pytest.mark.parametrize("cut", range(1, len(SEEN)))
-def test_the_same_however_the_rows_arrive(cut):
-    whole = sensors_of([("detections", detections(SEEN))])
-    parts = [("detections", detections(SEEN[:cut])), ("detections", detections(SEEN[cut:]))]
-    assert sensors_of(parts) == whole
-    row_by_row = [("detections", detections([row])) for row in SEEN]
-    assert sensors_of(row_by_row) == whole
 
 
 def test_a_sensor_that_saw_nothing_is_there():
@@ -107,28 +87,9 @@ def test_a_sensor_that_saw_nothing_is_there():
     }
 
 
-def test_an_unknown_range_is_null_and_never_the_nearest():
-    rows = [("radar", 10, "a", math.nan), ("radar", 10, "b", 900.0), ("radar", 20, "a", math.nan)]
-    for pieces in ([rows], [rows[:1], rows[1:]]):
-        result = sensors_of([("detections", detections(piece)) for piece in pieces])["radar"]
-        assert result["first_detection"]["target"] == "b"
-        assert result["last_detection"] == {"time_s": 2.0, "range_m": None, "target": "a"}
-
-
 def test_results_are_plain_json():
     result = sensors_of([("detections", detections(SEEN)), ("scans", scans([("eo", 0, 2, 1)]))])
     assert json.loads(json.dumps(result, allow_nan=False)) == result
-
-
-def test_fused_rows_are_counted_by_combination():
-    names = ("radar", "radar+eo", "eo")
-    observer = FusedSummary()
-    assert observer.result() == {"fused": {}}
-    observer.update("fused", {"sensors": text(["radar", "radar+eo", "radar"], names)})
-    observer.update("fused", {"sensors": text(["eo", "radar", None], names)})
-    result = observer.result()["fused"]
-    assert result == {"eo": 1, "radar": 3, "radar+eo": 1}
-    assert list(result) == sorted(result)
 
 
 def test_sightings_at_the_first_and_the_last_scan_are_marked():

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import expm
 
 from components.estimation.estimator import (
     Estimates,
@@ -55,6 +56,18 @@ def test_every_update_of_three_models_agrees_with_40_digits():
         mean, spread = combined(after)
         np.testing.assert_allclose(mean[:, 0], known["state"], rtol=1e-9)
         assert apart(spread[:, :, 0], np.array(known["covariance"])) < 1e-9
+
+
+def test_which_model_it_was_is_what_bayes_says_of_two_unlike_times():
+    rates = np.array([[0.0, 0.3, 0.02], [0.1, 0.0, 0.05], [0.4, 0.01, 0.0]])
+    generator, weights = rates - np.diag(rates.sum(axis=1)), np.array([0.6, 0.3, 0.1])
+    models = [ExtendedKalmanFilter(ConstantVelocity(q)) for q in (1.0, 2.0, 3.0)]
+    imm = InteractingMultipleModels(tuple(models), rates)
+    until_s, since_s = np.array([0.5, 4.0]), np.array([3.0, 0.2])
+    found = imm.models_then(np.stack([weights, weights], axis=1), until_s, since_s)
+    for k in range(2):
+        joint = (weights @ expm(generator * until_s[k]))[:, None] * expm(generator * since_s[k])
+        np.testing.assert_allclose(found[..., k], joint / joint.sum(axis=0), rtol=1e-12)
 
 
 def test_the_frozen_looks_ask_every_model():

@@ -5,7 +5,7 @@ import pytest
 
 from components.estimation.kalman import innovation, updated
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, predict
-from components.estimation.out_of_sequence import retrodiction
+from components.estimation.out_of_sequence import retrodiction, retrodiction_by_motion
 
 RNG = np.random.default_rng(3)
 H = RNG.normal(size=(2, 6))[:, :, np.newaxis]
@@ -62,6 +62,28 @@ def test_one_that_only_one_came_before_is_as_good_as_in_time(model):
 def test_without_noise_it_is_as_good_as_in_time_however_late(late):
     found, wanted, _ = both(ConstantVelocity(1e-12), late)
     assert apart(found, wanted) < 1e-8
+
+
+@pytest.mark.parametrize("model", [ConstantVelocity(3.0), ConstantAcceleration(0.7)])
+def test_before_all_that_was_known_it_is_what_both_instants_say_together(model):
+    """By the information of both states at once; nothing else was known of the earlier one."""
+    size, since = model.size, np.array([1.3])
+    root, state = RNG.normal(size=(size, size)), RNG.normal(size=(size, 1)) * 30.0
+    now = state, (root @ root.T * 50.0 + np.eye(size))[:, :, np.newaxis]
+    measured = RNG.normal(size=(2, 1)) * 5.0
+    then = retrodiction_by_motion(model, now, since)
+    found = then.carried_over(*now, *corrected(then.state, then.covariance, measured))
+
+    whole, slope = np.zeros((2 * size, 2 * size)), np.zeros((2, 2 * size))
+    moves = np.hstack([model.jacobian(state, since)[..., 0], -np.eye(size)])
+    whole += moves.T @ np.linalg.solve(model.noise(since)[..., 0], moves)
+    whole[size:, size:] += np.linalg.inv(now[1][..., 0])
+    slope[:, :6] = H[..., 0]
+    whole += slope.T @ (slope / R)
+    says = slope.T @ (measured / R)
+    says[size:] += np.linalg.solve(now[1][..., 0], state)
+    wanted = np.linalg.solve(whole, says)[size:], np.linalg.inv(whole)[size:, size:, np.newaxis]
+    assert apart(found, wanted) < 1e-7
 
 
 def test_with_noise_and_several_since_it_is_near_and_stays_positive():

@@ -28,7 +28,7 @@ def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
 
 def near(culling, own, times):
     """Return which targets may be in reach of one ownship at times, (times, targets)."""
-    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)
+    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)[1]
 
 
 @pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])
@@ -41,7 +41,7 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
     ]  # fmt: skip
     fleet = ScriptedFleet(targets)
     own = SteeredFleet(ScriptedFleet([flight("own", 52.0, 4.0, 20.0, 70.0)]))
-    culling = SteeredCulling(own, fleet, reach_m)
+    culling = SteeredCulling(own, fleet, reach_m, 1000.0)
     assert culling.epoch_s[0] >= SHORTEST_EPOCH_S
     in_reach = left_out = 0
     now = 0.0
@@ -62,11 +62,32 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
             assert alone.tolist() == whole[row : row + 1].tolist()
         turn = Manoeuvre(math.radians(draw.uniform(-170, 170)), math.radians(3.0))
         own = own.steered(np.array([0]), np.array([later]), [turn])
-        culling.forget(np.array([0]))
+        culling.forget(0, later)
         assert own[0].max_speed_mps < 70.0 * 1.01
         now = later
     assert in_reach > 0
     assert left_out > 0
+
+
+def test_what_was_known_of_a_later_time_is_forgotten_at_a_turn():
+    # As when a run looked ahead and goes back: beyond the turn nothing is as it was.
+    draw = np.random.default_rng(4)
+    targets = [
+        flight(f"t{i}", -43 + draw.uniform(-0.4, 0.4), 172 + draw.uniform(-0.6, 0.6),
+               draw.uniform(0, 360), draw.uniform(0, 250))
+        for i in range(80)
+    ]  # fmt: skip
+    before = SteeredFleet(ScriptedFleet([flight("own", -43.0, 172.0, 217.0, 90.0)]))
+    times = np.arange(0.0, 300.0, 7.0)
+    turned = before.steered(np.array([0]), np.array([40.0]), [Manoeuvre(math.pi, 0.05)])
+    looked_ahead, fresh = (
+        SteeredCulling(before, ScriptedFleet(targets), 9000.0, 300.0) for _ in "ab"
+    )
+    straight = near(looked_ahead, before, times)
+    looked_ahead.forget(0, 40.0)
+    whole = near(looked_ahead, turned, times)
+    assert whole.tolist() == near(fresh, turned, times).tolist()
+    assert (straight[times > 40.0] != whole[times > 40.0]).any()
 
 
 def test_leaving_out_changes_nothing_but_the_counts():
@@ -110,7 +131,7 @@ def test_whoever_comes_in_reach_of_an_ownship_that_was_told_to_fly_faster_is_nea
         ]  # fmt: skip
         fleet = ScriptedFleet(targets)
         own = SteeredFleet(ScriptedFleet([flight("own", 52.0, 4.0, 20.0, 40.0)]))
-        culling = SteeredCulling(own, fleet, 3000.0)
+        culling = SteeredCulling(own, fleet, 3000.0, 200.0)
         faster = Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0)
         own = own.steered(np.array([0]), np.array([5.0]), [faster])
         times = np.arange(6.0, 200.0, 0.5)

@@ -185,6 +185,13 @@ def test_skipping_validation_changes_nothing_else():
     assert all(np.array_equal(a, b) for a, b in zip(checked, unchecked, strict=True))
 
 
+def test_the_range_alone_is_that_of_the_line_to_the_bit():
+    own, other = hard_pairs(2000, seed=10).T[:3], hard_pairs(2000, seed=11).T[3:]
+    for places in ((*own, *other), [*(x[:50, np.newaxis] for x in own), *(x[:30] for x in other)]):
+        alone = ellipsoid.slant_range_m(*places)
+        assert np.array_equal(alone, ellipsoid.line_of_sight(*places)[2])
+
+
 def test_points_about_a_reference_each_are_those_of_each_alone():
     pymap3d = pytest.importorskip("pymap3d")
     rng = np.random.default_rng(12)

@@ -3,14 +3,11 @@
 import math
 
 import numpy as np
-import pyarrow.compute as pc
 import pytest
 
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -79,22 +76,6 @@ def test_share_of_detections_and_errors_are_those_that_are_stated():
     rank = (np.arange(count) + 0.5) / count
     assert np.abs(uniform - rank).max() < 1.63 / math.sqrt(count)
     assert not {"detection_probability"} & {n for n, v in found.items() if v[0] is not None}
-
-
-@pytest.mark.parametrize("sweep", ["false", "true"])
-def test_windows_and_company_change_no_byte(sweep):
-    sets = [*CROOKED, f"blocks.laser.beam_sweep={sweep}"]
-    scene = load_scene(SCENE, sets=sets, duration_s="12")
-    alone = tables_of(scene)["detections"].combine_chunks()
-    assert alone.num_rows > 40
-    for window in (1, 7):
-        assert tables_of(scene, window=window)["detections"].combine_chunks().equals(alone)
-    scenes = [scene_of(scene, Replica(scene.seed + i, {})) for i in range(3)]
-    each = [alone, *(tables_of(one)["detections"].combine_chunks() for one in scenes[1:])]
-    together = tables_of(scenes, runner=lock_step)["detections"]
-    for number, expected in enumerate(each):
-        mine = together.filter(pc.equal(together["replica"], number)).drop_columns(["replica"])
-        assert mine.combine_chunks().equals(expected)
 
 
 def test_a_sweep_dates_each_piece_by_its_column():

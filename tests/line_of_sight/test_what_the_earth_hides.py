@@ -7,6 +7,7 @@ import numpy as np
 import pymap3d
 import pytest
 from covering import covers
+from same_runs import same_as_alone
 from wired import chain, first_look, rows, run, sensor
 
 import dsa_des
@@ -275,19 +276,9 @@ def test_bad_values_are_one_clear_error(terrain, says, tmp_path, monkeypatch):
 
 def test_replicas_over_one_raster_run_in_lock_step():
     """Each reads its scene anew; the ground is the same one."""
-    import pyarrow.compute as pc
-
-    from dsa_des.record.recording import Recorder
-    from dsa_des.record.sinks import MemorySink
-    from dsa_des.replicas.lockstep import lock_step
 
     def load(seed):
         sets = [f"seed={seed}", "blocks.radar.false_alarm_probability=0.2"]
         return dsa_des.load_scene("configs/terrain/behind_the_ridge.toml", sets=sets, duration_s=4)
 
-    memory = MemorySink()
-    lock_step([load(1), load(2)], recorder=Recorder([memory])).run()
-    together = memory.tables()["scans"]
-    for number, seed in enumerate((1, 2)):
-        mine = together.filter(pc.equal(together["replica"], number)).drop_columns("replica")
-        assert mine.to_pylist() == dsa_des.run(load(seed)).scans.to_pylist()
+    same_as_alone([load(1), load(2)])

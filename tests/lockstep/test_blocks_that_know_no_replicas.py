@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from same_runs import same_as_alone
 
 from components.radar.swerling import SwerlingRadar
 from components.radar.weather import Rain
@@ -98,9 +99,7 @@ class Echo(Component):
     ],
 )
 @pytest.mark.parametrize("window", [None, 90])
-def test_state_of_an_ordinary_block_stays_with_its_replica(
-    lock, tmp_path, block, kind, sets, window
-):
+def test_state_of_an_ordinary_block_stays_with_its_replica(tmp_path, block, kind, sets, window):
     path = tmp_path / "scene.toml"
     path.write_text(
         f"""
@@ -111,7 +110,7 @@ def test_state_of_an_ordinary_block_stays_with_its_replica(
     )
     scene = load_scene(path, sets=[*SOUTH, *sets], duration_s="12")
     scenes = [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
-    simulation = lock.same_as_alone(scenes, window=window)
+    simulation = same_as_alone(scenes, window=window)
     assert list(simulation.timeline.split) == [block]
 
 
@@ -153,8 +152,8 @@ def with_tracker(tmp_path, kind):
 
 
 @pytest.mark.parametrize("window", [None, 90])
-def test_one_that_serves_all_keeps_what_it_remembers_by_run(lock, tmp_path, window):
-    simulation = lock.same_as_alone(with_tracker(tmp_path, CountingByRun), window=window)
+def test_one_that_serves_all_keeps_what_it_remembers_by_run(tmp_path, window):
+    simulation = same_as_alone(with_tracker(tmp_path, CountingByRun), window=window)
     assert not simulation.timeline.split
 
 
@@ -197,8 +196,8 @@ class DrawsForAll(TrackerStub):
         return super().run(wake)
 
 
-def test_who_draws_when_set_up_draws_in_each_replica(lock, tmp_path):
-    simulation = lock.same_as_alone(with_tracker(tmp_path, DrawsOnce))
+def test_who_draws_when_set_up_draws_in_each_replica(tmp_path):
+    simulation = same_as_alone(with_tracker(tmp_path, DrawsOnce))
     assert list(simulation.timeline.split) == ["tracker"]
 
 

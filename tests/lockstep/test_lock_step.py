@@ -5,11 +5,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import pyarrow.compute as pc
 import pytest
+from same_runs import same_as_alone, tables_of
 
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
@@ -33,30 +31,10 @@ def variants(scene, changes=OFFSETS, seed=40):
     return [scene_of(scene, Replica(seed + i, change)) for i, change in enumerate(fine)]
 
 
-def recorded(simulation_type, scenes, runs=1, **kwargs):
-    sink = MemorySink()
-    simulation = simulation_type(scenes, recorder=Recorder([sink], runs=runs), **kwargs)
-    simulation.run()
-    return simulation, sink.tables()
-
-
-def assert_equal_to_separate_runs(scenes, **kwargs):
-    simulation, together = recorded(lock_step, scenes, **kwargs)
-    rows = 0
-    for number, scene in enumerate(scenes):
-        _, alone = recorded(Simulation, scene, len(scenes))
-        for table, wanted in alone.items():
-            got = together[table].filter(pc.equal(together[table]["replica"], number))
-            assert got.drop_columns(["replica"]).combine_chunks().equals(wanted), (number, table)
-            rows += wanted.num_rows
-    assert rows == sum(table.num_rows for table in together.values()) > 0
-    return simulation
-
-
 @pytest.mark.parametrize("window", [None, 50])
 def test_other_seeds_and_offsets(window):
     scene = load_scene(FIRST_LIGHT, duration_s="70")
-    simulation = assert_equal_to_separate_runs(variants(scene), window=window)
+    simulation = same_as_alone(variants(scene), window=window)
     assert not simulation.timeline.split
 
 
@@ -75,13 +53,13 @@ def test_other_seeds_and_offsets(window):
 )
 def test_effects_that_remember_or_draw(sets):
     scene = load_scene(FIRST_LIGHT, sets=sets, duration_s="40")
-    assert_equal_to_separate_runs(variants(scene))
+    same_as_alone(variants(scene))
 
 
 def test_traffic_that_differs_is_flown_together():
     scene = load_scene(FIRST_LIGHT, duration_s="60")
     changes = [{}, {"blocks.traffic.intruders[0].east_m": 900}]
-    simulation = assert_equal_to_separate_runs(variants(scene, changes))
+    simulation = same_as_alone(variants(scene, changes))
     assert list(simulation.timeline.together) == ["traffic"]
     assert not simulation.timeline.split
 
@@ -89,14 +67,14 @@ def test_traffic_that_differs_is_flown_together():
 def test_traffic_that_is_asked_for_other_instants_is_flown_together_too():
     scene = load_scene(FIRST_LIGHT, duration_s="20", sets=["blocks.radar.beam_sweep=true"])
     changes = [{}, {"blocks.traffic.intruders[0].east_m": 900}]
-    simulation = assert_equal_to_separate_runs(variants(scene, changes))
+    simulation = same_as_alone(variants(scene, changes))
     assert list(simulation.timeline.together) == ["traffic"]
     assert not simulation.timeline.split
 
 
 def test_random_traffic_is_drawn_from_each_seed():
     scene = load_scene("configs/benchmark/clocks.toml", duration_s="30")
-    assert_equal_to_separate_runs(variants(scene))
+    same_as_alone(variants(scene))
 
 
 def test_wires_that_lose_and_delay_rows():
@@ -109,7 +87,7 @@ def test_wires_that_lose_and_delay_rows():
     ]
     scene = replace(scene, wires=wires)
     for window in (None, 7):
-        assert_equal_to_separate_runs(variants(scene), window=window)
+        same_as_alone(variants(scene), window=window)
 
 
 def test_shared_processors_are_refused_by_name():
@@ -124,11 +102,11 @@ def test_aircraft_that_differ_are_refused_not_mixed():
     changes = [{}, {"blocks.traffic.intruders[0].contrast_ir": 0.5}]
     scenes = [scene_of(scene, Replica(1, change)) for change in changes]
     with pytest.raises(NotInLockStep, match="differs between replicas"):
-        recorded(lock_step, scenes)
+        tables_of(scenes)
     # They run all the same, one by one.
     outcomes = run_replicas(scene, [Replica(1, change) for change in changes])
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
-    _, alone = recorded(Simulation, scenes[1])
+    _, alone = tables_of(scenes[1])
     assert len(outcomes[1].tables["detections"]["tick"]) == alone["detections"].num_rows
 
 
@@ -137,9 +115,9 @@ def test_targets_whose_radar_cross_sections_differ_run_together():
     scene = load_scene(FIRST_LIGHT, duration_s="60", sets=sets)
     changes = [{"blocks.traffic.intruders[0].rcs_dbsm": rcs} for rcs in (-12.0, 3.0, 20.0)]
     scenes = [scene_of(scene, Replica(1, change)) for change in changes]
-    assert_equal_to_separate_runs(scenes)
+    same_as_alone(scenes)
     # Only the cross-section differs: with all draws the same, a larger one is seen more often.
-    seen = [sum(recorded(Simulation, one)[1]["scans"]["detected"].to_pylist()) for one in scenes]
+    seen = [sum(tables_of(one)[1]["scans"]["detected"].to_pylist()) for one in scenes]
     assert seen == sorted(seen) and seen[0] < seen[2]
 
 
@@ -148,7 +126,7 @@ def test_a_message_that_comes_after_the_end_comes_in_no_replica():
     for delay_s in (2, 3, 4.3, 5, 9, 20):
         scene = load_scene(FIRST_LIGHT, duration_s="2", sets=[f"blocks.radar.latency_s={delay_s}"])
         replicas = [Replica(seed) for seed in range(4)]
-        assert_equal_to_separate_runs([scene_of(scene, replica) for replica in replicas])
+        same_as_alone([scene_of(scene, replica) for replica in replicas])
 
 
 def test_a_block_that_never_runs_has_its_say():
@@ -163,15 +141,31 @@ def test_a_block_that_never_runs_has_its_say():
         replicas = [Replica(1, change) for change in changes]
         scenes = [scene_of(scene, replica) for replica in replicas]
         with pytest.raises(NotInLockStep, match="block radar asks for something else"):
-            recorded(lock_step, scenes)
+            tables_of(scenes)
         # They run all the same, one by one; and what they count differs.
         culled = []
         for one, outcome in zip(scenes, run_replicas(scene, replicas), strict=True):
-            _, alone = recorded(Simulation, one)
+            _, alone = tables_of(one)
             counts = outcome.tables["scans"]["skipped_culled"]
             assert counts.tolist() == alone["scans"]["skipped_culled"].to_pylist()
             culled.append(counts.sum())
         assert culled[0] != culled[1]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_replicas_that_record_other_columns_run_as_they_do_alone(first):
+    """A radar that is off asks for nothing, sweeping or not; but a sweep has columns of its own."""
+    scene = load_scene(FIRST_LIGHT, duration_s="2", sets=["blocks.radar.enabled=false"])
+    replicas = [Replica(1, {"blocks.radar.beam_sweep": sweeps}) for sweeps in (first, not first)]
+    with pytest.raises(NotInLockStep, match="block radar records something else"):
+        tables_of([scene_of(scene, replica) for replica in replicas])
+    swept = []
+    for replica, together in zip(replicas, run_replicas(scene, replicas), strict=True):
+        (alone,) = run_replicas(scene, [replica])
+        columns = {table: list(values) for table, values in together.tables.items()}
+        assert columns == {table: list(values) for table, values in alone.tables.items()}
+        swept.append("own_lat_deg" in columns["detections"])
+    assert swept == [first, not first]
 
 
 def test_a_block_that_never_runs_reports():
@@ -211,7 +205,7 @@ def test_replicas_whose_line_of_sight_rests_on_where_their_own_traffic_is(tmp_pa
     outcomes = run_replicas(scene, replicas)
     models, rows = set(), 0
     for replica, outcome in zip(replicas, outcomes, strict=True):
-        simulation, alone = recorded(Simulation, scene_of(scene, replica))
+        simulation, alone = tables_of(scene_of(scene, replica))
         models.add(simulation.components["transform"].rung.earth)
         wanted = alone["detections"]["true_azimuth_rad"].to_pylist()
         assert outcome.tables["detections"]["true_azimuth_rad"].tolist() == wanted

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from same_runs import replicas_of, same_as_alone, tables_of
 
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.memory import LevelMemory, MemoryRule
@@ -33,13 +34,13 @@ wires = [
 """
 
 
-def test_places_of_a_replica_that_has_no_scan_for_a_while(lock):
+def test_places_of_a_replica_that_has_no_scan_for_a_while():
     """Half a second at a time; the first replica is the one that is left out at first."""
     scene = load_scene("configs/tracking/cueing.toml", duration_s="5", sets=SETS)
     phases = [{"blocks.radar.offset_s": Fraction(tenths, 10)} for tenths in (7, 1, 6)]
-    scenes = lock.replicas_of(scene, *phases)
-    assert not lock.same_as_alone(scenes, window=11).timeline.split
-    _, tables = lock.tables_of(lock_step, scenes)
+    scenes = replicas_of(scene, *phases)
+    assert not same_as_alone(scenes, window=11).timeline.split
+    _, tables = tables_of(scenes)
     found = tables["detections"].to_pylist()
     mine = [row["declared"] for row in found if row["block"] == "radar" and row["replica"] == 0]
     assert {*mine} == {True, False}

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from same_runs import replicas_of, same_as_alone, tables_of
 
 from components.encounters.ending import ClosestApproachPassed
 from dsa_des.errors import SceneError
@@ -62,10 +63,10 @@ def loaded(tmp_path, text, kind=OURS):
     [(text, kind, window) for text, window in ((CROSSING, None), (HEAD_ON, None), (HEAD_ON, 9))
      for kind in (OURS, f"{__name__}:OfAStranger")],
 )  # fmt: skip
-def test_replicas_end_by_themselves(lock, tmp_path, text, kind, window):
+def test_replicas_end_by_themselves(tmp_path, text, kind, window):
     scene = loaded(tmp_path, text, kind)
-    scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}, {SPEED: 0.0})
-    simulation = lock.same_as_alone(scenes, window=window)
+    scenes = replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}, {SPEED: 0.0})
+    simulation = same_as_alone(scenes, window=window)
     assert (simulation.runs.going.start == 0) == (text is CROSSING or window is None)
     assert ("over" in simulation.timeline.split) == (kind != OURS)
     assert len(set(simulation.runs.ends.tolist())) == 3
@@ -111,15 +112,15 @@ def test_what_has_ended_runs_no_more(tmp_path):
 
 @pytest.mark.parametrize("options", [{"window": 2, "shuffle_ties": 3}, {"window": 31}])
 @pytest.mark.parametrize("text", [CROSSING, HEAD_ON], ids=["closed", "open"])
-def test_a_single_run_ends_at_the_same_tick_in_any_window(lock, tmp_path, text, options):
+def test_a_single_run_ends_at_the_same_tick_in_any_window(tmp_path, text, options):
     scene = loaded(tmp_path, text)
-    one, first = lock.tables_of(Simulation, scene)
-    other, second = lock.tables_of(Simulation, scene, **options)
+    one, first = tables_of(scene)
+    other, second = tables_of(scene, **options)
     assert one.runs.ends.tolist() == other.runs.ends.tolist() < [one.runs.run_ticks]
     assert first == second
 
 
-def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
+def test_what_is_under_way_at_the_end_does_not_come(tmp_path):
     """Messages are under way for a second: some would come at the very end, others later."""
     text = HEAD_ON
     for source, target in (("radar", "fusion"), ("fusion", "tracker")):
@@ -130,8 +131,8 @@ def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
     )
     NEAR[text] = NEAR[HEAD_ON]
     scene = loaded(tmp_path, text)
-    scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0})
-    simulation = lock.same_as_alone(scenes)
+    scenes = replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0})
+    simulation = same_as_alone(scenes)
     together = lock_step(scenes)
     fusion = together.nodes["fusion"]
     came, runner = [], fusion.runner
@@ -148,9 +149,9 @@ def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
     together.run()
     assert np.concatenate(came).all()
     assert simulation.runs.early
-    one, first = lock.tables_of(Simulation, scene)
+    one, first = tables_of(scene)
     assert first["state_tracks"].num_rows > 0
-    _, second = lock.tables_of(Simulation, scene, window=1)
+    _, second = tables_of(scene, window=1)
     assert first == second
     assert one.recorder.rows == {name: table.num_rows for name, table in first.items()}
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from same_runs import replicas_of, same_as_alone, tables_of
 
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.running.loops import opened_loops
@@ -23,23 +24,23 @@ FLIGHTS = (
 NEARER = ["blocks.traffic.intruders[0].east_m=2600", "blocks.traffic.intruders[0].north_m=2000"]
 
 
-def test_an_avoidance_that_turns_each_ownship_by_itself(lock):
+def test_an_avoidance_that_turns_each_ownship_by_itself():
     scene = load_scene(CROSSING, duration_s="40", sets=NEARER)
-    simulation = lock.same_as_alone(lock.replicas_of(scene, *FLIGHTS), window=9)
-    _, tables = lock.tables_of(lock_step, lock.replicas_of(scene, *FLIGHTS))
+    simulation = same_as_alone(replicas_of(scene, *FLIGHTS), window=9)
+    _, tables = tables_of(replicas_of(scene, *FLIGHTS))
     assert len(simulation.runs.going) > 1
     assert len(set(tables["manoeuvres"]["replica"].to_pylist())) > 1
 
 
-def test_a_pilot_in_the_loop(lock):
+def test_a_pilot_in_the_loop():
     sets = [*NEARER, "blocks.pilot.coordination_s=0", "blocks.pilot.initial_delay_s=1"]
     scene = load_scene(PILOT, duration_s="40", sets=sets)
-    lock.same_as_alone(lock.replicas_of(scene, *FLIGHTS))
-    _, tables = lock.tables_of(lock_step, lock.replicas_of(scene, *FLIGHTS))
+    same_as_alone(replicas_of(scene, *FLIGHTS))
+    _, tables = tables_of(replicas_of(scene, *FLIGHTS))
     assert tables["manoeuvres"].num_rows > 0
 
 
-def test_drawn_clocks_and_wires_in_the_loop(lock):
+def test_drawn_clocks_and_wires_in_the_loop():
     sets = [*NEARER, "blocks.radar.jitter_s=0.05", "blocks.eo.rate_error_ppm=900"]
     scene = load_scene(CROSSING, duration_s="30", sets=sets)
     wires = [
@@ -48,7 +49,7 @@ def test_drawn_clocks_and_wires_in_the_loop(lock):
         else wire
         for wire in scene.wires
     ]
-    lock.same_as_alone(lock.replicas_of(replace(scene, wires=wires), *FLIGHTS))
+    same_as_alone(replicas_of(replace(scene, wires=wires), *FLIGHTS))
 
 
 def test_a_loop_is_opened_where_it_takes_longest():

@@ -12,9 +12,12 @@ from dsa_des.time.runs import Runs
 RUN_TICKS = 60
 
 
-def as_held(runs, sent, asked, longest, horizon=None):
+def as_held(runs, sent, asked, longest, horizon=None, *, initial=False):
     """Whether every replica holds at each tick that it asks about what came there last."""
     channel = Channel("source", 0, None, runs)
+    if initial:
+        channel.hold(Message(np.array([-1])), -1)
+        sent = [[-1, *ticks] for ticks in sent]
     windows = Windows(runs, longest, horizon)
     told = 0
 
@@ -58,3 +61,21 @@ def test_what_came_at_the_very_start_is_held_to_the_end_of_its_run(step):
     runs = Runs(3, RUN_TICKS)
     sent, asked = [[0], [4], [0, 20]], [range(0, RUN_TICKS, 3)] * 3
     assert as_held(runs, sent, asked, step) == 20 + 18 + 20
+
+
+def drawn_ticks(random):
+    """Draw some instants, ascending: none, a few or most of a run's."""
+    count = random.choice([0, 1, 3, RUN_TICKS // 2])
+    return np.sort(random.choice(RUN_TICKS, count, replace=False)).tolist()
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_whatever_comes_each_replica_holds_what_came_last(seed):
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 6))
+    runs = Runs(count, RUN_TICKS)
+    sent, asked = ([drawn_ticks(random) for _ in range(count)] for _ in range(2))
+    # All at a time, some, or one; the last ones may be fewer, down to a single one.
+    longest = RUN_TICKS * int(random.integers(1, count + 1))
+    horizon = random.choice([None, 1, 7])
+    as_held(runs, sent, asked, longest, horizon, initial=bool(random.integers(2)))

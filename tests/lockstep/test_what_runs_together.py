@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 import pytest
+from same_runs import replicas_of, same_as_alone, tables_of
 
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene.scene import load_scene
 
@@ -53,22 +53,22 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", list(SCENES))
-def test_one_block_serves_all(lock, name):
+def test_one_block_serves_all(name):
     path, duration_s, sets, table = SCENES[name]
     scene = load_scene(f"configs/{path}", duration_s=duration_s, sets=sets)
-    scenes = lock.replicas_of(scene, {}, {})
-    assert not lock.same_as_alone(scenes, window=11).timeline.split
-    _, tables = lock.tables_of(lock_step, scenes)
+    scenes = replicas_of(scene, {}, {})
+    assert not same_as_alone(scenes, window=11).timeline.split
+    _, tables = tables_of(scenes)
     assert len({*tables[table]["replica"].to_pylist()}) == 2
 
 
-def test_flights_over_terrain(lock):
+def test_flights_over_terrain():
     """Each is checked to stay above it, and one that does not fails by itself."""
     sets = ["terrain.height_m=900", "blocks.radar.enabled=false"]  # whose clutter asks as well
     scene = load_scene("configs/first_light.toml", duration_s="5", sets=sets)
     own = "blocks.traffic.ownship.alt_m"
-    good = lock.replicas_of(scene, {own: 950}, {own: 1050})
-    simulation = lock.same_as_alone(good)
+    good = replicas_of(scene, {own: 950}, {own: 1050})
+    simulation = same_as_alone(good)
     assert list(simulation.timeline.together) == ["traffic"]
     one, other = run_replicas(scene, [Replica(1, {own: 950}), Replica(1, {own: 850})])
     assert isinstance(one, Recorded)
@@ -76,7 +76,7 @@ def test_flights_over_terrain(lock):
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path, closed):
+def test_the_tracks_of_two_trackers_are_fused_together(tmp_path, closed):
     """In a loop all runs go side by side; without one they come one after the other."""
     path = tmp_path / "distributed.toml"
     cueing = Path("configs/tracking/cueing.toml").resolve()
@@ -96,11 +96,11 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path, closed):
         {f"blocks.{sensor}.offset_s": Fraction(tenths, 10) for sensor in ("radar", "eo")}
         for tenths in (1, 6, 2)
     ]
-    scenes = lock.replicas_of(replace(scene, wires=late), *phases)
-    simulation = lock.same_as_alone(scenes, window=11)
+    scenes = replicas_of(replace(scene, wires=late), *phases)
+    simulation = same_as_alone(scenes, window=11)
     assert not simulation.timeline.split
     assert (simulation.runs.going == range(3)) == closed
-    _, tables = lock.tables_of(lock_step, scenes)
+    _, tables = tables_of(scenes)
     fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
     assert len({*fused["replica"].to_pylist()}) == 3
 
@@ -117,7 +117,7 @@ wires = [
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
+def test_alerts_of_tracks_at_instants_of_their_own(tmp_path, closed):
     """In some stretches of time only some replicas have scans; or one lasts for several windows."""
     name, _, sets, _ = SCENES["alerts of tracks"]
     path = Path("configs", name)
@@ -129,21 +129,21 @@ def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
         sets = [*sets, *seen, "blocks.alerting.scan_rate_hz=5"]
     scene = load_scene(path, duration_s="7", sets=sets)
     phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
-    scenes = lock.replicas_of(scene, *phases)
-    simulation = lock.same_as_alone(scenes, window=None if closed else 2)
+    scenes = replicas_of(scene, *phases)
+    simulation = same_as_alone(scenes, window=None if closed else 2)
     assert (simulation.runs.going == range(3)) == closed
     assert not simulation.timeline.split
 
 
-def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next(lock):
+def test_what_was_measured_in_a_run_that_has_ended_is_in_no_gate_of_the_next():
     """Each run goes through several windows, and they run one after the other."""
     scene = load_scene("configs/systems/tecvol_tracked.toml", duration_s="6")
-    simulation = lock.same_as_alone(lock.replicas_of(scene, {}, {}, {}), window=9)
+    simulation = same_as_alone(replicas_of(scene, {}, {}, {}), window=9)
     assert simulation.runs.going == range(2, 3)
 
 
 @pytest.mark.parametrize("late", ["rerun", "one_step"])
-def test_looks_that_come_late_in_a_loop_are_remembered_by_run(lock, late):
+def test_looks_that_come_late_in_a_loop_are_remembered_by_run(late):
     sets = [f"blocks.tracker.late={late}", "blocks.tracker.lag_s=2"]
     scene = load_scene("configs/avoidance/crossing_tracked.toml", duration_s="8", sets=sets)
     wires = [
@@ -152,7 +152,7 @@ def test_looks_that_come_late_in_a_loop_are_remembered_by_run(lock, late):
         else wire
         for wire in scene.wires
     ]
-    simulation = lock.same_as_alone(lock.replicas_of(replace(scene, wires=wires), {}, {}, {}))
+    simulation = same_as_alone(replicas_of(replace(scene, wires=wires), {}, {}, {}))
     assert not simulation.timeline.split
     assert len(simulation.runs.going) == 3
     assert simulation.components["tracker"]._past

@@ -72,6 +72,13 @@ def test_of_targets_that_are_seen_at_once_the_nearest_is_the_first():
         assert found[f"first_detection_range_m.{name}"] == pytest.approx(near_m, abs=0.02)
 
 
+def test_who_is_never_detected_has_no_first_detection():
+    blind = chain({**SENSORS, "eye": {**SENSORS["eye"], "threshold": 1e9}})
+    found = measured(blind, {"metric": "first_detection", "sensors": ["radar", "eye"]})
+    assert (found["detected.radar"], found["detected.eye"]) == (1, 0)
+    assert np.isnan([found[f"first_detection_{what}.eye"] for what in ("time_s", "range_m")]).all()
+
+
 @covers("target", "sensors", of=("[metric detection_share]",))
 def test_shares_of_looks_that_detect():
     """The radar hears the nearer target only, the camera looks at both."""
@@ -123,8 +130,7 @@ def test_a_rule_of_m_in_n_needs_them_close_together():
     assert found["declared.radar"] == 0
 
 
-@pytest.mark.parametrize(("m", "n"), [(3, 4), (3, 5), (2, 2), (4, 5), (5, 8), (5, 9)])
-def test_scans_that_miss_count_among_the_n(tmp_path, m, n):
+def two_of_four(tmp_path, **more) -> dict[str, Any]:
     """A target that turns once a second shows a large side to two of four scans."""
     nodes = [(az, el) for az in range(0, 360, 10) for el in (-90, 90)]
     lines = [f"{az},{el},{30 if 5 < az < 175 else -60}" for az, el in nodes]
@@ -136,7 +142,12 @@ def test_scans_that_miss_count_among_the_n(tmp_path, m, n):
         "rcs_table": str(path), "legs": [{"kind": "turn", "rate_deg_s": 360}],
     }  # fmt: skip
     radar = {**HEARS_ALL, "scan_rate_hz": 4, "threshold_db": 20.0}
-    looked = chain({"radar": radar}, targets=[turning], duration_s=4)
+    return chain({"radar": radar}, targets=[turning], **{"duration_s": 4, **more})
+
+
+@pytest.mark.parametrize(("m", "n"), [(3, 4), (3, 5), (2, 2), (4, 5), (5, 8), (5, 9)])
+def test_scans_that_miss_count_among_the_n(tmp_path, m, n):
+    looked = two_of_four(tmp_path)
     hits = [row["scan"] for row in rows(run(looked))]
     assert {b - a for a, b in pairwise(hits)} == {1, 3}
     expected = next(
@@ -214,6 +225,14 @@ def test_updates_and_breaks_of_tracks(recorded, target, break_after_s):
     assert found["track_continuity"] == pytest.approx(1.0 - broken.sum() / gaps.sum())
     assert found["track_breaks"] == np.count_nonzero(broken > 0.0)
     assert bool(broken.any()) is (break_after_s < 1)
+
+
+def test_most_updates_follow_within_the_percentile(tmp_path):
+    """After one scan or three, by turns."""
+    plain = {"fusion": {"type": "fusion.pick_best"}, "tracker": {"type": "tracking.stub"}}
+    found = measured(two_of_four(tmp_path, duration_s=4.25, **plain), "track_updates")
+    assert found["track_update_interval_p95_s"] == pytest.approx(0.75)
+    assert 0.4 < found["track_update_interval_s"] < 0.6
 
 
 @covers("target", of=("[metric position_error]",))

@@ -10,12 +10,11 @@ import pytest
 
 from components.metrics.losses import closest, first_inside, first_losses_s, nearest_of, ways_of
 from components.metrics.separation import Separation, separations
-from components.metrics.track_quality import _ramp_quantiles
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Text
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.replicas import Recorded, run_replicas
+from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import METRICS, Group, wanted_by
 from dsa_des.studies.study import MetricSpec
@@ -42,14 +41,6 @@ def table(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return columns
 
 
-def measured(name: str, runs: list[dict[str, Any]], **keys: Any) -> dict[str, np.ndarray]:
-    scene = load_scene("small.toml")
-    metric = MetricSpec(name, keys).build(scene)
-    recorded = [Recorded(tables, 10**9, 6.0, dict) for tables in runs]
-    group = Group(scene, [Replica(k) for k in range(len(runs))], recorded, wanted_by([metric]))
-    return dict(metric.measure(group))
-
-
 def look(time_s: float, scan: int, range_m: float, target: str | None = "one",
          block: str = "radar") -> dict[str, Any]:  # fmt: skip
     return {"block": block, "target": target, "time_s": time_s, "scan": scan,
@@ -72,96 +63,6 @@ RUNS: list[dict[str, Any]] = [
     },
     {"detections": table([look(3.0, 15, 700)]), "fused": table([fused(3.0, "radar")])},
 ]  # fmt: skip
-
-
-def test_first_detection(small: Path) -> None:
-    found = measured("first_detection", RUNS)
-    np.testing.assert_array_equal(found["first_detection_time_s.radar"], [0.2, 3.0])
-    np.testing.assert_array_equal(found["first_detection_range_m.radar"], [900, 700])
-    np.testing.assert_array_equal(found["detected.ir"], [1, 0])
-    np.testing.assert_array_equal(found["first_detection_time_s.ir"], [1.5, np.nan])
-    np.testing.assert_array_equal(found["first_detection_time_s.fused"], [0.2, 3.0])
-    only = measured("first_detection", RUNS, target="two", sensors=["radar"])
-    np.testing.assert_array_equal(only["first_detection_range_m.radar"], [500, np.nan])
-
-
-@pytest.mark.parametrize(
-    ("m", "n", "time_s"),
-    [(1, 1, 0.2), (2, 2, 0.4), (2, 5, 0.4), (3, 5, np.nan), (3, 6, 1.2), (4, 7, 1.4),
-     (4, 6, np.nan)],
-)  # fmt: skip
-def test_declaration_after_m_of_n(small: Path, m: int, n: int, time_s: float) -> None:
-    found = measured("declaration", RUNS, m=m, n=n, target="one", sensors=["radar"])
-    np.testing.assert_array_equal(
-        found["declaration_time_s.radar"], [time_s, 3.0 if m == 1 else np.nan]
-    )
-    np.testing.assert_array_equal(found["declared.radar"], [time_s == time_s, m == 1])
-    np.testing.assert_allclose(found["declaration_delay_s.radar"][0], time_s - 0.2)
-
-
-def test_declaration_by_any_sensor_is_the_earliest(small: Path) -> None:
-    found = measured("declaration", RUNS)
-    np.testing.assert_array_equal(found["declaration_time_s.any"], [0.2, 3.0])
-    np.testing.assert_array_equal(found["declaration_time_s.ir"], [1.5, np.nan])
-
-
-def test_age_of_information(small: Path) -> None:
-    # Arrivals at 0.2, 0.4 and 1.4 s: two ramps, 0 to 0.2 s and 0 to 1 s, over 1.2 s.
-    found = measured("age_of_information", RUNS)
-    np.testing.assert_allclose(
-        found["age_of_information_mean_s"], [(0.02 + 0.5) / 1.2, np.nan], rtol=1e-12
-    )
-    np.testing.assert_allclose(found["age_of_information_p95_s"], [0.94, np.nan], rtol=1e-9)
-
-
-def test_quantile_of_ramps_against_sampling() -> None:
-    low, high = np.array([0.0, 0.1, 0.3]), np.array([0.5, 0.6, 0.4])
-    ages = np.concatenate(
-        [np.linspace(a, b, round((b - a) * 1_000_000)) for a, b in zip(low, high, strict=True)]
-    )
-    for share in (0.1, 0.5, 0.95):
-        span = np.array([(high - low).sum()])
-        found = _ramp_quantiles(np.zeros(3, dtype=np.int64), low, high, span, share)
-        assert found[0] == pytest.approx(np.quantile(ages, share), abs=1e-5)
-
-
-def test_track_updates_and_breaks(small: Path) -> None:
-    times = [0.0, 1.0, 2.0, 7.0, 8.0]
-    rows = [
-        {"block": "tracker", "target": "one", "time_s": t, "age_s": 0.0, "true_range_m": 0}
-        for t in times
-    ]
-    rows.insert(3, {**rows[0], "time_s": 5.0, "age_s": 3.0})  # held, not updated
-    found = measured("track_updates", [{"tracks": table(rows)}], break_after_s=2.0)
-    assert found["track_update_interval_s"][0] == 2.0
-    assert found["track_update_interval_p95_s"][0] == 5.0
-    assert found["track_breaks"][0] == 1.0
-    assert found["track_continuity"][0] == 1 - 3 / 8
-
-
-def test_position_error(small: Path) -> None:
-    # 3 m to the side at 4 m, measured 4 m straight ahead of a target 5 m away.
-    angle = np.arctan2(3, 4)
-    row = {"block": "fusion", "target": "one", "time_s": 0.0, "azimuth_rad": 0.0,
-           "elevation_rad": 0.0, "range_m": 4.0, "true_azimuth_rad": angle,
-           "true_elevation_rad": 0.0, "true_range_m": 5.0}  # fmt: skip
-    blind = {**row, "time_s": 1.0, "range_m": np.nan}
-    found = measured("position_error", [{"fused": table([row, blind])}])
-    assert found["fused_position_error_m"][0] == pytest.approx(3.0)
-    assert found["fused_angle_error_deg"][0] == pytest.approx(np.degrees(angle))
-
-
-def test_encounter_head_on(small: Path) -> None:
-    scene = load_scene("small.toml", duration_s=60)
-    (flight,) = separations(scene, 0.1)
-    # 5 km apart, closing at 110 m/s, 100 m to the side and 10 m higher.
-    range_m, time_s, cut_off = closest(flight)
-    assert cut_off == ""
-    assert time_s == pytest.approx(5000 / 110, abs=0.1)
-    assert range_m == pytest.approx(np.hypot(100, 10), abs=0.6)
-    lost, collision = first_inside(flight, WELL_CLEAR_M, NMAC_M)
-    assert lost == pytest.approx((5000 - np.sqrt(609.6**2 - 100**2)) / 110, abs=0.15)
-    assert collision > lost
 
 
 def test_flights_together_are_as_each_alone(small: Path) -> None:

@@ -53,6 +53,14 @@ def test_bounds_are_quantiles_of_chi_square():
     np.testing.assert_allclose(chi_square_bounds(6), chi2.ppf([0.025, 0.975], 6))
 
 
+def test_the_last_nees_of_a_stretch_is_that_of_its_end_and_not_of_its_start():
+    tally = TrackTally(100.0, 2.0, 1.0)
+    tally.paired_s, tally.nees = [5.0, 5.0, 9.0, 10.0, 10.0, 11.0], [1.0, 3.0, 7.0, 20.0, 30.0, 9.0]
+    ends = [(0.0, 5.0), (5.0, 10.0), (5.0, 9.5), (10.0, 15.0), (11.0, 15.0)]
+    assert [tally.last_nees(*each) for each in ends[:4]] == [2.0, 25.0, 7.0, 9.0]
+    assert math.isnan(tally.last_nees(*ends[4]))
+
+
 def test_identities_break_and_swap():
     assert changes({0: [1, 1, 3, 3], 1: [2, 2]}) == (1.0, 0.0)
     assert changes({0: [1, 2, 2], 1: [2, 1, 1]}) == (0.0, 2.0)

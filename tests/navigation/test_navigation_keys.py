@@ -1,6 +1,7 @@
 """What the ownship believes of itself moves its reports by the same, in the horizon's axes."""
 
 import math
+from types import SimpleNamespace
 
 import crooked
 import numpy as np
@@ -9,8 +10,14 @@ import pytest
 from covering import covers
 from wired import SENSORS, chain, rows, run, sensor
 
+from components.environment.tables import Navigation
+from components.navigation.errors import NavigationErrors
+from dsa_des.block.component import Context
+from dsa_des.time.randomness import Streams
+
 #: New at every instant.
 WHITE = {"position_correlation_time_s": 0.0, "attitude_correlation_time_s": 0.0}
+
 OWN = crooked.geodetic(crooked.position(crooked.OWNSHIP))
 ATTITUDE = np.array([crooked.OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll")])
 
@@ -172,3 +179,17 @@ def test_variances_have_the_pose_that_navigation_knows(mount, attitude_deg):
             strict=True,
         ):  # fmt: skip
             assert row[name] - before[name] == pytest.approx(more, rel=0.12), name
+
+
+def test_the_noise_of_a_late_instant_is_its_own():
+    """Instants beyond 48 bits of ticks draw other numbers than those they would wrap to."""
+    context = Context(Streams(1), sections={"navigation": Navigation(position_noise_m=(0, 0, 9))})
+    believed = NavigationErrors().build(SimpleNamespace(context=context))
+    ticks = np.array([7, 7 + 2**48, 7 + 2**50, 7])
+    zeros = np.zeros(4)
+    names = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+    states = SimpleNamespace(
+        tick=ticks, run=np.zeros(4, int), **{f"own_{name}": zeros for name in names}
+    )
+    alt = believed(states)["alt_m"]
+    assert alt[0] == alt[3] and len(set(alt.tolist())) == 3

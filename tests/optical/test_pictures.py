@@ -8,15 +8,15 @@ import sys
 import numpy as np
 import pytest
 from covering import covers
+from same_runs import same_as_alone, same_in_any_window
 
 import components.optical.image as image
 from components.optical.flow import find_spot
-from components.optical.picture import Pinhole, coverage, target_outlines, union_coverage
+from components.optical.picture import Pinhole, coverages, target_outlines, union_coverage
 from components.optical.silhouette import union_area
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -73,6 +73,13 @@ def test_a_pinhole_keeps_lines_straight_and_comes_back():
     assert row == pytest.approx(1000.0 * share)
     assert pinhole.direction(column, row) == pytest.approx((azimuth, elevation))
     assert np.isnan(pinhole.pixel(0.4 + 2.0, 0.0)).all()  # behind
+
+
+def coverage(corners, rows, columns):
+    picture = np.zeros((rows, columns))
+    ((box, share),) = coverages(corners[np.newaxis], rows, columns)
+    picture[box] = share
+    return picture
 
 
 def test_pixels_are_covered_by_the_exact_share():
@@ -212,16 +219,9 @@ def test_a_target_hides_what_is_behind_it(configs, monkeypatch):
 
 def test_it_is_the_same_in_any_window_and_beside_other_replicas(configs):
     sets = ["duration_s=3", "blocks.eo.texture_contrast=0.05"]
-    whole = detections(configs, *sets)[1].to_pylist()
-    assert len(whole) > 10
-    assert repr(detections(configs, *sets, window=3)[1].to_pylist()) == repr(whole)
     scenes = [load_scene(configs / SCENE, sets=[*QUIET, *sets], seed=seed) for seed in (9, 4)]
-    sink = MemorySink()
-    lock_step(scenes, recorder=Recorder([sink])).run()
-    together = sink.tables()["detections"].to_pylist()
-    alone = [{"replica": 1, **row} for row in whole]
-    mine = [row for row in together if row["replica"] == 1 and row["block"] == "eo"]
-    assert repr(mine) == repr(alone)
+    assert same_in_any_window(scenes[0], (3,))["detections"].num_rows > 10
+    same_as_alone(scenes)
 
 
 def test_what_cannot_be_is_refused(configs):

@@ -104,13 +104,6 @@ def test_against_a_brute_force_search_over_the_flights(
     assert expected == len(lit) > 25
 
 
-def test_any_window_and_everything_simulated_give_the_same_rows(tmp_path: Path) -> None:
-    _, whole = simulate(tmp_path)
-    for options in ({"window": 1}, {"window": 4}, {"simulate_everything": True}):
-        _, other = simulate(tmp_path, **options)
-        assert whole["detections"].equals(other["detections"]), options
-
-
 def test_who_comes_in_behind_the_beam_waits_for_the_next_scan() -> None:
     """A sweep of 2 rad in 1 s from 0: by hand."""
     start = np.array([-0.1, 0.5, 0.5, 2.1, 1.9, 2.0, 0.0, 4.0])

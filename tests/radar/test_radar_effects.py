@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from dsa_des.errors import SceneError
@@ -109,83 +108,6 @@ def test_the_reason_is_in_the_scene(scene, rcs_file, changes, sentence):
     assert plan[sentence.split(":")[0]].sentence() == sentence
 
 
-VARIANTS = [
-    {},
-    {"swerling": 0},
-    {"swerling": 0, "radar": 'fluctuation = "sampled"'},
-    {"swerling": 2, "radar": 'fluctuation = "sampled"\npulses = 3\nintegration_gain_db = 0'},
-    {"radar": "minimum_range_m = 2000"},
-    {"radar": "minimum_range_m = 0.5"},
-    {"table": 'rcs_table = "rcs.csv"'},
-    {"radar": CELLS},
-    {"radar": CELLS + "beam_sweep = true"},
-    {"radar": 'type = "radar.threshold"\nminimum_range_m = 2000\n' + CELLS},
-]
-
-
-@pytest.mark.parametrize("changes", VARIANTS)
-def test_neither_windows_nor_neutral_effects_change_a_bit(scene, rcs_file, changes):
-    path = scene(**changes, duration_s=3)
-    _, whole = simulate(path)
-    assert radar_rows(whole)
-    for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):
-        assert same(whole, simulate(path, **options)[1]), options
-
-
-def test_the_range_boundary_is_blind_and_sweeps_too(scene):
-    path = scene("minimum_range_m = 3900\nbeam_sweep = true\n")
-    swap = ["radar=radar.range_boundary"]
-    _, whole = simulate(path, swap=swap)
-    rows = radar_rows(whole)
-    assert rows and min(row["true_range_m"] for row in rows) >= 3900
-    assert all(0 <= row["illuminated_s"] - row["time_s"] <= 0.2 for row in rows)
-    for options in ({"window": 1}, {"simulate_everything": True}):
-        assert same(whole, simulate(path, swap=swap, **options)[1])
-
-
-def test_no_echo_in_the_blind_range_and_the_same_one_beyond(scene):
-    """The minimum range takes detections away and touches no other."""
-    _, whole = simulate(scene())
-    _, blind = simulate(scene("minimum_range_m = 3500"))
-    near = [row for row in radar_rows(whole) if row["true_range_m"] < 3500]
-    assert near
-    assert radar_rows(blind) == [row for row in radar_rows(whole) if row not in near]
-
-
-def test_false_alarms_are_binomial_and_have_no_target(scene):
-    """Pfa x cells by scan, within 4 sigma over a run; nothing true; others' draws unmoved."""
-    simulation, tables = simulate(scene(CELLS, duration_s=120))
-    _, without = simulate(scene(duration_s=120))
-    rows = radar_rows(tables)
-    false = [row for row in rows if row["target"] is None]
-    own = {"snr_db", "confidence", "detection_probability"}  # of what crossed the threshold
-
-    def others(row):
-        return {name: value for name, value in row.items() if name not in own}
-
-    of_targets = [others(row) for row in rows if row["target"] is not None]
-    assert of_targets == [others(row) for row in radar_rows(without)]
-    cells = 220 * 40 * math.ceil((15000 - simulation.components["radar"].budget.nearest_m) / 76.2)
-    scans = 120 * 5
-    mean = cells * 2e-6
-    counts = np.zeros(scans)
-    np.add.at(counts, [row["scan"] for row in false], 1)
-    assert abs(counts.mean() - mean) < 4 * math.sqrt(mean / scans)
-    assert counts.var() == pytest.approx(mean, rel=0.25)
-    true_columns = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
-    assert all(row[name] is None for row in false for name in true_columns)
-    assert all(row["declared"] and row["detection_probability"] is None for row in rows)
-    # On the grid of the radar, all over its field of view, and above the threshold of noise.
-    degrees = np.degrees([row["azimuth_rad"] for row in false])
-    np.testing.assert_allclose(degrees, np.round(degrees), atol=1e-9)
-    assert np.abs(degrees).max() <= 110 + 1e-9
-    assert abs(degrees.mean()) < 4 * 127 / math.sqrt(len(false) * 4)
-    assert min(row["snr_db"] for row in false) >= 10 * math.log10(-math.log(2e-6) - 1) - 1e-9
-    # In the order of what was measured in their scan.
-    order = [(row["tick"], row["range_m"], row["azimuth_rad"]) for row in rows]
-    assert order == sorted(order)
-
-
 def test_false_alarms_show_downstream_and_start_no_track(scene):
     _, tables = simulate(scene(CELLS))
     _, without = simulate(scene())
@@ -199,15 +121,6 @@ def test_false_alarms_show_downstream_and_start_no_track(scene):
     rest = [row for row in tables["fused"].to_pylist() if row["target"] is not None]
     assert rest == without["fused"].to_pylist()
     assert tables["tracks"].equals(without["tracks"])
-
-
-@pytest.mark.parametrize("gate", [0, 0.3])
-def test_false_alarms_pass_fusion_in_any_window(scene, gate):
-    path = scene(CELLS, f"[blocks.fusion]\ncoincidence_s = {gate}\n", duration_s=6)
-    _, whole = simulate(path)
-    assert any(row["target"] is None for row in whole["fused"].to_pylist())
-    for window in (1, 7):
-        assert same(whole, simulate(path, window=window)[1])
 
 
 def test_the_summary_counts_false_alarms_apart(scene):
@@ -287,19 +200,3 @@ def test_targets_that_are_not_offered(scene, monkeypatch):
     monkeypatch.setattr(TrafficSource, "offer", lambda self, port: others)
     with pytest.raises(BlockFailure, match="not offered"):
         simulate(path)
-
-
-def test_all_effects_together_in_any_window(scene):
-    """A turned radar over ground, in drizzle, with noise and a sweeping beam."""
-    radar = (
-        CELLS + 'beam_sweep = true\nfluctuation = "sampled"\nminimum_range_m = 500\n'
-        "mount_azimuth_deg = 20\nmount_roll_deg = 5\n"
-    )
-    world = "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 0.2\ngas = true\n"
-    path = scene(radar, world, duration_s=6)
-    _, whole = simulate(path)
-    rows = radar_rows(whole)
-    assert {row["target"] for row in rows} >= {"a", None}
-    assert all(0 <= row["illuminated_s"] - row["time_s"] <= 0.2 for row in rows)
-    for options in ({"window": 1}, {"window": 7}, {"shuffle_ties": 3}):
-        assert same(whole, simulate(path, **options)[1]), options

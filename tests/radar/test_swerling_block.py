@@ -4,20 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.messages.targets import RelativeTargets
 from components.radar.detection import detection_probability
-from components.radar.rcs import scan_rcs
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
 from components.sensor.look import Cells
 from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 
@@ -92,24 +87,6 @@ def test_sampled_fluctuation_detects_with_the_models_probability(model, pulses):
     assert seen.var() == pytest.approx(spread * snr[0] ** 2, rel=0.08, abs=1e-20)
 
 
-def test_one_draw_per_scan_or_one_per_pulse():
-    """Issue: one keyed draw per scan for I and III, per pulse for II and IV."""
-    asked = []
-
-    def draw(number):
-        asked.append(number)
-        return np.array([0.25, 0.75])
-
-    mean = np.array([1.0, 2.0])
-    for model, numbers in (("swerling1", [0]), ("swerling3", [0]), ("swerling2", [0, 1, 2])):
-        asked.clear()
-        scan_rcs(mean, draw, pulses=3, model=model)
-        assert asked == numbers
-    assert scan_rcs(mean, draw, pulses=3, model="swerling5").tolist() == [1.0, 2.0]
-    same = scan_rcs(mean, draw, pulses=1, model="swerling2")
-    np.testing.assert_array_equal(same, scan_rcs(mean, draw, pulses=1, model="swerling1"))
-
-
 def test_mixed_models_draw_as_if_each_target_were_alone():
     crafts = [Aircraft(swerling=model) for model in (4, 1, 0, 2, 3, 1)]
     radar = make(fluctuation="sampled", pulses=3)
@@ -162,56 +139,6 @@ def test_rcs_follows_the_aspect(attitude, dbsm, what, rcs_file):
         np.testing.assert_allclose(snr[:, 0], snr[:, 1], rtol=1e-12)
         np.testing.assert_array_equal(snr[:, 0], snr[:, 2])
     assert Aircraft(rcs_table=rcs_file).rcs_table.table is crafts[0].rcs_table.table
-
-
-def test_gram_charlier_where_it_holds():
-    cells = cells_of([Aircraft(swerling=1)], 200, range_m=np.linspace(2e3, 14e3, 200)[:, None])
-    exact = make(fluctuation="sampled", pulses=5).look(cells)
-    series = make(fluctuation="sampled", pulses=5, detection="gram_charlier").look(cells)
-    name = "detection_probability"
-    assert 0.0 < np.max(np.abs(series.extras[name] - exact.extras[name])) < 0.01
-    table = make(fluctuation="sampled", pulses=5, detection="table").look(cells)
-    assert 0.0 < np.max(np.abs(table.extras[name] - exact.extras[name])) < 1e-6
-    assert make(swerling=5, detection="gram_charlier").look(cells).detected.any()
-    for changes in ({}, {"swerling": 1}):
-        with pytest.raises(ValidationError, match=r"gram_charlier.*steady targets only"):
-            make(detection="gram_charlier", **changes)
-    for method in ("shnidman", "albersheim"):
-        with pytest.raises(ValidationError, match="detection"):
-            make(detection=method)
-
-
-def tables_of(path, window):
-    memory = MemorySink()
-    Simulation(load_scene(path), window=window, recorder=Recorder([memory])).run()
-    return memory.tables()
-
-
-def test_windows_do_not_change_a_bit(configs, tmp_path, rcs_file):
-    path = tmp_path / "scene.toml"
-    path.write_text(
-        f'extends = "{configs / "first_light.toml"}"\n'
-        "duration_s = 20\n"
-        "[blocks.radar]\n"
-        'fluctuation = "sampled"\npulses = 3\nintegration_gain_db = 0\n'
-        "[[blocks.traffic.intruders]]\n"
-        'name = "a"\nrcs_table = "rcs.csv"\nswerling = 4\n'
-        "east_m = 100\nnorth_m = 9000\nheading_deg = 170\nspeed_mps = 60\n"
-        "[[blocks.traffic.intruders]]\n"
-        'name = "b"\nrcs_table = "rcs.csv"\nswerling = 1\n'
-        "east_m = -2000\nnorth_m = 7000\nheading_deg = 100\nspeed_mps = 90\n"
-        '[[blocks.traffic.intruders]]\nname = "c"\nswerling = 2\n'
-        "east_m = 0\nnorth_m = 9000\nheading_deg = 180\nspeed_mps = 60\n",
-        encoding="utf-8",
-    )
-    one, many = tables_of(path, 1), tables_of(path, None)
-    assert one.keys() == many.keys()
-    for name, table in one.items():
-        assert table.equals(many[name]), name
-    radar = [row for row in one["detections"].to_pylist() if row["block"] == "radar"]
-    assert {row["target"] for row in radar} == {"a", "b", "c"}
-    # A relative path is taken from the scene's folder, and the resolved scene names the file.
-    assert str(rcs_file) in str(load_scene(path).resolved())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.results.ratio import paired_ratio
+from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
 from dsa_des.results.summary import compare_axis, summarise
@@ -49,6 +49,34 @@ def test_a_ratio_by_hand_with_both_intervals() -> None:
     (drawn,) = summarise(rows, [ratio(weight="w")], 0.95, "bootstrap", {})
     assert (drawn.estimate.low, drawn.estimate.high) == line.other.interval
     assert drawn.other is not None and drawn.other.interval == line.ratio.interval
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("families", [1, 3])
+def test_a_ratio_knows_no_unit_of_weight_no_order_and_no_other_class(
+    method: str, families: int
+) -> None:
+    random = np.random.default_rng(6)
+    n, m = ((random.random(1500) < chance).astype(float) for chance in (0.5, 0.4))
+    w, family = random.uniform(0.5, 1.5, 1500), np.arange(1500) // families
+    kind = np.array(["a", "bb", "c"])[random.integers(0, 3, 1500)]
+
+    def near(found: PairedRatio, wanted: PairedRatio) -> bool:
+        sides = [[v for v in vars(r).values() if not isinstance(v, str)] for r in (found, wanted)]
+        return np.allclose(*map(np.hstack, sides), rtol=1e-9, equal_nan=True)
+
+    def of(rows: np.ndarray, unit: float = 1.0) -> PairedRatio:
+        return paired_ratio(
+            n[rows], m[rows], unit * w[rows], cluster=family[rows], method=method, resamples=50
+        )
+
+    every = np.arange(1500)
+    assert not of(every).few
+    assert near(of(every, 1e3), of(every)) and near(of(every, 1e-3), of(every))
+    assert near(of(random.permutation(1500)), of(every))
+    classes = ratios_by_class(n, m, w, kind, family, method=method, resamples=50)
+    assert list(classes) == ["a", "bb", "c"]
+    assert all(near(classes[name], of(np.flatnonzero(kind == name))) for name in classes)
 
 
 def test_a_share_ends_at_one_and_a_ratio_does_not() -> None:

@@ -31,3 +31,10 @@ def test_one_problem_says_what_is_wrong_with_it(given: str, said: str) -> None:
     assert [str(problem).partition("blocks.tracker.")[2] for problem in caught.value.problems] == [
         said
     ]
+
+
+def test_an_empty_name_is_refused_in_our_words() -> None:
+    with pytest.raises(dsa_des.SceneError) as caught:
+        dsa_des.load_scene("first_light", sets=["blocks.traffic.intruders[0].name=''"])
+    (problem,) = caught.value.problems
+    assert str(problem).endswith("blocks.traffic.intruders[0].name = '': must not be empty")

@@ -107,6 +107,27 @@ def test_keys_of_manoeuvres_that_are_not_made_are_warned_of(kind, keys, key, tmp
     assert line.startswith(f"blocks.avoidance: {key}")
 
 
+@pytest.mark.parametrize(
+    ("key", "still_works", "in_vain", "because"),
+    [
+        ("offset_s", 9.9, 10, "it never scans in 10 s"),
+        ("latency_s", 9.9, 10, "nothing it sends arrives in 10 s"),
+        ("jitter_s", 0.15, 0.16, "scans keep within 0.45 of the time between them, 0.45 s"),
+    ],
+)
+def test_times_that_leave_nothing_to_do_or_are_cut_are_warned_of(
+    key, still_works, in_vain, because
+):
+    def noted(value):
+        table = sensor("radar.range_boundary", scan_rate_hz=1, **{key: value})
+        scene = dsa_des.load_scene({**chain({"s": table}), "duration_s": 10})
+        return [line for line in notes_of_scene(Simulation(scene)) if key in line]
+
+    assert noted(still_works) == []
+    (line,) = noted(in_vain)
+    assert line.startswith(f"blocks.s: {key} is {in_vain:g}: {because}")
+
+
 def test_keys_that_have_an_effect_are_not_warned_of():
     assert told(radar(**STATED, quantised=False, azimuth_bias_deg=1.0, biases="fixed")) == []
     assert told(weather={"wind_mps": 5.0, "wind_from_deg": 90.0}) == []

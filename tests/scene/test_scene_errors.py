@@ -50,6 +50,10 @@ def only(lab, blocks=CHAIN, wires=WIRES, **load):
             "Pulse; scan_rate_hz = true",
             'blocks.a.scan_rate_hz = True: must be a number or a text such as "30000/1001"',
         ),
+        (
+            "Pulse; scan_rate_hz = 2020-01-01",
+            'blocks.a.scan_rate_hz = 2020-01-01: must be a number or a text such as "30000/1001"',
+        ),
         ("Pulse; scan_rate_hz = nan", "blocks.a.scan_rate_hz = nan: must be finite"),
         ("Pulse; scan_rate_hz = 5; gain = 'big'", "blocks.a.gain = 'big': must be a number"),
         ("Pulse; scan_rate_hz = 5; gain = '5'", "blocks.a.gain = '5': must be a number"),
@@ -157,12 +161,12 @@ def test_a_block(lab, block, text):
         (
             {"a": PULSE, "b": "Relay"},
             ['{from = "a", to = "b", delay = "soon"}'],
-            'wires[0] = \'soon\': delay must read "1 scan" or "N scans"',
+            'wires[0].delay = \'soon\': must read "1 scan" or "N scans"',
         ),
         (
             {"a": PULSE, "b": "Relay"},
             ['{from = "a", to = "b", delay_s = -1}'],
-            "wires[0] = -1: delay_s must be 0 or greater",
+            "wires[0].delay_s = -1: must be 0 or greater",
         ),
         (
             {**CHAIN, "x": PULSE},

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, RANGING, SENSORS, covers
 from looks import COLUMNS, ERRORS, RANGE_ERRORS, errors_of, mean_is, quantities
+from same_runs import tables_of
 from wired import run
+
+import dsa_des
 
 CASES = [(kind, quantity) for kind in SENSORS for quantity in quantities(kind)]
 #: Statistics of each test, for the bounds of all of its cases together.
@@ -42,7 +45,8 @@ def kind(request):
 
 @pytest.fixture(scope="module")
 def detections(kind):
-    found = looks.by_block(run(looks.scene(kind))["detections"])
+    only = {"looks": False, "truth": False}
+    found = looks.by_block(run(looks.scene(kind, record=only))["detections"])
     assert all(len(columns["scan"]) == 100_000 for columns in found.values())
     return found
 
@@ -148,3 +152,27 @@ def test_a_radar_s_errors_follow_the_published_relations(detections, kind):
         sigma = np.sqrt(columns[COLUMNS[quantity][2]])
         expected = width / np.sqrt(2.0 * snr)
         np.testing.assert_allclose(sigma[strong], expected[strong], rtol=1e-9)
+
+
+SLOW = [
+    "blocks.eo.errors=stated", "blocks.eo.azimuth_error_deg=0.3",
+    "blocks.eo.azimuth_correlation_time_s=2", "blocks.eo.quantised=false",
+    "blocks.eo.noise_equivalent_contrast=0",
+]  # fmt: skip
+
+
+def test_scan_rates_share_what_lasts():
+    """Twice as many scans: at the instants that both have, an error that lasts is the same."""
+    found = []
+    for rate in (2, 4):
+        sets = [*SLOW, f"blocks.eo.scan_rate_hz={rate}"]
+        seen = dsa_des.load_scene("first_light", sets=sets, duration_s=100)
+        table = tables_of(seen)[1]["detections"]
+        column = {n: table[n].to_numpy(zero_copy_only=False) for n in table.column_names}
+        mine = (column["block"] == "eo") & (column["target"] == "head_on")
+        off = column["azimuth_rad"][mine] - column["true_azimuth_rad"][mine]
+        found.append(dict(zip(column["tick"][mine].tolist(), off.tolist(), strict=True)))
+    slow, fast = found
+    common = sorted(slow.keys() & fast.keys())
+    assert len(common) == len(slow) > 10
+    np.testing.assert_array_equal([slow[t] for t in common], [fast[t] for t in common])

@@ -10,7 +10,6 @@ from wired import chain, noise_crosses, sensor
 import dsa_des
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 
 PFA, PER_FRAME = 2e-4, 0.03
@@ -69,25 +68,3 @@ def test_alarms_come_as_often_as_their_probability_says(looks, kind):
     assert np.sum((seen - expected)[kept] ** 2 / expected[kept]) < chi2.ppf(0.99, 3)
     # One scan knows nothing of the one before.
     assert abs(np.corrcoef(found[1:], found[:-1])[0, 1]) < 2.58 / np.sqrt(len(found))
-
-
-def test_windows_and_replicas_in_lock_step_change_none():
-    scene = chain(noisy(100), targets=FAR, duration_s=2)
-
-    def load(seed):
-        return dsa_des.load_scene({**scene, "seed": seed})
-
-    alone = {
-        seed: recorded(lambda seed=seed, **options: Simulation(load(seed), **options))["detections"]
-        for seed in (1, 2)
-    }
-    assert alone[1].num_rows > 60 and not alone[1].equals(alone[2])
-    for window in (1, 70):
-        other = recorded(lambda **options: Simulation(load(1), **options), window=window)
-        assert other["detections"].equals(alone[1])
-    memory = MemorySink()
-    lock_step([load(1), load(2)], recorder=Recorder([memory])).run()
-    together = memory.tables()["detections"]
-    for number, seed in enumerate((1, 2)):
-        mine = together.filter(np.asarray(together["replica"]) == number).drop_columns("replica")
-        assert mine.to_pylist() == alone[seed].to_pylist()

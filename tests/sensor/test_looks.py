@@ -1,7 +1,5 @@
 """The table ``looks``: what was looked at and not detected stands there too."""
 
-import math
-
 import crooked
 import numpy as np
 import pytest
@@ -92,16 +90,19 @@ def test_a_curve_of_pd_from_a_folder_lies_within_the_bounds_of_the_model():
     assert curve[0] > 0.9 and curve[-1] < 0.3 and curve == sorted(curve, reverse=True)
 
 
-@pytest.mark.parametrize("options", [{"window": 1}, {"window": 5}, {"simulate_everything": True}])
-def test_looks_do_not_depend_on_windows_or_on_what_is_culled(options):
-    far = {**crooked.DIVING, "name": "far", "east_m": 90_000.0}
-    sensors = {"radar": {**FADING, "scan_rate_hz": 4, "range_km": 8}, "eye": SEES_ALL}
-    del sensors["eye"]
-    scene = chain(sensors, targets=[crooked.DIVING, far], duration_s=2, record=ON)
-    plain, other = tables(scene), tables(scene, **options)
-    assert plain["looks"] == other["looks"]
-    assert [row["evaluated"] for row in plain["looks"].to_pylist()[:2]] == [True, False]
-    assert math.isfinite(plain["looks"]["true_range_m"][0].as_py())
+@pytest.mark.parametrize("kind", ["radar.swerling", "radar.threshold"])
+def test_a_look_at_what_gives_no_echo_has_no_snr_and_no_chance(kind):
+    """Closer than the minimum range; of an SNR of 0 dB, or of noise, it would have had some."""
+    radar = {**FADING, "type": kind, "scan_rate_hz": 2, "minimum_range_m": 3500.0}
+    radar["false_alarm_probability"] = 0.3
+    scene = chain({"radar": radar}, targets=away(1)["blocks"]["traffic"]["intruders"],
+                  duration_s=4, record=ON)  # fmt: skip
+    near = [row for row in tables(scene)["looks"].to_pylist() if row["true_range_m"] < 3500.0]
+    far = [row for row in tables(scene)["looks"].to_pylist() if row["true_range_m"] > 3500.0]
+    assert len(near) >= 2 and all(row["evaluated"] and not row["detected"] for row in near)
+    assert {(row["snr_db"], row["confidence"]) for row in near} == {(None, None)}
+    assert {row["detection_probability"] or 0.0 for row in near} == {0.0}
+    assert far and all(row["snr_db"] is not None for row in far)
 
 
 def test_a_value_of_neither_kind_is_one_problem():

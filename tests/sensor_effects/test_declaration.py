@@ -31,27 +31,3 @@ def test_ragged_looks_agree_with_counting_by_hand(looks, n, data):
         assert declared[target == who].tolist() == by_hand(mine.tolist(), m, n)
         padded = np.concatenate((np.zeros(n - 1, dtype=bool), mine))
         assert memory[who].tolist() == padded[len(padded) - (n - 1) :].tolist()
-
-
-def test_scans_of_every_target_in_windows_of_any_size():
-    seen = np.random.Generator(np.random.PCG64(4)).random((50, 7)) < 0.4
-    target = np.tile(np.arange(7), (50, 1))
-    whole, after = declare_looks(target.ravel(), seen.ravel(), 3, 5, no_looks_yet(5, 7))
-    assert whole.reshape(50, 7)[:, 2].tolist() == by_hand(seen[:, 2].tolist(), 3, 5)
-    for size in (1, 3, 50):
-        memory, parts = no_looks_yet(5, 7), []
-        for start in range(0, 50, size):
-            some = slice(start, start + size)
-            part, memory = declare_looks(target[some].ravel(), seen[some].ravel(), 3, 5, memory)
-            parts.append(part)
-        np.testing.assert_array_equal(np.concatenate(parts), whole)
-        np.testing.assert_array_equal(memory, after)
-
-
-def test_one_of_one_is_the_detection_itself():
-    seen = np.array([True, False, False, True])
-    declared, memory = declare_looks(np.array([0, 1, 0, 1]), seen, 1, 1, no_looks_yet(1, 2))
-    np.testing.assert_array_equal(declared, seen)
-    assert memory.shape == (2, 0)
-    nobody = np.empty(0, dtype=np.int64)
-    assert len(declare_looks(nobody, seen[:0], 2, 3, no_looks_yet(3, 0))[0]) == 0

@@ -8,7 +8,6 @@ import pyarrow.compute as pc
 import pytest
 
 import dsa_des
-from components.surveillance.reception import fitted
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -139,29 +138,6 @@ def test_stated_variances_are_those_of_the_errors(scene):
         # Of a normal error's square the variance is 2; a Laplacian's, in the elevation, 5.
         spread = (5.0 if quantity == "elevation" else 2.0) / len(ratios)
         assert abs(np.mean(ratios) - 1.0) < NormalDist().inv_cdf(0.9995) * sqrt(spread), quantity
-
-
-def test_shares_received_are_those_of_the_law(scene):
-    """Every position message comes through or not, by itself."""
-    east = 300_000
-    loaded = scene(kea="ads_b = {}", east=east, duration_s="600", sets=[
-        "blocks.ether.scan_rate_hz=10", "blocks.traffic.intruders[0].speed_mps=0",
-        "blocks.traffic.ownship.speed_mps=0",
-    ])  # fmt: skip
-    seen = reports(recorded(loaded), "kea")
-    share = len(np.unique(column(seen, "reported_s"))) / 1200.0
-    p = float(fitted(column(seen, "true_range_m")[:1])[0])
-    assert abs(share - p) < NormalDist().inv_cdf(0.9995) * sqrt(p * (1.0 - p) / 1200.0)
-
-
-def test_the_tracker_follows_and_two_runs_are_the_same(scene):
-    loaded = scene(kea="ads_b = { nacp = 9 }", moa="ads_b = { nacp = 10 }")
-    tables = recorded(loaded)
-    tracks = tables["state_tracks"]
-    assert len(set(tracks["track"].to_pylist())) == 2
-    for options in ({"window": 1}, {"window": 7}, {}):
-        again = recorded(loaded, **options)
-        assert all(again[name].equals(table) for name, table in tables.items())
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,38 @@ def test_tiles_side_by_side_are_one_raster():
         mosaic([tiles[0], ElevationRaster(-42.1, 179.0, 0.25, 0.25, whole[:, :5], "off")])
 
 
+@pytest.mark.parametrize("refraction", ["none", "four_thirds"])
+def test_a_plain_hides_what_a_sea_of_its_height_hides(refraction):
+    """Rays that graze it by metres, over up to 300 km, between nodes a degree apart."""
+    plain = ElevationRaster(-42.0, 178.0, 1.0, 1.0, np.full((5, 5), 500.0), "plain")
+    rng = np.random.default_rng(11)
+    own, other = rng.uniform((-41, 178), (-39, 182), (2, 500, 2)).transpose(0, 2, 1)
+    level = [(*place, np.full(500, 500.0)) for place in (own, other)]
+    sag = rays_between(*level, refraction).sag_m
+    tilt = rng.uniform(-0.4, 0.4, 500) * sag
+    lift = 500.0 + sag + rng.uniform(-6.0, 6.0, 500) + tilt**2 / (4.0 * sag)
+    ends = (*own, lift - tilt), (*other, lift + tilt)
+    low = rays_between(*ends, refraction).lowest_height_m()
+    known = np.abs(low - 500.0) > miss_bound_m(plain) + 0.001
+    hidden = behind_terrain(*ends, plain, refraction=refraction)
+    assert (hidden == behind_the_limb(*ends, surface_m=500.0, refraction=refraction))[known].all()
+    assert 100 < hidden.sum() < 400
+
+
+def test_a_bent_ray_leaves_as_steeply_as_it_is_seen():
+    own = np.full(80, -33.0), np.full(80, 18.0), np.full(80, 200.0)
+    elevation, range_m = np.linspace(-0.05, 1.5, 80), np.geomspace(2e3, 8e4, 80)
+    level = range_m * np.cos(elevation)
+    ecef = pymap3d.enu2ecef(0.6 * level, 0.8 * level, range_m * np.sin(elevation), *own)
+    other = tuple(map(np.asarray, pymap3d.ecef2geodetic(*ecef)))
+    rises = [
+        (rays_between(own, other, kind).points(np.full(80, 1e-3))[2] - 200.0) / (1e-3 * range_m)
+        for kind in ("none", "four_thirds")
+    ]
+    wanted = np.sin(bent_elevation_rad(elevation, range_m)) - np.sin(elevation)
+    np.testing.assert_allclose(rises[1] - rises[0], wanted, rtol=0.03, atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("name", "heights", "says"),
     [

@@ -1,25 +1,35 @@
 """Trackers record the same bytes whatever the window, the company and the names of targets."""
 
 import pyarrow as pa
-import pyarrow.compute as pc
 import pytest
+from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
+from wired import chain, noise_crosses, sensor
 
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.running.simulation import Simulation
+import dsa_des
 from dsa_des.scene.scene import load_scene
 
-KINDS = {
-    "ekf": ["tracker=tracking.ekf"],
-    "nearest": ["tracker=tracking.ekf", "blocks.tracker.association='nearest'"],
-    "ukf": ["tracker=tracking.ukf"],
-    "imm": ["tracker=tracking.imm", "blocks.tracker.models=['velocity','turn','acceleration']"],
+#: Trackers of the same detections. Those of a sweeping radar come early, of cameras late.
+TRACKERS = {
+    "ekf": {"type": "tracking.ekf"},
+    "nearest": {"type": "tracking.ekf", "association": "nearest", "late": "drop"},
+    "rerun": {"type": "tracking.ekf", "late": "rerun", "lag_s": 0.4},
+    "ukf": {"type": "tracking.ukf"},
+    "imm": {"type": "tracking.imm", "models": ["velocity", "turn", "acceleration"]},
     # Detections fall beside the gates of tracks that company would have gone through again.
-    "jpda": ["tracker=tracking.imm", "blocks.tracker.association='jpda'",
-             "navigation.attitude_noise_deg=[0.3,0.3,0.3]"],
+    "jpda": {"type": "tracking.imm", "association": "jpda"},
+}
+CLOSE = {"range_km": 5.0, "elevation_deg": [-30, 20]}
+GRID = {"azimuth_resolution_deg": 1.0, "elevation_resolution_deg": 1.0, "range_resolution_m": 30.0}
+SENSORS = {
+    "radar": sensor("radar.swerling", **CLOSE, **GRID, swerling=1, power_w=1e3, scan_rate_hz=4,
+                    beam_sweep=True, measures_range_rate=True, range_rate_resolution_m_s=2.0,
+                    **noise_crosses("radar.swerling", 1e-6)),
+    "eo": sensor("optical.eo", scan_rate_hz=10, latency_s=0.31, azimuth_pixels=3600,
+                 elevation_pixels=1800, threshold=1.0, false_alarms_per_frame=0.3),
+    "ir": sensor("optical.ir", scan_rate_hz=7, latency_s=0.117, azimuth_pixels=3600,
+                 elevation_pixels=1800),
 }  # fmt: skip
+ALONE = {"radar_tracker": "radar", "eo_tracker": "eo"}
 NEARER = [
     "blocks.traffic.intruders.0.north_m=4000", "blocks.traffic.intruders.1.north_m=3500",
     "blocks.traffic.intruders.1.east_m=3000", "blocks.radar.false_alarms=true",
@@ -29,46 +39,56 @@ NEARER = [
 ]  # fmt: skip
 
 
-def scene_with(kind, *sets, fusion="fusion.pass_through", duration_s="4"):
-    swap, *more = KINDS[kind]
-    swaps = [swap, f"fusion={fusion}"]
+@pytest.fixture(scope="module")
+def every_tracker():
+    """All of them behind one fusion, and those of two sensors whose tracks are fused again."""
+    scene = chain(SENSORS, fusion={"type": "fusion.pass_through"}, duration_s=1.5,
+                  navigation={"attitude_noise_deg": [0.3, 0.3, 0.3]})  # fmt: skip
+    scene["blocks"] |= TRACKERS
+    scene["wires"] += [f"fusion -> {name}" for name in TRACKERS]
+    for tracker, of in ALONE.items():
+        scene["blocks"][tracker] = {"type": "tracking.ekf"}
+        scene["blocks"][f"{of}_looks"] = {"type": "fusion.pass_through"}
+        scene["wires"].append(f"{of} -> {of}_looks -> {tracker} -> fused")
+    scene["blocks"]["fused"] = {"type": "fusion.covariance_intersection"}
+    return dsa_des.load_scene(scene)
+
+
+def test_windows_change_no_byte(every_tracker):
+    found = same_in_any_window(every_tracker)["state_tracks"].to_pylist()
+    confirmed = {row["block"] for row in found if row["track_status"] == "confirmed"}
+    assert confirmed == {*TRACKERS, *ALONE, "fused"}
+    sources = " ".join(row["contributors"] for row in found if row["block"] == "fused")
+    assert "radar" in sources and "eo" in sources
+
+
+def test_company_changes_no_byte(every_tracker):
+    same_as_alone(replicas_of(every_tracker, {}, {}), window=40)
+
+
+def test_boxes_about_gates_change_no_byte(every_tracker, monkeypatch):
+    known = tracks_of(every_tracker)
+    monkeypatch.setattr("components.tracking.gating._FEW_PAIRS", 0)
+    assert tracks_of(every_tracker).equals(known)
+
+
+def tracks_of(scene):
+    return tables_of(scene)[1]["state_tracks"]
+
+
+def near(*sets, duration_s="4"):
     return load_scene(
-        "configs/first_light.toml", swaps=swaps, sets=[*NEARER, *more, *sets],
-        duration_s=duration_s,
+        "configs/first_light.toml", swaps=["tracker=tracking.ekf", "fusion=fusion.pass_through"],
+        sets=[*NEARER, *sets], duration_s=duration_s,
     )  # fmt: skip
-
-
-def tracks_of(simulation_type, scene, **options):
-    sink = MemorySink()
-    simulation_type(scene, recorder=Recorder([sink]), **options).run()
-    return sink.tables()["state_tracks"].combine_chunks()
-
-
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_windows_and_company_change_no_byte(kind):
-    scene = scene_with(kind, duration_s="3")
-    alone = tracks_of(Simulation, scene)
-    assert {"confirmed"} <= set(alone["track_status"].to_pylist())
-    for window in (1, 7) if kind == "ekf" else (1,):
-        assert tracks_of(Simulation, scene, window=window).equals(alone), window
-    scenes = [
-        scene_of(scene, Replica(scene.seed + i, {})) for i in range(3 if kind == "ekf" else 2)
-    ]
-    each = [alone, *(tracks_of(Simulation, one) for one in scenes[1:])]
-    for window in (None, 40) if kind == "ekf" else (40,):
-        together = tracks_of(lock_step, scenes, window=window)
-        for number, expected in enumerate(each):
-            mine = together.filter(pc.equal(together["replica"], number))
-            mine = mine.drop_columns(["replica"]).combine_chunks()
-            assert mine.equals(expected), number
 
 
 def test_tracks_know_nothing_of_the_roster(monkeypatch):
     """Targets are renumbered, and all that is true is replaced, before the tracker sees it."""
     from components.tracking.filters import ExtendedKalman
 
-    scene = scene_with("ekf")
-    known = tracks_of(Simulation, scene)
+    scene = near()
+    known = tracks_of(scene)
     original = ExtendedKalman.run
 
     def blind(self, wake):
@@ -78,7 +98,7 @@ def test_tracks_know_nothing_of_the_roster(monkeypatch):
         return original(self, wake)
 
     monkeypatch.setattr(ExtendedKalman, "run", blind)
-    assert tracks_of(Simulation, scene).equals(known)
+    assert tracks_of(scene).equals(known)
 
 
 def _relabelled(fused):
@@ -97,8 +117,5 @@ def test_what_the_old_name_builds_is_the_same_block():
         load_scene("configs/first_light.toml", swaps=[f"tracker={name}"], duration_s="3")
         for name in ("tracking.stub", "tracking.hold_last")
     ]
-    sinks = [MemorySink() for _ in scenes]
-    for scene, sink in zip(scenes, sinks, strict=True):
-        Simulation(scene, recorder=Recorder([sink])).run()
-    assert isinstance(sinks[0].tables()["tracks"], pa.Table)
-    assert sinks[0].tables()["tracks"].equals(sinks[1].tables()["tracks"])
+    old, new = (tables_of(scene)[1]["tracks"] for scene in scenes)
+    assert isinstance(old, pa.Table) and old.equals(new)

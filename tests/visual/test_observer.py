@@ -2,9 +2,7 @@
 
 import math
 
-import crooked
 import numpy as np
-import pyarrow.compute as pc
 import pytest
 from covering import covers
 from wired import chain, rows, run
@@ -258,25 +256,6 @@ def tables_of(scene, runner=Simulation, **options):
     sink = MemorySink()
     runner(scene, recorder=Recorder([sink]), **options).run()
     return sink.tables()
-
-
-@pytest.mark.parametrize("search", ["random", "round"])
-def test_windows_and_company_change_no_byte(search):
-    pilot = {"search": search, "right_looking": 0.5, "looking": "spells", "latency_s": 0.4,
-             "azimuth_deg": [-180, 180], "elevation_deg": [-90, 90],
-             "round_s": 20.0, "scan_rate_hz": 3}  # fmt: skip
-    one = dsa_des.load_scene(chain({"eyes": {"type": "visual.acquisition", **pilot}}, duration_s=9,
-                           targets=crooked.TARGETS))  # fmt: skip
-    alone = tables_of(one)["detections"].combine_chunks()
-    for window in (1, 7):
-        assert tables_of(one, window=window)["detections"].combine_chunks().equals(alone)
-    scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(4)]
-    each = [alone, *(tables_of(s)["detections"].combine_chunks() for s in scenes[1:])]
-    assert sum(table.num_rows for table in each) > 20
-    together = tables_of(scenes, lock_step)["detections"]
-    for number, expected in enumerate(each):
-        mine = together.filter(pc.equal(together["replica"], number)).drop_columns(["replica"])
-        assert mine.combine_chunks().equals(expected)
 
 
 def test_who_is_seen_stays_seen_and_darkness_hides_all():

@@ -195,12 +195,14 @@ class Crossing:
     threshold: float
 
     @classmethod
+    @lru_cache(maxsize=256)
     def of(cls, pulses: int, false_alarm_probability: float) -> Crossing:
         """Return that of a threshold which noise crosses so often."""
         threshold = float(detection_threshold(pulses, false_alarm_probability))
         return cls(pulses, false_alarm_probability, threshold)
 
     @classmethod
+    @lru_cache(maxsize=256)
     def at(cls, pulses: int, snr_db: float) -> Crossing:
         """Return that of a threshold on the SNR of a pulse, as the output over noise less 1."""
         from scipy.special import gammaincc

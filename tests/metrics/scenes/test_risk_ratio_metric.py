@@ -3,12 +3,14 @@
 import math
 
 import crooked
+import numpy as np
 import pytest
 from covering import covers
 from test_mitigated_metric import SIZES, scene
 from wired import measured
 
 import dsa_des
+from components.encounters.risk_metric import side_of
 
 KIND = ("[metric risk_ratio]",)
 NMAC, LOSS = "nmac_risk_ratio", "well_clear_lost_risk_ratio"
@@ -73,6 +75,23 @@ def test_classes_are_those_of_the_flights(bearing_deg, course_deg, kind, side, t
     mine = {n for n, v in found.items() if n.startswith(LOSS) and not math.isnan(v)}
     assert mine == {LOSS, f"{LOSS}.{kind.replace(' ', '_')}", f"{LOSS}.{side}"}
     assert "encounter_geometry" not in found
+
+
+def test_sides_are_quarters_about_the_ownship_s_course():
+    edges = np.array([45.0, 135.0, 225.0, 315.0])
+    sides = ["ahead", "right", "behind", "left"]
+    for turn in (-360.0, 0.0, 360.0):
+        assert side_of(edges + turn - 0.1).tolist() == sides
+        assert side_of(edges + turn + 0.1).tolist() == [*sides[1:], "ahead"]
+
+
+def test_who_meets_nobody_is_of_no_class(tmp_path):
+    alone = scene()
+    alone["blocks"]["traffic"]["intruders"][0]["start_time_s"] = 1e3
+    metric = {"metric": "risk_ratio", "by": ["geometry", "bearing"]}
+    found = dsa_des.study(alone, metrics=[metric], replicas=1, workers=1, out=tmp_path / "out")
+    (row,) = found.runs.to_pylist()
+    assert row["encounter_geometry"] is row["encounter_bearing"] is None
 
 
 @covers("needless", of=KIND)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.special import chndtr, roots_genlaguerre
 
-from components.radar.detection import detection_probability
-from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
@@ -44,8 +42,6 @@ speed_mps = 60
 GROUND = "[terrain]\nheight_m = 60\nclutter_gamma_db = -20\n"
 NARROW = "azimuth_beamwidth_deg = 1\nelevation_beamwidth_deg = 1\n"
 NO_BEAM = 'remove = ["azimuth_beamwidth_deg", "elevation_beamwidth_deg"]\n'
-#: Clutter counts as signal: the threshold stays at the noise.
-STAYS = 'clutter_threshold = "noise"\n'
 
 
 @pytest.fixture
@@ -81,14 +77,9 @@ def radar_rows(tables, target):
 
 
 @pytest.mark.parametrize("swerling", [0, 1, 3])
-@pytest.mark.parametrize("mean", ["constant", "fluctuating"])
-@pytest.mark.parametrize(("radar", "rises"), [("", True), (STAYS, False)])
-def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling, radar, rises):
-    """Shnidman's treatment (thesis §5.3.2) at the CNR of the radar equation, detection by one.
-
-    A threshold that rises with the clutter sees the powers of all that much smaller.
-    """
-    path = scene(GROUND + f'clutter_mean = "{mean}"\n', radar=radar, swerling=swerling)
+def test_pd_is_that_of_an_echo_within_clutter_that_is_constant(scene, swerling):
+    """A threshold that rises with the clutter sees the powers of all that much smaller."""
+    path = scene(GROUND + 'clutter_mean = "constant"\n', swerling=swerling)
     simulation, tables = simulate(path)
     rows = radar_rows(tables, "low")
     assert len(rows) > 40
@@ -107,20 +98,10 @@ def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling, radar,
     cnr = simulation.components["radar"].budget.snr(ranges, clutter)
     assert cnr.max() > 0.3
     snr = 10.0 ** (np.array([row["snr_db"] for row in rows]) / 10.0)
-    stays = {"false_alarm_probability": 0.05, "model": f"swerling{swerling}"}
-    if rises and mean == "fluctuating":
-        expected = detection_probability(snr / (1.0 + cnr), **stays)
-    elif rises:
-        powers = [snr / (1.0 + cnr), cnr / (1.0 + cnr)]
-        expected = averaged_over_the_echoes(*powers, 1.0 / (1.0 + cnr), swerling)
-    else:
-        expected = clutter_detection_probability(snr, cnr, **stays, clutter=mean)
+    powers = [snr / (1.0 + cnr), cnr / (1.0 + cnr)]
+    expected = averaged_over_the_echoes(*powers, 1.0 / (1.0 + cnr), swerling)
     found = np.array([row["detection_probability"] for row in rows])
-    np.testing.assert_allclose(found, expected, rtol=1e-4 if rises else 1e-8)
-    clear = detection_probability(snr, false_alarm_probability=0.05, model=f"swerling{swerling}")
-    assert np.max(np.abs(found - clear)) > 1e-5
-    if rises:
-        assert np.all(found <= clear + 1e-12)
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
 def averaged_over_the_echoes(target, clutter, noise, swerling):
@@ -158,20 +139,6 @@ def test_clutter_hides_a_low_target_from_a_threshold_radar(scene):
         first.append(max(seen, default=0.0))
         assert radar_rows(tables, "level")
     assert first[0] > first[1] > first[2]
-
-
-@pytest.mark.parametrize("swap", [[], ["radar=radar.threshold"]])
-@pytest.mark.parametrize("terrain", ["", GROUND])
-def test_neither_windows_nor_neutral_effects_change_a_bit(scene, terrain, swap):
-    path = scene(terrain)
-    path.write_text(path.read_text().replace("duration_s = 20", "duration_s = 4"))
-    _, whole = simulate(path, swap)
-    assert radar_rows(whole, "level")
-    for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):
-        _, other = simulate(path, swap, **options)
-        # Scans and looks say what was evaluated, which is what is saved.
-        same = [name for name in whole if name not in ("scans", "looks")]
-        assert all(whole[name].equals(other[name]) for name in same), options
 
 
 def test_the_reason_is_in_the_scene(scene):

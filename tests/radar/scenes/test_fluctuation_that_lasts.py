@@ -11,14 +11,12 @@ from scipy.special import gammaincc
 from scipy.stats import gamma, kstest, ncx2, norm
 from wired import HEARS_ALL, chain, decided, run
 
-import dsa_des
 from components.radar.detection import detection_probability
 from components.radar.rcs import Scatterers, fading_power
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.time.randomness import Stream, target_keys
 
@@ -114,29 +112,6 @@ def test_a_faster_radar_sees_the_same_fades_at_the_same_instants():
     assert fast[::5] == pytest.approx(slow, rel=1e-9, nan_ok=True)
     late = power(scan_rate_hz=2, fluctuation_correlation_s=3.0, offset_s=0.3)
     assert fast[3::5] == pytest.approx(late, rel=1e-9, nan_ok=True)
-
-
-@pytest.mark.parametrize("lasts", [
-    {"fluctuation_correlation_s": 0.7, "scintillation_extent_m": 5.0, "beam_sweep": True},
-    {"fluctuation_correlation_s": 0.7},
-    {"scintillation_extent_m": 5.0},
-])  # fmt: skip
-def test_windows_and_replicas_together_change_nothing(lasts):
-    keys = {"power_w": 3.5, "swerling": 3, **lasts}
-    whole = looks(5, 2, table="detections", **keys)
-    assert 20 < len(whole) < 100
-    for window in (1, 7):
-        assert looks(5, 2, window=window, table="detections", **keys).equals(whole)
-    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=2)
-    scenes = [load_scene(scene, seed=seed) for seed in (20, 21, 22)]
-    sink = MemorySink()
-    together = lock_step(scenes, recorder=Recorder([sink]))
-    together.run()
-    assert not together.timeline.split  # one radar serves all replicas
-    for number, alone in enumerate(scenes):
-        expected = dsa_des.run(alone).tables["detections"].to_pylist()
-        mine = [row for row in sink.tables()["detections"].to_pylist() if row["replica"] == number]
-        assert [{k: row[k] for k in expected[0]} for row in mine] == expected != []
 
 
 def test_a_beam_that_sweeps_meets_the_fade_of_its_own_instant():

@@ -12,12 +12,7 @@ import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from wired import HEARS_ALL, chain, decided, noise_crosses, rows, run, sensor
 
-import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.running.simulation import Simulation
 
 FREQUENCY_HZ, PRF_HZ = 10e9, 6000.0
 WAVELENGTH_M = 299_792_458.0 / FREQUENCY_HZ
@@ -264,33 +259,6 @@ def test_a_blind_speed_hides_a_target_that_comes_straight_on(radar, multiple):
         there = [t for t in np.arange(0, 6.0, 0.25) if 1500.0 < 2500.0 + rate * t < 3500.0]
         assert len(there) >= 2
         assert (len(early) > 0.5 * len(there)) is seen, (share, early)
-
-
-@pytest.mark.parametrize("radar", RADARS)
-def test_neither_windows_nor_lock_step_change_a_bit(radar):
-    table = sensor(
-        radar, **{**CELL, **POWER[radar], "scan_rate_hz": 5, "frequency_hz": FREQUENCY_HZ,
-                  "prf_hz": PRF_HZ, "moving_target_filter": "filter_bank"},
-    )  # fmt: skip
-    terrain = {"height_m": GROUND_M, "clutter_gamma_db": -25.0}
-    scene = chain({"radar": table}, terrain=terrain, duration_s=4)
-
-    def recorded(simulate, **options):
-        memory = MemorySink()
-        simulate(recorder=Recorder([memory]), **options).run()
-        return memory.tables()["detections"]
-
-    def load(seed):
-        return dsa_des.load_scene({**scene, "seed": seed})
-
-    whole = {s: recorded(lambda s=s, **o: Simulation(load(s), **o)) for s in (1, 2)}
-    assert whole[1].num_rows > 3
-    other = recorded(lambda **o: Simulation(load(1), **o), window=1)
-    assert other.equals(whole[1])
-    together = recorded(lambda **o: lock_step([load(1), load(2)], **o))
-    for number, seed in enumerate((1, 2)):
-        mine = together.filter(np.asarray(together["replica"]) == number).drop_columns("replica")
-        assert mine.to_pylist() == whole[seed].to_pylist()
 
 
 @covers("range_rate_folds", of=RADARS)

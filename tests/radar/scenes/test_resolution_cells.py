@@ -14,8 +14,6 @@ from wired import alone, chain, decided, noise_crosses, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
@@ -63,16 +61,6 @@ def test_two_targets_in_one_cell_are_one_report_of_the_stronger(kind):
         power = sum(10.0 ** (0.1 * each[name]["snr_db"]) for name in ("diving", "faint"))
         assert row["snr_db"] == pytest.approx(10.0 * math.log10(power), abs=1e-9)
     assert 2 < together < len(apart) - 2
-
-
-@pytest.mark.parametrize("kind", RADARS)
-def test_windows_do_not_matter(kind):
-    radar = sensor(kind, scan_rate_hz=5, resolution_cells=True, **CELL)
-    scene = chain({"radar": radar}, targets=TARGETS, duration_s=3)
-    whole = run(scene).tables["detections"]
-    memory = MemorySink()
-    Simulation(dsa_des.load_scene(scene), recorder=Recorder([memory]), window=1).run()
-    assert memory.tables()["detections"].equals(whole)
 
 
 @pytest.mark.parametrize("merged", [False, True])

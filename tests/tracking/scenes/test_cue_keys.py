@@ -6,6 +6,7 @@ import crooked
 import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS, covers
+from same_runs import replicas_of, same_as_alone, same_in_any_window
 from wired import chain, rows, run, sensor
 
 import dsa_des
@@ -242,59 +243,17 @@ def problems_of_loop(scene):
     return problems(scene)
 
 
-def test_a_loop_is_the_same_whatever_its_windows():
-    """The sensor that is cued feeds the tracker that cues it."""
-    from dsa_des.record.recording import Recorder
-    from dsa_des.record.sinks import MemorySink
-    from dsa_des.running.simulation import Simulation
-
-    scene = cued(
-        "radar.swerling",
-        cued_dwell_factor=3.0,
-        power_w=1e3,
-        azimuth_resolution_deg=0.5,
-        elevation_resolution_deg=0.5,
-        range_resolution_m=20.0,
-    )
-    scene["wires"].append("sensor -> fusion")
-    loaded = dsa_des.load_scene(scene)
-    tables = []
-    for options in ({}, {"window": 1}, {"window": 40}):
-        sink = MemorySink()
-        Simulation(loaded, recorder=Recorder([sink]), **options).run()
-        tables.append(sink.tables())
-    for other in tables[1:]:
-        for name in ("detections", "state_tracks", "cues"):
-            assert other[name].combine_chunks().equals(tables[0][name].combine_chunks()), name
-
-
 @pytest.mark.parametrize("late", ["drop", "one_step"])
-def test_replicas_of_a_loop_are_the_same_together_as_alone(late):
-    """Looks of the spotter come late, so that the tracker has to remember those of the other."""
-    import pyarrow.compute as pc
+def test_a_loop_is_the_same_whatever_its_windows_and_company(late):
+    """The sensor that is cued feeds the tracker that cues it.
 
-    from dsa_des.record.recording import Recorder
-    from dsa_des.record.sinks import MemorySink
-    from dsa_des.replicas.changed_scene import Replica, scene_of
-    from dsa_des.replicas.lockstep import lock_step
-    from dsa_des.running.simulation import Simulation
-
+    Looks of the spotter come late, so that the tracker has to remember those of the other.
+    """
     grid = {"azimuth_resolution_deg": 0.5, "elevation_resolution_deg": 0.5,
             "range_resolution_m": 20.0}  # fmt: skip
     scene = cued("radar.swerling", cued_dwell_factor=3.0, power_w=1e3, **grid,
                  spotter={"latency_s": 0.9}, tracker={"late": late})  # fmt: skip
     scene["wires"].append("sensor -> fusion")
     loaded = dsa_des.load_scene(scene)
-    scenes = [scene_of(loaded, Replica(loaded.seed + i, {})) for i in range(2)]
-
-    def tables(kind, what):
-        sink = MemorySink()
-        kind(what, recorder=Recorder([sink])).run()
-        return {name: table.combine_chunks() for name, table in sink.tables().items()}
-
-    together = tables(lock_step, scenes)
-    for number, one in enumerate(scenes):
-        alone = tables(Simulation, one)
-        for name in ("detections", "state_tracks", "cues"):
-            mine = together[name].filter(pc.equal(together[name]["replica"], number))
-            assert mine.drop_columns(["replica"]).combine_chunks().equals(alone[name]), name
+    same_in_any_window(loaded, (1, 40))
+    same_as_alone(replicas_of(loaded, {}, {}))

@@ -9,10 +9,6 @@ from covering import covers
 from wired import HEARS_ALL, chain, rows, run
 
 import dsa_des
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 
 TRACKERS = ("tracking.ekf", "tracking.ukf", "tracking.imm")
@@ -101,31 +97,3 @@ def test_only_rates_of_who_may_tell_them_are_used():
     first, second = rows(run(given), "state_tracks")
     assert first["north_m_s"] == first["east_m_s"] == first["down_m_s"] == 0.0
     assert second["north_m_s"] != 0.0
-
-
-def table(simulation_type, scene, **options):
-    sink = MemorySink()
-    simulation_type(scene, recorder=Recorder([sink]), **options).run()
-    return sink.tables()["state_tracks"].combine_chunks()
-
-
-@pytest.mark.parametrize("sweep", [False, True])
-def test_no_byte_changes_by_window_or_company(sweep):
-    radar = {
-        "type": "radar.swerling", "swerling": 1, "scan_rate_hz": 2, "power_w": 1e5,
-        "antenna_gain_db": 30.0, "frequency_hz": 35e9, "bandwidth_hz": 1e6,
-        "false_alarm_probability": 1e-7, "range_km": 6.0, "beam_sweep": sweep, "false_alarms": True,
-        "azimuth_resolution_deg": 1.0,
-        "elevation_resolution_deg": 1.0, "range_resolution_m": 30.0,
-        "measures_range_rate": True, "range_rate_resolution_m_s": 2.0,
-    }  # fmt: skip
-    one = dsa_des.load_scene(scene(radar=radar, duration_s=4))
-    alone = table(Simulation, one)
-    assert alone.num_rows > 4
-    assert table(Simulation, one, window=1).equals(alone)
-    scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(2)]
-    together = table(lock_step, scenes)
-    for number, single in enumerate(scenes):
-        mine = together.filter(np.equal(together["replica"].to_numpy(), number))
-        mine = mine.drop_columns(["replica"]).combine_chunks()
-        assert mine.equals(table(Simulation, single))

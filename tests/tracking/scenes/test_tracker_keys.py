@@ -286,8 +286,8 @@ def test_what_cannot_be_is_refused(keys, said):
 
 
 @pytest.mark.parametrize("kind", TRACKERS)
-def test_who_follows_is_one_track_on_both_sides_of_astern(kind):
-    """Azimuths near 180 deg, of one sign and of the other, are of one place."""
+def test_who_follows_is_one_track_on_both_sides_of_astern(kind, monkeypatch):
+    """Azimuths near 180 deg, of one sign and of the other, are of one place: with boxes, too."""
     level = {"heading_deg": 217.0, "speed_mps": 70.0}
     own = {"lat_deg": -41.3, "lon_deg": 170.0, "alt_m": 2400.0, **level}
     astern = math.radians(37.0)
@@ -303,6 +303,8 @@ def test_who_follows_is_one_track_on_both_sides_of_astern(kind):
     found = run(scene)
     assert {math.copysign(1, row["azimuth_rad"]) for row in rows(found)} == {-1.0, 1.0}
     told = rows(found, "state_tracks")
+    monkeypatch.setattr("components.tracking.gating._FEW_PAIRS", 0)
+    assert rows(run(scene), "state_tracks") == told
     assert {row["track"] for row in told} == {1}
     assert {row["track_status"] for row in told} == {"tentative", "confirmed"}
 

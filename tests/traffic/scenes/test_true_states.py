@@ -6,6 +6,7 @@ import crooked
 import numpy as np
 import pytest
 from covering import covers
+from same_runs import replicas_of, same_as_alone, same_in_any_window
 from wired import HEARS_ALL, SEES_ALL, chain, rows, run
 
 import dsa_des
@@ -121,9 +122,8 @@ def test_targets_that_no_sensor_looks_at_are_there_as_well():
     assert names.count("leaving") == 3  # from 0 to 0.5 s
 
 
-@pytest.mark.parametrize("window", [1, 3])
-def test_the_truth_does_not_depend_on_the_window(window):
-    assert tables(far_scene(), window=window)["truth"] == tables(far_scene())["truth"]
+def test_the_truth_does_not_depend_on_the_window():
+    same_in_any_window(dsa_des.load_scene(far_scene()), (1, 3))
 
 
 def test_a_velocity_where_a_flight_begins_or_ends_is_that_of_its_own_side():
@@ -135,21 +135,8 @@ def test_a_velocity_where_a_flight_begins_or_ends_is_that_of_its_own_side():
 @pytest.mark.parametrize("key", ["blocks.radar.scan_rate_hz", "blocks.traffic.intruders[0].up_m"])
 def test_replicas_in_lock_step_have_the_truth_of_each(key):
     """Of shared traffic and of one for each replica."""
-    from dsa_des.replicas.changed_scene import Replica, scene_of
-    from dsa_des.replicas.lockstep import lock_step
-
-    loaded = dsa_des.load_scene(far_scene())
     values = (4.0, 5.0) if "radar" in key else (-510.0, -400.0)
-    scenes = [scene_of(loaded, Replica(5 + i, {key: v})) for i, v in enumerate(values)]
-    sink = MemorySink()
-    lock_step(scenes, recorder=Recorder([sink])).run()
-    together = sink.tables()["truth"].to_pylist()
-    for number, scene in enumerate(scenes):
-        alone = MemorySink()
-        Simulation(scene, recorder=Recorder([alone])).run()
-        own = [{k: v for k, v in row.items() if k != "replica"} for row in together
-               if row["replica"] == number]  # fmt: skip
-        assert own == alone.tables()["truth"].to_pylist()
+    same_as_alone(replicas_of(dsa_des.load_scene(far_scene()), *({key: v} for v in values)))
 
 
 def test_a_steered_ownship_is_where_it_was_steered():
