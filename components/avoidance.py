@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.guidance.daidalus import ConfParameters, changes_out, smaller
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
@@ -18,8 +19,8 @@ _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
 # 2 m/s² and a quarter of gravity.
 _TURN_RATE_RAD_S = math.radians(3.0)
-_VERTICAL_RATE_MPS = 500.0 * 0.3048 / 60.0
-_ACCELERATION_MPS2, _VERTICAL_ACCELERATION_MPS2 = 2.0, 0.25 * 9.80665
+_VERTICAL_RATE_MPS = 500.0 * FOOT_M / 60.0
+_ACCELERATION_MPS2, _VERTICAL_ACCELERATION_MPS2 = 2.0, 0.25 * STANDARD_GRAVITY_M_S2
 
 
 class TurnOutParameters(ConfParameters):
@@ -202,9 +203,9 @@ class TurnAway(Component):
             near |= np.isnan(tracks.range_m)
         row = tracks.row_of_entries
         manoeuvres: dict[int, Manoeuvre] = {}
-        for index in np.unique(row[near]).tolist():
-            tick = int(wake.ticks[index])
-            run = int(wake.run[index])
+        rows = np.flatnonzero(np.bincount(row[near]))
+        instants = wake.ticks[rows].tolist(), wake.run[rows].tolist()
+        for index, tick, run in zip(rows.tolist(), *instants, strict=True):
             if tick < self._free_from.get(run, 0):
                 continue
             entries = np.flatnonzero(near & (row == index))

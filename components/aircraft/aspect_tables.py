@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.arguments.units import FOOT_M
 from components.geometry import past
 from dsa_des.block.parameters import refuse_extremes
 from dsa_des.files.input_files import InputFileError, read_input_text
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9
-_SQUARE_FOOT_M2 = 0.3048**2
+_SQUARE_FOOT_M2 = FOOT_M**2
 
 # Column names for the area, and what one unit of them is in square metres.
 AREA_COLUMNS = {

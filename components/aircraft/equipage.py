@@ -12,15 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
+from components.arguments.units import NAUTICAL_MILE_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.time.randomness import target_keys
 
-_NMI_M = 1852.0
 #: 95 % radius of the horizontal position error by navigation accuracy category, NACp 1 to 11, m
 #: (RTCA DO-260B, table 2-71); of the velocity error by NACv 1 to 4, m/s (table 2-22).
 POSITION_RADIUS_M = np.array(
-    [np.nan, *(_NMI_M * nmi for nmi in (10.0, 4.0, 2.0, 1.0, 0.5, 0.3, 0.1, 0.05)), 30.0, 10.0, 3.0]
+    [
+        np.nan,
+        *(NAUTICAL_MILE_M * nmi for nmi in (10.0, 4.0, 2.0, 1.0, 0.5, 0.3, 0.1, 0.05)),
+        30.0,
+        10.0,
+        3.0,
+    ]
 )
 VELOCITY_RADIUS_M_S = np.array([np.nan, 10.0, 3.0, 1.0, 0.3])
 #: Standard deviations of each of two axes in the 95 % radius of both, 2.448.

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from components.alert_configuration.configuration import REGIONS
+from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.formats.text_rows import (
     ANGLE_DEG,
     LENGTH_M,
@@ -17,8 +18,6 @@ from components.formats.text_rows import (
 from dsa_des.errors import nearest
 from dsa_des.text.safe_text import shortened
 
-GRAVITY_MPS2 = 9.80665
-
 #: Units by kind of value, each with its factor to SI units (radians for angles).
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": TIME_S,
@@ -26,7 +25,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "speed": SPEED_MPS,
     "angle": {unit: math.radians(factor) for unit, factor in ANGLE_DEG.items()},
     "turn rate": {"deg/s": math.radians(1.0), "rad/s": 1.0},
-    "acceleration": {"m/s^2": 1.0, "g": GRAVITY_MPS2, "ft/s^2": 0.3048},
+    "acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_M_S2, "ft/s^2": FOOT_M},
 }
 
 #: Kind, default and its unit of each key.

@@ -9,7 +9,8 @@ from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_tables import BandsOverTime, bands_over_time
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
-from components.well_clear.volume import NAUTICAL_MILE_M, Volume
+from components.arguments.units import NAUTICAL_MILE_M
+from components.well_clear.volume import Volume
 from dsa_des.record.drawing import drawing, figure_text, tight
 
 #: Colour of each level from 0; levels beyond the last share its colour.

@@ -1,4 +1,7 @@
-"""What pictures of a run have in common: a plane, and where what was measured lies on the Earth."""
+"""What pictures of a run have in common: a plane, and where what was recorded lies on the Earth.
+
+The page of a run, globes, ASTERIX and the traffic display ask here.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,8 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from components.display.recorded_run import POSE, RecordedTables
 from components.geometry import body_to_ned, enu_to_geodetic, line_of_sight_ned
+from components.messages.columns import ORIGIN, POSITION
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.errors import UsageError
+
+#: A measured line of sight, in body axes.
+LINE = ("azimuth_rad", "elevation_rad", "range_m")
 
 
 @dataclass(frozen=True)
@@ -30,7 +39,7 @@ class TangentPlane:
         return east, north
 
 
-def offset_positions(ned_m: FloatArray, origin: Sequence[FloatArray]) -> FloatArray:
+def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray]) -> FloatArray:
     """Return latitude, longitude (deg) and altitude (m), (3, n), of offsets from origins alike.
 
     NaN where the offset (3, n) north, east and down is not known.
@@ -47,14 +56,13 @@ def offset_positions(ned_m: FloatArray, origin: Sequence[FloatArray]) -> FloatAr
     return result
 
 
-def sights(
-    azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray, pose: Sequence[Any]
-) -> tuple[FloatArray, FloatArray]:
+def sights(line: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return bearings of measured lines of sight, rad from north, and where they end, (3, n).
 
-    A pose is latitude, longitude (deg), altitude (m), heading, pitch and roll (rad). What is not
-    known is NaN.
+    Lines (3, n) are those of `LINE`, poses (6, n) those of `POSE`, in degrees, metres and radians.
+    What is not known is NaN.
     """
+    azimuth_rad, elevation_rad, range_m = line
     known = np.flatnonzero(np.isfinite(pose[0]) & np.isfinite(azimuth_rad))
     ranged = known[np.isfinite(range_m[known])]
 
@@ -69,3 +77,48 @@ def sights(
 
     north, east, _ = ned(known, 1.0)
     return np.arctan2(east, north), offset_positions(ned(ranged, range_m[ranged]), pose[:3])
+
+
+def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+    """Return rows of ``state_tracks`` whose states have a range, and where they are.
+
+    Latitude, longitude (deg) and height above the ellipsoid (m), (3, n), at ``state_s``.
+    """
+    if "state_tracks" not in run.tables:
+        return np.empty(0, dtype=np.int64), np.empty((3, 0))
+    ned_m = run.stacked("state_tracks", POSITION)
+    rows = np.flatnonzero(np.isfinite(ned_m).all(axis=0))
+    return rows, offset_positions(ned_m[:, rows], run.stacked("state_tracks", ORIGIN, rows))
+
+
+def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+    """Return rows of ``tracks`` with a range, one for each measurement held, and where it was.
+
+    Places are as in `estimated_positions`, at ``measured_s``.
+    """
+    nothing = np.empty(0, dtype=np.int64), np.empty((3, 0))
+    if "tracks" not in run.tables:
+        return nothing
+    lines = run.stacked("tracks", LINE)
+    measured_s = run.numbers("tracks", "measured_s")
+    names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
+    measured: dict[tuple[str, str], float] = {}
+    kept = []
+    for row in np.flatnonzero(np.isfinite(lines).all(axis=0)).tolist():
+        key = blocks[row] or "", names[row] or ""
+        if measured.get(key) != measured_s[row]:
+            measured[key] = float(measured_s[row])
+            kept.append(row)
+    if not kept:
+        return nothing
+    rows = np.array(kept)
+    if run.has("tracks", POSE[0]):  # as believed, where that is recorded
+        pose: FloatArray | None = run.stacked("tracks", POSE, rows)
+    else:
+        pose = run.true_poses(measured_s[rows])
+    if pose is None:
+        raise UsageError(
+            f"{run.folder}: truth.parquet does not say where the ownship was when tracks were "
+            "measured: record it with truth = true under [record]"
+        )
+    return rows, sights(run.stacked("tracks", LINE, rows), pose)[1]

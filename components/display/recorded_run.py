@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray
+from components.messages.columns import POSE as POSE_COLUMNS
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import UsageError
 from dsa_des.record.run_folder import Run, with_columns_of_rows
 from dsa_des.scene.examples import find_example
@@ -20,6 +21,8 @@ _STATE = (
     "velocity_down_m_s", "heading_rad", "pitch_rad", "roll_rad",
 )  # fmt: skip
 OWNSHIP = "ownship"
+#: What a pose is made of, as recorded with what was measured.
+POSE = tuple(POSE_COLUMNS)
 # Greater than any position, speed or time of a run.
 _LARGEST = 1e10
 
@@ -86,6 +89,16 @@ class RecordedTables:
                 result[name] = {key: values[mine][first] for key, values in columns.items()}
         return result
 
+    def true_poses(self, time_s: FloatArray) -> FloatArray | None:
+        """Return the ownship's true poses (6, n); None where one of the instants has none."""
+        own = self.flights().get(OWNSHIP)
+        if own is None:
+            return None
+        at = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
+        if (own["time_s"][at] != time_s).any():
+            return None
+        return np.stack([own[name.removeprefix("own_")][at] for name in POSE])
+
     def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
         """Refuse what is no number, or greater than any of a run, by name and row."""
         for name, values in columns.items():
@@ -104,6 +117,12 @@ class RecordedTables:
             return np.asarray(column, dtype=np.float64)
         except (TypeError, ValueError):
             raise UsageError(f"{self.folder}: {table}.parquet: {name} holds no numbers") from None
+
+    def stacked(
+        self, table: str, names: Iterable[str], rows: IntArray | slice = slice(None)
+    ) -> FloatArray:
+        """Return columns of numbers of some rows, (columns, rows)."""
+        return np.stack([self.numbers(table, name)[rows] for name in names])
 
     def texts(self, table: str, name: str) -> list[str | None]:
         """Return a column of texts, as `numbers` does one of numbers."""

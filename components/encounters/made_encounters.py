@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, KNOT_M_S
 from components.encounters.sampling import EncounterDraws
 from components.flights.closest_geometry import SENSES, Approach, flown, in_plane, intruder_heading
 from components.formats.encounter_set import (
@@ -23,15 +24,13 @@ from components.formats.encounter_set import (
     geometry_class,
 )
 from components.formats.set_file import EncounterSetError, is_origin
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, read_input_text, read_once, resolve_home
 from dsa_des.files.toml_files import parse_toml
 
-_KT = 1852.0 / 3600.0
-_LENGTH, _SPEED = {"m": 1.0, "ft": FOOT_M}, {"mps": 1.0, "kt": _KT}
+_LENGTH, _SPEED = {"m": 1.0, "ft": FOOT_M}, {"mps": 1.0, "kt": KNOT_M_S}
 _CLIMB, _ANGLE = {"mps": 1.0, "ft_min": FOOT_M / 60.0}, {"deg": math.pi / 180.0}
 _TIME = {"s": 1.0}
 

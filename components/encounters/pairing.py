@@ -23,13 +23,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.encounters.model import EncounterModel
 from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
 from components.encounters.sampling import EncounterDraws, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
 from components.flights.point_mass import fly_euler, summed
 from components.formats.encounter_set import EVENTS, NAMES, EncounterSet, geometry_class
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Pairs that are made together, and attempts of them that are looked at together.

@@ -126,7 +126,7 @@ class Estimator(Protocol):
     ) -> list[Moments]:
         """Return what every model expects to be measured of predicted tracks.
 
-        `told` are the errors of the measurements, of a filter that carries some.
+        `reported` are the errors of the measurements, of a filter that carries some.
         """
         ...
 

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import sights
-from components.display.recorded_run import OWNSHIP, RecordedTables
-from components.export.track_positions import POSE, estimated_positions, held_positions
+from components.display.picture import LINE, estimated_positions, held_positions, sights
+from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
 from components.formats.asterix_records import (
     ADS_B,
     NORTH_MARKER,
@@ -67,14 +66,14 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give a north marker with the position of the radar for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
-    lines = [run.numbers("detections", n) for n in ("azimuth_rad", "elevation_rad", "range_m")]
+    lines = run.stacked("detections", LINE)
     there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_says_where(run))
     names = run.texts("detections", "block")
     radars = {names[row] or "" for row in there.tolist()}
     yield from _scans(run, sic, radars)
     if len(there) == 0:
         return
-    pose = [run.numbers("detections", name)[there] for name in POSE]
+    pose = run.stacked("detections", POSE, there)
     unknown = ~np.isfinite(pose).all(axis=0)
     if unknown.any():
         sensor = names[int(there[np.argmax(unknown)])]
@@ -84,8 +83,8 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
         )
     lit = run.numbers("detections", "illuminated_s")[there]
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
-    azimuth, elevation, far_m = (part[there] for part in lines)
-    bearing, ends = sights(azimuth, elevation, far_m, pose)
+    lines = run.stacked("detections", LINE, there)
+    bearing, ends = sights(lines, pose)
     rate_m_s = run.numbers("detections", "range_rate_m_s")[there]
     for k, row in enumerate(there.tolist()):
         yield AsterixRecord(
@@ -95,7 +94,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
                 "sac": _SAC,
                 "sic": sic[names[row] or ""],
                 "simulated": 1,
-                "range_m": float(far_m[k]),
+                "range_m": float(lines[2, k]),
                 "azimuth_deg": float(np.degrees(bearing[k])),
                 "alt_m": float(ends[2, k]),
                 # What does not fit is left out: a speed that is cut off would be a wrong one.
@@ -106,7 +105,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
 
 def _says_where(run: RecordedTables) -> BoolArray:
     """Return which detections are reports of an aircraft that says where it is."""
-    if "reported_lat_deg" not in run.table("detections").column_names:
+    if not run.has("detections", "reported_lat_deg"):
         return np.zeros(run.tables["detections"].num_rows, dtype=bool)
     return np.isfinite(run.numbers("detections", "reported_lat_deg"))
 
@@ -147,7 +146,7 @@ def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecor
 def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
-    positions = zip(*(run.numbers("scans", name).tolist() for name in POSE[:3]), strict=True)
+    positions = run.stacked("scans", POSE[:3]).T.tolist()
     times = run.numbers("scans", "time_s").tolist()
     for name, time_s, position in zip(run.texts("scans", "block"), times, positions, strict=True):
         if (name or "") in radars:
@@ -173,20 +172,17 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
-    origin = [run.numbers("state_tracks", name)[rows] for name in ORIGIN]
+    origin = run.stacked("state_tracks", ORIGIN, rows)
     # Velocities are along the axes of the frame's origin; the track's own have turned a little.
-    moves = [run.numbers("state_tracks", name)[rows] for name in VELOCITY]
+    moves = run.stacked("state_tracks", VELOCITY, rows)
     east, north, up = local_axes(origin[0], origin[1])
     earth = [
         moves[0] * n + moves[1] * e - moves[2] * u for n, e, u in zip(north, east, up, strict=True)
     ]
     own_axes = local_axes(positions[0], positions[1])
     along: list[Any] = [sum(v * a for v, a in zip(earth, axis, strict=True)) for axis in own_axes]
-    errors = {
-        name: np.sqrt(np.maximum(run.numbers("state_tracks", column)[rows], 0.0))
-        for name, column in _ERRORS.items()
-    }
-    stated = np.asarray(np.isfinite(np.stack(list(errors.values()))).all(axis=0))
+    errors = np.sqrt(np.maximum(run.stacked("state_tracks", _ERRORS.values(), rows), 0.0))
+    stated = np.asarray(np.isfinite(errors).all(axis=0))
     blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
     numbers = run.values("state_tracks", "track")
     state_s = run.numbers("state_tracks", "state_s")
@@ -203,7 +199,7 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
             "velocity_up_m_s": float(along[2][k]),
         }
         if stated[k]:
-            values |= {name: float(error[k]) for name, error in errors.items()}
+            values |= dict(zip(_ERRORS, errors[:, k].tolist(), strict=True))
         yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
 
 

@@ -6,11 +6,10 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from components.display.picture import sights
-from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.display.picture import LINE, estimated_positions, held_positions, sights
+from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
 from components.export.alert_levels import Alert, alerts_of
-from components.export.track_positions import POSE, estimated_positions, held_positions
 from components.messages.state_tracks import HELD
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark
@@ -137,23 +136,19 @@ def seen_positions(run: RecordedTables) -> Iterator[Seen]:
     """Give the detections that have a range."""
     if "detections" not in run.tables:
         return
-    number: dict[str, FloatArray] = {
-        name: run.numbers("detections", name)
-        for name in ("time_s", "azimuth_rad", "elevation_rad", "range_m", *POSE)
-    }
-    there = np.flatnonzero(~np.isnan(list(number.values())).any(axis=0))
-    run.refuse_large("detections", {n: np.where(np.isnan(v), 0.0, v) for n, v in number.items()})
+    names = ("time_s", *LINE, *POSE)
+    number = run.stacked("detections", names)
+    there = np.flatnonzero(~np.isnan(number).any(axis=0))
+    known = np.where(np.isnan(number), 0.0, number)
+    run.refuse_large("detections", dict(zip(names, known, strict=True)))
     if len(there) == 0:
         return
-    number = {name: values[there] for name, values in number.items()}
-    directions = number["azimuth_rad"], number["elevation_rad"], number["range_m"]
-    _, (lat, lon, alt) = sights(*directions, [number[name] for name in POSE])
+    number = run.stacked("detections", names, there)
+    _, (lat, lon, alt) = sights(number[1:4], number[4:])
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
-    positions = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
-    for row, time_s, position in zip(
-        there.tolist(), number["time_s"].tolist(), positions, strict=True
-    ):
-        yield Seen(sensors[row] or "", targets[row] or "", time_s, position)
+    rows = zip(*(part.tolist() for part in (there, number[0], lon, lat, alt)), strict=True)
+    for row, at_s, *position in rows:
+        yield Seen(sensors[row] or "", targets[row] or "", at_s, tuple(position))
 
 
 def _estimated(run: RecordedTables) -> Iterator[Course]:

@@ -14,7 +14,7 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
-from components.display.recorded_run import OWNSHIP, RecordedTables
+from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
 from components.estimation.frame import pose_in_frame
 from components.geometry import local_axes, north_east_up
 from components.messages.columns import ORIGIN
@@ -35,7 +35,7 @@ _VARIANCES = (
     "range_rate_variance_m2_s2",
 )  # fmt: skip
 _MOVES = ("own_velocity_north_m_s", "own_velocity_east_m_s", "own_velocity_down_m_s")
-_POSE = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
+_PLACE = ("lat_deg", "lon_deg", "alt_m")
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
 
 #: Latitude and longitude (deg) and height above the ellipsoid (m).
@@ -123,7 +123,7 @@ def _detections(run: RecordedTables) -> dict[str, Any]:
     """Return columns of the detections in order of their instants, and what each look is."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         raise UsageError(f"{run.folder}: has no detections")
-    names = [*_MEASURED, *_VARIANCES, *(f"own_{name}" for name in _POSE), "illuminated_s", "time_s"]
+    names = [*_MEASURED, *_VARIANCES, *POSE, "illuminated_s", "time_s"]
     columns: dict[str, Any] = {name: run.numbers("detections", name) for name in names}
     for name in _MOVES:  # runs before sensors measured range rates have none
         known = name in run.table("detections").column_names
@@ -149,25 +149,23 @@ def _poses(
     run: RecordedTables, columns: Mapping[str, Any], flights: Mapping[str, Any]
 ) -> FloatArray:
     """Return the ownship's pose at each detection, (6, n): as believed, or the true one."""
-    pose = np.stack([columns[f"own_{name}"] for name in _POSE])
+    pose = np.stack([columns[name] for name in POSE])
     unknown = np.isnan(pose).any(axis=0)
     if not unknown.any():
         return pose
-    own = flights.get(OWNSHIP)
-    if own is None:
+    if OWNSHIP not in flights:
         raise UsageError(
             f"{run.folder}: its detections have no pose of the ownship and there is no "
             "truth.parquet: record one with fusion = fusion.pass_through or truth = true under "
             "[record]"
         )
-    time_s = columns["time_s"][unknown]
-    row = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
-    if (own["time_s"][row] != time_s).any():
+    true = run.true_poses(columns["time_s"][unknown])
+    if true is None:
         raise UsageError(
             f"{run.folder}: its detections have no pose of the ownship, and truth.parquet has none "
             "at their instants: record them with fusion = fusion.pass_through"
         )
-    pose[:, unknown] = [own[name][row] for name in _POSE]
+    pose[:, unknown] = true
     return pose
 
 
@@ -204,7 +202,7 @@ def _looks(
 
 
 def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> GroundTruthPath:
-    position = [np.ascontiguousarray(flight[key]) for key in _POSE[:3]]
+    position = [np.ascontiguousarray(flight[key]) for key in _PLACE]
     here = [np.full(len(position[0]), value) for value in origin]
     north, east, up = north_east_up(*here, *position)
     states = state_vectors(np.stack([north, east, -up]), _velocity(flight, position, here))
@@ -240,7 +238,7 @@ def _platform(
     when, first = np.unique(time_s, return_index=True)
     velocity = np.full((3, len(when)), np.nan)
     if own is not None:
-        at = [np.ascontiguousarray(own[key]) for key in _POSE[:3]]
+        at = [np.ascontiguousarray(own[key]) for key in _PLACE]
         known = _velocity(own, at, [np.full(len(at[0]), value) for value in origin])
         velocity = np.stack([np.interp(when, own["time_s"], part) for part in known])
     states = state_vectors(position.position_m[:, first], velocity)

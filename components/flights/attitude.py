@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.geometry import Vector, local_axes, radii_of_curvature, wrap_heading_rad
 from dsa_des.arrays.types import FloatArray
-
-STANDARD_GRAVITY_MPS2 = 9.80665
-"""ISO 80000-3 standard acceleration of free fall."""
 
 WINDOW_S = 4.0
 """Whole width of the smoothing window: ±2 s around each sample, and always both neighbours."""
@@ -91,7 +89,7 @@ def attitude_from_path(
     across = across / np.where(moving, speed, 1.0)
     yaw = wrap_heading_rad(_held(np.arctan2(v_east, v_north), moving))
     pitch = np.where(moving, np.arctan2(v_up, np.where(moving, speed, 1.0)), 0.0)
-    roll = np.where(moving, np.arctan2(across, STANDARD_GRAVITY_MPS2), 0.0)
+    roll = np.where(moving, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)
     return yaw, pitch, roll
 
 

@@ -220,14 +220,13 @@ class SteeredCulling:
             known = self._known[1, of, index] == epoch[left]
             position[:, left[known]] = self._position[:, of[known], index[known]]
             left = left[~known]
-            self._move_targets(run[left], epoch[left])
+            if len(left):
+                self._move_targets(run[left], epoch[left])
         return position
 
     def _move_targets(self, run: IntArray, epoch: IntArray) -> None:
         """Learn where targets are from the first epoch of each run on, as many as there is room."""
         of, first = np.unique(run, return_index=True)
-        if not len(of):
-            return
         _, _, room, width = self._position.shape
         number = epoch[first, np.newaxis] + np.arange(room)
         start_s = np.minimum(number * self.epoch_s[of, np.newaxis], self._end_s)

@@ -136,7 +136,7 @@ def geodesic_state(
     """Evaluate straight legs."""
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
     # Flights that all keep their altitude have one row of them for all times.
-    climbed = table[_CLIMB] * (elapsed if table[_CLIMB].any() else elapsed[:1])
+    climbed = table[_CLIMB] * (elapsed if np.count_nonzero(table[_CLIMB]) else elapsed[:1])
     # Ground speed is flown at altitude: over the ellipsoid it is slower by R / (R + h), with h
     # the mean altitude so far. The bound only matters in a dive to the Earth's core.
     below = 0.5 * climbed

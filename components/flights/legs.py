@@ -10,7 +10,7 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 from pydantic import Field, model_validator
 
-from components.flights.attitude import STANDARD_GRAVITY_MPS2
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
 from components.flights.leg_motion import FORMULAS, Kind, Segment, turn_parameters
 from components.geometry import enu_to_geodetic, heading_from_deg
@@ -229,7 +229,7 @@ class LegBuilder:
         if self.speed == 0.0:
             return self._hold(climb, rate, duration)
         table = turn_parameters(*self.position, self.heading, self.speed, climb, rate)
-        bank = math.atan2(self.speed * rate, STANDARD_GRAVITY_MPS2)
+        bank = math.atan2(self.speed * rate, STANDARD_GRAVITY_M_S2)
         return self._add("turn", table, duration, math.atan2(climb, self.speed), bank)
 
     def _to_waypoint(self, point: Waypoint) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.messages.steering import SLOWEST_TURN_DEG_S
 from dsa_des.arrays.types import FloatArray
 
@@ -26,7 +27,7 @@ _MOST_BANK = np.radians(75.0)
 _ROLL_GAIN = 20.0
 _SLOWEST, _FASTEST = 1.7, 1116.0
 
-_G_M_S2 = G_FT_S2 * 0.3048
+_G_M_S2 = G_FT_S2 * FOOT_M
 _STEPS_PER_COMMAND = 10
 #: Less than this is left to chance by no rounding, and is turned at once: 0.2 arc seconds.
 _ALMOST_RAD = 1e-6

@@ -28,6 +28,7 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
+from dsa_des.arrays.column_values import constant
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
@@ -381,15 +382,16 @@ class _Group:
             now = self.formula(self.table, inside)
             # Of flights that keep their altitude one row of them is for all times.
             moving = moving or [
-                np.empty(shape) if len(values) == len(inside) else np.broadcast_to(values, shape)
-                for values in now
+                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
+                for v in now
             ]
             for out, values in zip(moving, now, strict=True):
                 if out.flags.writeable:
                     out[block] = values
             np.logical_and(t >= start_s, t <= end_s, out=present[block])
         lat, lon, alt, yaw = moving or np.empty((4, *shape))
-        fixed_yaw, pitch, roll = np.broadcast_to(self.attitude[:, np.newaxis], (3, *shape))
-        if self.yaw_is_fixed.any():
+        fixed_yaw, *others = self.attitude
+        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
+        if np.count_nonzero(self.yaw_is_fixed):
             yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

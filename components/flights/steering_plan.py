@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.flights.attitude import STANDARD_GRAVITY_MPS2
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
 from components.flights.point_mass import eased_turn
@@ -143,7 +143,7 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     rate_rad_s = manoeuvre.rate_rad_s
     if manoeuvre.bank_rad:
         slowest_mps = max(speed_mps, _SLOWEST_BANKED_MPS)
-        rate_rad_s = STANDARD_GRAVITY_MPS2 * math.tan(manoeuvre.bank_rad) / slowest_mps
+        rate_rad_s = STANDARD_GRAVITY_M_S2 * math.tan(manoeuvre.bank_rad) / slowest_mps
     rate_deg_s = math.copysign(math.degrees(rate_rad_s), manoeuvre.turn_rad)
     angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
     rolling: Pieces = ()
@@ -162,10 +162,10 @@ def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
     -g / (v p) ln cos(p t). The first piece is longer where the turn would hardly show in it.
     """
-    per_rad = speed_mps * roll_rad_s / STANDARD_GRAVITY_MPS2
+    per_rad = speed_mps * roll_rad_s / STANDARD_GRAVITY_M_S2
     if not per_rad:
         return ()
-    full_rad = math.atan(rate_rad_s * speed_mps / STANDARD_GRAVITY_MPS2)
+    full_rad = math.atan(rate_rad_s * speed_mps / STANDARD_GRAVITY_M_S2)
     lasts_s = min(full_rad, math.acos(math.exp(-angle_rad * per_rad))) / roll_rad_s
     ends_s = [lasts_s * k / _ROLL_PIECES for k in range(_ROLL_PIECES + 1)]
     turned_rad = [-math.log(math.cos(roll_rad_s * end_s)) / per_rad for end_s in ends_s]
@@ -225,23 +225,20 @@ def flown_from(
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     flown = []
-    base_s = np.ptp(times_around_s(time_s), axis=1).tolist()
+    chords = _chords(around, time_s) if any(one is None for one in before) else []
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
         position = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
         if earlier is None:
-            north, east = _chord(around, row)
-            along = float(north[1] - north[0]), float(east[1] - east[0])
-            heading_deg = math.degrees(math.atan2(along[1], along[0]))
-            speed_mps = math.hypot(*along) / base_s[row]
-            plan = SteeringPlan(
-                (), (), _own_climb((high - low) / base_s[row], manoeuvre), (), speed_mps
-            )
+            north_m, east_m, base_s = chords[row]
+            heading_deg = math.degrees(math.atan2(east_m, north_m))
+            speed_mps = math.hypot(north_m, east_m) / base_s
+            plan = SteeringPlan((), (), _own_climb((high - low) / base_s, manoeuvre), (), speed_mps)
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
             )
-            rate_rad_s = turned_rad / base_s[row]
+            rate_rad_s = turned_rad / base_s
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             elapsed_s = at_s - earlier.start_time_s
@@ -257,12 +254,16 @@ def flown_from(
     return flown
 
 
-def _chord(around: TrajectoryState, row: int) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of the chord seen from its middle, so that the track is the one there."""
-    positions = around.lat_deg[row], around.lon_deg[row], around.alt_m[row]
-    middle, ends = [part[1:2] for part in positions], [part[[0, 2]] for part in positions]
+def _chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
+    """Return the way from before to after each time, north and east, m, and how long it takes, s.
+
+    Its ends are seen from its middle, so that the track is the one there.
+    """
+    positions = around.lat_deg, around.lon_deg, around.alt_m
+    middle, ends = [part[:, 1:2] for part in positions], [part[:, [0, 2]] for part in positions]
     north, east, _ = line_of_sight_ned(*middle, *ends)
-    return north, east
+    ways = north[:, 1] - north[:, 0], east[:, 1] - east[:, 0]
+    return np.stack([*ways, np.ptp(times_around_s(time_s), axis=1)], axis=-1).tolist()
 
 
 def _turned(turns: Pieces, elapsed_s: float) -> float:

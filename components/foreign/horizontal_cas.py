@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
+from components.arguments.units import FOOT_M
 from components.foreign.nnet_file import Network, read_nnet
 from components.messages.alerts import AlertLevels
 from components.messages.steering import Manoeuvre, Manoeuvres
-from components.well_clear.volume import FOOT_M
 from dsa_des.block.component import Component, Input, Output, Parameters, ScenePath
 from dsa_des.block.wake import Wake
 

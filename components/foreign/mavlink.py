@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, field_validator
 
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
@@ -30,7 +31,7 @@ from dsa_des.block.wake import Wake
 from dsa_des.running.pacing import Pacer
 
 _LONGEST_DATAGRAM = 65_535
-_VERTICAL_ACCELERATION_MPS2 = 0.25 * 9.80665
+_VERTICAL_ACCELERATION_MPS2 = 0.25 * STANDARD_GRAVITY_M_S2
 
 
 class MavlinkParameters(ClockedParameters):

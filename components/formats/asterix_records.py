@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.formats.text_rows import TrafficFileError
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from dsa_des.errors import UsageError
 from dsa_des.errors.extras import library
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.flights.point_mass import DYNAMICS
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 EVENTS, TRACKS = "events", "tracks"

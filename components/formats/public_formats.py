@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.formats.encounter_set import NAMES, TRACKS, EncounterSet
 from components.formats.set_file import EncounterSetError, read_set
 from components.formats.track_files import (
@@ -22,7 +23,6 @@ from components.formats.track_files import (
     read_track_csv,
     read_track_matrices,
 )
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import IntArray
 from dsa_des.errors import UsageError
 from dsa_des.files.input_files import InputFileError, read_input_bytes

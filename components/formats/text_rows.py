@@ -10,13 +10,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.flights.sampled_flight import SampledTrajectory
 from dsa_des.errors import Lines, nearest
 from dsa_des.files.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
 from dsa_des.text.safe_text import shortened
-
-_FOOT_M = 0.3048
-_NAUTICAL_MILE_M = 1852.0
 
 LENGTH_M = {
     "m": 1.0,
@@ -25,11 +23,11 @@ LENGTH_M = {
     "meter": 1.0,
     "meters": 1.0,
     "km": 1000.0,
-    "ft": _FOOT_M,
-    "foot": _FOOT_M,
-    "feet": _FOOT_M,
-    "nmi": _NAUTICAL_MILE_M,
-    "nm": _NAUTICAL_MILE_M,
+    "ft": FOOT_M,
+    "foot": FOOT_M,
+    "feet": FOOT_M,
+    "nmi": NAUTICAL_MILE_M,
+    "nm": NAUTICAL_MILE_M,
 }
 SPEED_MPS = {
     "m/s": 1.0,
@@ -37,17 +35,17 @@ SPEED_MPS = {
     "km/h": 1.0 / 3.6,
     "kph": 1.0 / 3.6,
     "kmh": 1.0 / 3.6,
-    "knot": _NAUTICAL_MILE_M / 3600.0,
-    "knots": _NAUTICAL_MILE_M / 3600.0,
-    "kn": _NAUTICAL_MILE_M / 3600.0,
-    "kt": _NAUTICAL_MILE_M / 3600.0,
-    "kts": _NAUTICAL_MILE_M / 3600.0,
-    "nmi/h": _NAUTICAL_MILE_M / 3600.0,
-    "nmi/s": _NAUTICAL_MILE_M,
-    "fpm": _FOOT_M / 60.0,
-    "ft/min": _FOOT_M / 60.0,
-    "ft/s": _FOOT_M,
-    "fps": _FOOT_M,
+    "knot": NAUTICAL_MILE_M / 3600.0,
+    "knots": NAUTICAL_MILE_M / 3600.0,
+    "kn": NAUTICAL_MILE_M / 3600.0,
+    "kt": NAUTICAL_MILE_M / 3600.0,
+    "kts": NAUTICAL_MILE_M / 3600.0,
+    "nmi/h": NAUTICAL_MILE_M / 3600.0,
+    "nmi/s": NAUTICAL_MILE_M,
+    "fpm": FOOT_M / 60.0,
+    "ft/min": FOOT_M / 60.0,
+    "ft/s": FOOT_M,
+    "fps": FOOT_M,
 }
 ANGLE_DEG = {
     "deg": 1.0,

@@ -21,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.formats.encounter_set import NAMES
 from components.formats.set_file import EncounterSetError
 from components.formats.text_rows import csv_table
 from components.geometry import line_of_sight_ned
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text

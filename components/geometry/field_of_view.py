@@ -1,48 +1,15 @@
 """The field of view of a sensor: a test of directions, and its width."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from components.arguments.checks import common_shape, squarable
-from components.geometry.angles import TWO_PI, wrap_pi_unchecked
-from dsa_des.arrays.types import FloatArray
-
-BoolArray = npt.NDArray[np.bool_]
+from components.geometry.angles import TWO_PI
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 _EPS = float(np.finfo(np.float64).eps)
 # Rounding of two angles near 2 pi, of 2 pi itself and of their sum.
 _WRAP_TOLERANCE_RAD = 8.0 * _EPS
-
-
-def inside(
-    azimuth_rad: npt.ArrayLike,
-    elevation_rad: npt.ArrayLike,
-    *,
-    azimuth_min_rad: float,
-    azimuth_max_rad: float,
-    elevation_min_rad: float,
-    elevation_max_rad: float,
-) -> BoolArray:
-    """Tell which directions lie inside a field of view."""
-    low, high = _azimuth_bounds(azimuth_min_rad, azimuth_max_rad)
-    _require("elevation_min_rad", elevation_min_rad, 0.5 * math.pi, "[-pi/2, pi/2]")
-    _require("elevation_max_rad", elevation_max_rad, 0.5 * math.pi, "[-pi/2, pi/2]")
-    if elevation_min_rad > elevation_max_rad:
-        raise ValueError(
-            f"elevation_min_rad is {elevation_min_rad}: it must not exceed elevation_max_rad, "
-            f"{elevation_max_rad}"
-        )
-    p, q = squarable("azimuth_rad", azimuth_rad), squarable("elevation_rad", elevation_rad)
-    shape = common_shape(azimuth_rad=p, elevation_rad=q)
-    in_elevation = (q >= elevation_min_rad) & (q <= elevation_max_rad)
-    if high - low >= TWO_PI:
-        return np.array(np.broadcast_to(in_elevation, shape))[()]
-    in_azimuth = _in_sector(np.atleast_1d(p), low, high).reshape(p.shape)
-    return np.asarray(in_azimuth & in_elevation)[()]
 
 
 class FieldOfView:
@@ -50,8 +17,9 @@ class FieldOfView:
 
     Parameters
     ----------
-    azimuth_rad, elevation_rad : (min, max)
-        As for `inside`.
+    azimuth_rad : (low, high)
+        Clockwise from low to high, each within two turns; the upper may lie below the lower one.
+    elevation_rad : (low, high)
 
     Raises
     ------
@@ -62,23 +30,29 @@ class FieldOfView:
     def __init__(
         self, azimuth_rad: tuple[float, float], elevation_rad: tuple[float, float]
     ) -> None:
-        inside(
-            0.0, 0.0, azimuth_min_rad=azimuth_rad[0], azimuth_max_rad=azimuth_rad[1],
-            elevation_min_rad=elevation_rad[0], elevation_max_rad=elevation_rad[1],
-        )  # fmt: skip
         self._low, self._high = _azimuth_bounds(*azimuth_rad)
+        for name, elevation in zip(("min", "max"), elevation_rad, strict=True):
+            _require(f"elevation_{name}_rad", elevation, 0.5 * math.pi, "[-pi/2, pi/2]")
         self._lowest, self._highest = elevation_rad
-        self._turns = bool(_turns(self._low, self._high))
+        if self._lowest > self._highest:
+            raise ValueError(
+                f"elevation_min_rad is {self._lowest}: it must not exceed elevation_max_rad, "
+                f"{self._highest}"
+            )
+        self._turns = _turns(self._low, self._high)
 
     def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
-        """Tell which directions lie inside, as `inside` does."""
+        """Tell which directions lie inside; bounds are."""
         result = elevation_rad >= self._lowest
         result &= elevation_rad <= self._highest
         if self._high - self._low < TWO_PI:
             within = azimuth_rad >= self._low
             within &= azimuth_rad <= self._high
             if self._turns:
-                within = _at_other_turns(azimuth_rad, azimuth_rad, self._low, self._high, within)
+                slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth_rad)
+                for shift in self._turns:
+                    turned = azimuth_rad + shift
+                    within |= (turned >= self._low - slack) & (turned <= self._high + slack)
             result &= within
         return result
 
@@ -103,26 +77,6 @@ def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[flo
             f"azimuth_max_rad, {azimuth_max_rad}"
         )
     return low, high
-
-
-def _in_sector(azimuth: FloatArray, low: float, high: float) -> BoolArray:
-    """Compare azimuths with bounds, at every whole turn that the bounds can reach."""
-    p = wrap_pi_unchecked(azimuth)
-    slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
-    slack_here = np.where(p == azimuth, 0.0, slack)
-    result = (p >= low - slack_here) & (p <= high + slack_here)
-    return _at_other_turns(p, azimuth, low, high, result)
-
-
-def _at_other_turns(
-    p: FloatArray, azimuth: FloatArray, low: float, high: float, result: BoolArray
-) -> BoolArray:
-    """Add to the result what lies inside after whole turns; p is the wrapped azimuth."""
-    for shift in _turns(low, high):
-        turned = p + shift
-        slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
-        result |= (turned >= low - slack) & (turned <= high + slack)
-    return result
 
 
 def _turns(low: float, high: float) -> list[float]:

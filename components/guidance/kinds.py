@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
 from components.guidance.intervals import FULL_TURN, limits_of
 from components.guidance.situation import Detector, State, meets
@@ -54,7 +55,7 @@ def _direction_steps(own: State, values: Any) -> Steps:
     speed = np.maximum(np.hypot(own.east_mps, own.north_mps), least)
     rate = np.full((1, 1), float(values["turn_rate"]))
     if values["turn_rate"] == 0.0 and values["bank_angle"] > 0.0:
-        rate = 9.80665 * math.tan(values["bank_angle"]) / speed
+        rate = STANDARD_GRAVITY_M_S2 * math.tan(values["bank_angle"]) / speed
     left, right = (_turns(values[key], step) for key in ("left_hdir", "right_hdir"))
     number = np.arange(-left, right + 1)
     track = np.arctan2(own.east_mps, own.north_mps)

@@ -145,9 +145,9 @@ def _draw(
     from matplotlib.colors import LogNorm
     from matplotlib.lines import Line2D
 
-    from dsa_des.record.drawing import drawing
+    from dsa_des.record.drawing import RED, drawing
 
-    styles: list[Any] = list(zip(contours, ("#FFFFFF", "#D55E00"), ("--", "-"), strict=True))
+    styles: list[Any] = list(zip(contours, ("#FFFFFF", RED), ("--", "-"), strict=True))
     # A column for each model, and one for the bar of shades.
     width_in = 1.4 + 2.0 * len(maps)
     left, pitch = 0.56 / width_in, 2.0 / width_in

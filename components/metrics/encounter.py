@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.arguments.units import FOOT_M
 from components.metrics.censored import END, START, in_scan, said
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.flown_flights import FlownMetric, each_alone
@@ -23,7 +24,7 @@ from components.metrics.rows import (
     sensors_of,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
-from components.well_clear.volume import FOOT_M, PRESETS, Volume
+from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.arguments.units import FOOT_M
 from components.metrics.encounter import STEP, SizeParameters, size
 from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.scene.scene import Scene

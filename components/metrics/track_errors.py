@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import held
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
@@ -20,8 +21,6 @@ from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
 
-#: A nautical mile, m.
-MILE_M = 1852.0
 _TABLE = "state_tracks"
 _ERRORS = {
     "error_across_m": "horizontal error of the position across the line of sight, m",
@@ -114,9 +113,9 @@ class ErrorsByRange(Metric):
         seen = coverage.holds(target, time_s) & there
         error, of_rows, first_m = self._errors(columns, rows, own, target)
         if math.isfinite(first_m):
-            values["first_track_range_nmi"] = first_m / MILE_M
+            values["first_track_range_nmi"] = first_m / NAUTICAL_MILE_M
         for r in self.p.ranges_nmi:
-            k = _nearest(range_m, r * MILE_M, seen)
+            k = _nearest(range_m, r * NAUTICAL_MILE_M, seen)
             if k < 0:
                 continue
             told_s = columns["time_s"][of_rows]
@@ -158,4 +157,4 @@ def _nearest(range_m: FloatArray, wanted_m: float, seen: BoolArray) -> int:
     """Return the first instant nearest to a range, within half a mile of it, or -1."""
     apart = np.where(seen, np.abs(range_m - wanted_m), np.inf)
     k = int(np.argmin(apart))
-    return k if apart[k] <= 0.5 * MILE_M else -1
+    return k if apart[k] <= 0.5 * NAUTICAL_MILE_M else -1

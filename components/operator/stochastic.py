@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from components.arguments.units import FOOT_M
 from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out
 from components.messages.alerts import AlertLevels
@@ -27,7 +28,6 @@ COORDINATION_SHAPE = 5.5
 CLEARLY_SMALLER_RAD = math.radians(40.0)
 #: Otherwise it is taken with this probability, and where not: left, and down, with these.
 FOLLOWS_SMALLER, LEFT, DESCENDS = 0.8, 0.6, 0.5
-_FOOT_M = 0.3048
 _DEGREE = math.pi / 180.0
 
 
@@ -42,7 +42,7 @@ class Excess(NamedTuple):
 
 TURN = Excess(6.21, 9.67 * _DEGREE, 30.0 * _DEGREE, 30.0 * _DEGREE)
 TURN_OTHER_SIDE = Excess(5.47, 8.25 * _DEGREE, 30.0 * _DEGREE, 15.0 * _DEGREE)
-CLIMB = Excess(9.73, 207.98 * _FOOT_M, 1500.0 * _FOOT_M, 500.0 * _FOOT_M)
+CLIMB = Excess(9.73, 207.98 * FOOT_M, 1500.0 * FOOT_M, 500.0 * FOOT_M)
 
 # Least time to the next decision and the mean of what comes on top, s: without an alert, then by
 # level 1 (preventive), 2 (corrective), 3 (warning).

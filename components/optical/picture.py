@@ -187,24 +187,16 @@ def _cross(a: FloatArray, b: FloatArray) -> Any:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def coverage(corners: FloatArray, rows: int, columns: int) -> FloatArray:
-    """Return the share of each pixel that a polygon covers, exact to 1e-7.
-
-    Each edge's part of a row hides what lies to the right of it: the mean, over that part, of the
-    share of the pixel right of the edge is that of a clipped line, in closed form (Green's theorem,
-    pixel by pixel). The corners (n, 2), x to the right and y down in pixels, are those of any
-    simple polygon, in either sense.
-    """
-    picture: FloatArray = np.zeros((rows, columns))
-    for box, share in _coverages(np.asarray(corners)[np.newaxis], rows, columns):
-        picture[box] = share
-    return picture
-
-
-def _coverages(
+def coverages(
     corners: FloatArray, rows: int, columns: int
 ) -> Iterator[tuple[tuple[slice, slice], FloatArray]]:
-    """Yield the box in the picture round each polygon (count, n, 2), and its `coverage` there."""
+    """Yield the box in the picture round each polygon (count, n, 2), and its share of each pixel.
+
+    Exact to 1e-7. Each edge's part of a row hides what lies to the right of it: the mean, over that
+    part, of the share of the pixel right of the edge is that of a clipped line, in closed form
+    (Green's theorem, pixel by pixel). Corners, x to the right and y down in pixels, are those of
+    any simple polygon, in either sense.
+    """
     corners = np.asarray(finite("corners", corners))
     count, edges = corners.shape[:2]
     if edges < 3:
@@ -264,7 +256,7 @@ def union_coverage(
     steps = min(64, 1 + math.ceil(4.0 * float(np.hypot(*smear))))
     moved = ((np.arange(steps) + 0.5) / steps - 0.5)[:, np.newaxis, np.newaxis] * smear
     drawn = [
-        (sign, _coverages(part + moved, rows, columns)) for sign, part in parts if len(part) > 2
+        (sign, coverages(part + moved, rows, columns)) for sign, part in parts if len(part) > 2
     ]
     total: FloatArray = np.zeros((rows, columns))
     for boxes in zip(*(covered for _, covered in drawn), strict=True):

@@ -207,22 +207,20 @@ class SwerlingRadar(LinkBudgetRadar):
         return self._reference((self.p.swerling or 0) % 5)
 
     def look(self, cells: Cells) -> Look:
-        """Draw every cell against its probability of detection."""
+        """Draw every cell against its probability of detection; where no echo comes that is 0."""
         snr, clutter = self.received(cells)
         echo = snr > 0.0
-        snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
+        snr_db = 10.0 * np.log10(np.where(echo, snr, np.nan))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
             confidence[chosen] = snr_db[chosen] - self._reference(model)
-        pd = self._pd_of_cells(cells, snr, clutter)
+        pd = np.where(echo, self._pd_of_cells(cells, snr, clutter), 0.0)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
         noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
         tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
-        return Look(
-            echo & (draw < pd), confidence, extras, signal_over_clutter(snr, cnr), noise, tail
-        )
+        return Look(draw < pd, confidence, extras, signal_over_clutter(snr, cnr), noise, tail)
 
     def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.

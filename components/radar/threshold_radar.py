@@ -343,15 +343,13 @@ class ThresholdRadar(LinkBudgetRadar):
         snr, clutter = self.received(cells)
         cnr = None if clutter is None else clutter.total
         echo = snr > 0.0
-        snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
+        snr_db = 10.0 * np.log10(np.where(echo, snr, np.nan))
         margin = snr_db - self._threshold_of(cells)
         if cnr is not None and self.p.clutter_threshold == "noise":
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
-        return Look(
-            echo & (margin >= 0.0), margin, {"snr_db": snr_db}, signal_over_clutter(snr, cnr)
-        )
+        return Look(margin >= 0.0, margin, {"snr_db": snr_db}, signal_over_clutter(snr, cnr))
 
     def _threshold_of(self, cells: Cells) -> Any:
         """Return the threshold in dB: one for all, or each cell's own where some are cued."""

@@ -6,12 +6,13 @@ visible.
 """
 
 from dsa_des.block.mark import Mark
+from dsa_des.record.drawing import BLUE, GREEN, ORANGE, PINK, RED, SKY
 
-EO = Mark("#0072B2", "o", 7.5)
-IR = Mark("#E69F00", "^", 6.0)
-RADAR = Mark("#D55E00", "s", 4.0)
+EO = Mark(BLUE, "o", 7.5)
+IR = Mark(ORANGE, "^", 6.0)
+RADAR = Mark(RED, "s", 4.0)
 LASER = Mark("#117733", "*", 6.0)
 EYES = Mark("#AA4499", "p", 6.0)
-FUSION = Mark("#009E73", "D", 5.0)
-COOPERATIVE = Mark("#56B4E9", "P", 5.5)
-TRACKER = Mark("#CC79A7", "v", 5.5)
+FUSION = Mark(GREEN, "D", 5.0)
+COOPERATIVE = Mark(SKY, "P", 5.5)
+TRACKER = Mark(PINK, "v", 5.5)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from components.arguments.units import FOOT_M
 from components.estimation.carried_errors import BEARING, RANGE
 from components.geometry import wrap_pi_unchecked
 from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
@@ -43,7 +44,6 @@ from components.surveillance.interrogation import (
 )
 from components.surveillance.reports import unreported
 from components.surveillance.stated_errors import ALTIMETER, ROUNDING, unstated_errors
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.time.clock import NANOSECONDS

@@ -11,20 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
+from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.navigation.errors import displaced_position
 from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
-    FOOT_PER_MINUTE_M_S,
     HIGHEST_FT,
-    KNOT_M_S,
     LOWEST_FT,
     quantised_altitude_ft,
     quantised_climb_ft_min,
     quantised_speed_kt,
 )
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.gauss_markov import GaussMarkov
 from dsa_des.time.randomness import Streams

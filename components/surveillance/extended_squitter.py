@@ -12,11 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.surveillance.compact_position import encode
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-KNOT_M_S = 1852.0 / 3600.0
-FOOT_PER_MINUTE_M_S = FOOT_M / 60.0
 #: Steps of altitude, of each part of a velocity, and of a vertical rate.
 ALTITUDE_STEP_FT, SPEED_STEP_KT, CLIMB_STEP_FT_MIN = 25, 1, 64
 LOWEST_FT, HIGHEST_FT = -1000, 50_175

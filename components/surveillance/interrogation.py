@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from dsa_des.arrays.types import BoolArray, FloatArray
 
-_NMI_M = 1852.0
 #: Farthest answers: Mode S all round, Mode C ahead (within 45°), at the side (135°) and behind.
-MODE_S_REACH_M = 15.6 * _NMI_M
-MODE_C_REACH_M = (20.6 * _NMI_M, 14.3 * _NMI_M, 8.0 * _NMI_M)
+MODE_S_REACH_M = 15.6 * NAUTICAL_MILE_M
+MODE_C_REACH_M = (20.6 * NAUTICAL_MILE_M, 14.3 * NAUTICAL_MILE_M, 8.0 * NAUTICAL_MILE_M)
 AHEAD_RAD, SIDE_RAD = np.radians(45.0), np.radians(135.0)
 #: Rounds of interrogations are 0.1 s apart; an answer counts if any of the last ten came.
 ROUND_S, ROUNDS = 0.1, 10
@@ -22,8 +22,8 @@ IN_1_S = (0.95, 0.90)
 BEARING_RAD = np.radians(np.array([9.0, 15.0]))
 LEVEL_RAD, CUT = np.radians(10.0), 3.0
 #: From fixed distances of transponders' delays: to Mode S and to Mode C.
-RANGE_BIAS_M = (125.0 * 0.3048, 250.0 * 0.3048)
-RANGE_ERROR_M, RANGE_CORRELATION_S = 50.0 * 0.3048, 1.0
+RANGE_BIAS_M = (125.0 * FOOT_M, 250.0 * FOOT_M)
+RANGE_ERROR_M, RANGE_CORRELATION_S = 50.0 * FOOT_M, 1.0
 
 
 def reach_m(bearing_rad: FloatArray, mode_s: BoolArray) -> FloatArray:

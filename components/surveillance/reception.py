@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from components.arguments.units import NAUTICAL_MILE_M
 from dsa_des.arrays.types import FloatArray
 
-_NMI_M = 1852.0
 #: Farthest reception of the fitted law, and its coefficients of 1st to 4th order.
-FITTED_RANGE_M = 290.0 * _NMI_M
+FITTED_RANGE_M = 290.0 * NAUTICAL_MILE_M
 FITTED_COEFFICIENTS = (-1.80, 11.96, -23.27, 20.30)
 #: Ranges up to which the two steps of DO-365's law hold, and probabilities of a report in 1 s:
 #: 95 % within 3 s and within 7 s.
-DO_365_RANGES_M = (10.0 * _NMI_M, 20.0 * _NMI_M)
+DO_365_RANGES_M = (10.0 * NAUTICAL_MILE_M, 20.0 * NAUTICAL_MILE_M)
 DO_365_IN_1_S = (1.0 - 0.05 ** (1.0 / 3.0), 1.0 - 0.05 ** (1.0 / 7.0))
 #: Squitters of one kind in a second, on average.
 _PER_SECOND = 2.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.aircraft.equipage import Equipage
+from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.estimation.carried_errors import (
     CLIMB,
     EAST,
@@ -20,8 +21,6 @@ from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, ToldError
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.broadcast import CLIMB_SCALE_M_S, CORRELATION_TIME_S
-from components.surveillance.extended_squitter import FOOT_PER_MINUTE_M_S, KNOT_M_S
-from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.

@@ -17,7 +17,7 @@ from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 from components.geometry import RAD_PER_DEG, past, radii_of_curvature
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
-from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.files.input_files import InputFileError, read_once, status_of
 from dsa_des.text.safe_text import shortened
 
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
@@ -290,10 +290,8 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
     return ElevationRaster(south, west, transform.a, -transform.e, np.array(height), name)
 
 
-@lru_cache(maxsize=8)
-def _read(path: Path, changed_ns: int, size: int) -> ElevationRaster:
-    # Runs of a study that name the same file share one raster.
-    return read_raster(path)
+#: Runs of a study that name the same file share one raster.
+_read_once = read_once(8)(read_raster)
 
 
 @lru_cache(maxsize=2)
@@ -311,8 +309,8 @@ def _validated(value: Any) -> RasterOfFile:
         path = _PATH.validate_python(item)
         name = shortened(str(path), 300)
         try:
-            status = status_of(path, LARGEST_RASTER_BYTES)
-            rasters.append(_read(path, status.st_mtime_ns, status.st_size))
+            status_of(path, LARGEST_RASTER_BYTES)
+            rasters.append(_read_once(path))
         except InputFileError as error:
             raise ValueError(f"must be a raster that can be read: {name}: {error}") from None
         paths.append(path)

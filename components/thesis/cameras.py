@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.optical.camera import Camera
 from components.optical.infrared_area import infrared_area
 from components.optical.signature import detection_range
@@ -22,7 +23,7 @@ from dsa_des.record.drawing import BLUE, GREEN, ORANGE, SKY
 CLIMB_DEG = 1.4
 #: A King Air B200, level, from the nose and abeam: 396 and 273 square feet in b200.csv of
 #: mit-ll/degas-surveillance-jwandrews, m².
-KING_AIR_M2 = {"Level head-on": 396 * 0.3048**2, "Level abeam": 273 * 0.3048**2}
+KING_AIR_M2 = {"Level head-on": 396 * FOOT_M**2, "Level abeam": 273 * FOOT_M**2}
 
 
 def camera_range_km(

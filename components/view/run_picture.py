@@ -8,26 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import TangentPlane, offset_positions, sights
-from components.display.recorded_run import RecordedTables, read_table
+from components.display.picture import LINE, TangentPlane, offset_positions, sights
+from components.display.recorded_run import POSE, RecordedTables, read_table
 from components.display.symbols import block_marks
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
-from components.messages.columns import ORIGIN
+from components.messages.columns import ORIGIN, POSITION
 from components.view.page import RunPicture
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.errors import UsageError
 
-_NO_TARGET = -1
+_NO_TARGET, _NOWHERE = -1, TangentPlane(0.0, 0.0)
 #: What the page shows of a run; the first two are in every run.
 _TABLES = (
     "detections", "scans", "truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres",
     "bands",
 )  # fmt: skip
-_OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
-        "own_roll_rad")  # fmt: skip
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
 
@@ -43,10 +41,8 @@ def run_picture(folder: Path) -> RunPicture:
     known = ("truth", "detections", "alerts")
     names = sorted({text for table in known for text in _texts(run, table, "target")})
     targets = {name: number for number, name in enumerate(names)}
-    own = _own(run)
-    plane = TangentPlane(0.0, 0.0)
-    if len(own["time_s"]):
-        plane = TangentPlane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
+    own_s, own = _own(run)
+    plane = TangentPlane(float(own[0, 0]), float(own[1, 0])) if len(own_s) else _NOWHERE
     sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
     marks = block_marks(run.block_types(sensors))
     blocks = run.scene.get("blocks", {})
@@ -61,47 +57,43 @@ def run_picture(folder: Path) -> RunPicture:
     def plain(table: str, *columns: str) -> dict[str, AnyArray]:
         return {name: run.values(table, name) for name in columns if run.has(table, name)}
 
-    def lines(table: str) -> dict[str, Any]:
-        measured = ("time_s", "azimuth_rad", "elevation_rad", "range_m")
-        return {name: run.values(table, name) for name in measured}
-
     def about(table: str) -> dict[str, AnyArray]:
         result = {"target": _codes(run.values(table, "target"), targets)}
         return result | _sources(run, table)
 
     tables = picture.tables
-    tables["own"] = _own_columns(own, plane)
+    tables["own"] = _own_columns(own_s, own, plane)
     if "truth" in run.tables:
         tables["truth"] = _truth(run, plane, targets)
     tables["scans"] = {
-        "time_s": run.values("scans", "time_s"),
+        "time_s": run.numbers("scans", "time_s"),
         "sensor": _codes(run.values("scans", "block"), sensors),
         "detected": run.values("scans", "detected"),
     }
     tables["detections"] = {
-        "time_s": run.values("detections", "time_s"),
+        "time_s": run.numbers("detections", "time_s"),
         "sensor": _codes(run.values("detections", "block"), sensors),
         "target": _codes(run.values("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
-        **_seen(lines("detections"), {n: run.values("detections", n) for n in _OWN}, plane),
+        **_seen(run, "detections", run.stacked("detections", POSE), plane),
     }
     for name in ("fused", "tracks"):
         if run.has(name, "azimuth_rad"):
-            seen = lines(name)
+            time_s = run.numbers(name, "time_s")
             tables[name] = {
                 **about(name),
                 **plain(name, "age_s"),
-                "time_s": seen["time_s"],
-                **_seen(seen, _pose_at(own, seen["time_s"]), plane),
+                "time_s": time_s,
+                **_seen(run, name, _pose_at(own_s, own, time_s), plane),
             }
     if "tracks" in tables:
         picture.trackers = _blocks(run, "tracks")
     if "state_tracks" in run.tables:
         picture.trackers = _blocks(run, "state_tracks")
-        tables["tracks"] = _estimates(run, picture.trackers, own, plane)
+        tables["tracks"] = _estimates(run, picture.trackers, own_s, own, plane)
     if "alerts" in run.tables:
         tables["alerts"] = {
-            **about("alerts"), "time_s": run.values("alerts", "time_s"),
+            **about("alerts"), "time_s": run.numbers("alerts", "time_s"),
             "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
         }  # fmt: skip
         if run.has("alerts", "track"):
@@ -181,31 +173,26 @@ def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     return result
 
 
-def _own(run: RecordedTables) -> dict[str, FloatArray]:
-    """Return where the ownship was and how it lay, in order of time: the truth, or its belief."""
-    names = [name.removeprefix("own_") for name in _OWN]
-    if run.has("truth", *names):
+def _own(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
+    """Return the ownship's poses (6, n) and their times, in order: the truth, or its belief."""
+    table, names, rows = "detections", list(POSE), np.arange(run.tables["detections"].num_rows)
+    true = [name.removeprefix("own_") for name in POSE]
+    if run.has("truth", *true):
         mine = np.array([name is None for name in run.values("truth", "target")], dtype=bool)
         if mine.any():
-            result = {f"own_{name}": run.values("truth", name)[mine] for name in names}
-            return _in_order(run.values("truth", "time_s")[mine], result)
-    result = {name: np.asarray(run.values("detections", name), dtype=float) for name in _OWN}
-    return _in_order(run.values("detections", "time_s"), result)
+            table, names, rows = "truth", true, np.flatnonzero(mine)
+    time_s, first = np.unique(run.numbers(table, "time_s")[rows], return_index=True)
+    return time_s, run.stacked(table, names, rows[first])
 
 
-def _in_order(time_s: FloatArray, own: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    time_s, first = np.unique(np.asarray(time_s, dtype=float), return_index=True)
-    return {**{name: values[first] for name, values in own.items()}, "time_s": time_s}
-
-
-def _own_columns(own: Mapping[str, FloatArray], plane: TangentPlane) -> dict[str, AnyArray]:
-    east, north = plane.east_north_m(own["own_lat_deg"], own["own_lon_deg"], own["own_alt_m"])
+def _own_columns(time_s: FloatArray, own: FloatArray, plane: TangentPlane) -> dict[str, AnyArray]:
+    east, north = plane.east_north_m(*own[:3])
     return {
-        "time_s": own["time_s"],
+        "time_s": time_s,
         "east_m": east,
         "north_m": north,
-        "alt_m": own["own_alt_m"],
-        "heading_rad": np.unwrap(own["own_heading_rad"]) if len(east) else east,
+        "alt_m": own[2],
+        "heading_rad": np.unwrap(own[3]) if len(east) else east,
     }
 
 
@@ -213,8 +200,8 @@ def _truth(
     run: RecordedTables, plane: TangentPlane, targets: Mapping[str, int]
 ) -> dict[str, AnyArray]:
     """Return the targets' true positions, by target and then by time."""
-    code, time_s = _codes(run.values("truth", "target"), targets), run.values("truth", "time_s")
-    keep = np.flatnonzero((code >= 0) & np.isfinite(run.values("truth", "lat_deg")))
+    code, time_s = _codes(run.values("truth", "target"), targets), run.numbers("truth", "time_s")
+    keep = np.flatnonzero((code >= 0) & np.isfinite(run.numbers("truth", "lat_deg")))
     keep = keep[np.lexsort((time_s[keep], code[keep]))]
     position = [run.values("truth", name)[keep] for name in ("lat_deg", "lon_deg", "alt_m")]
     east, north = plane.east_north_m(*position)
@@ -228,21 +215,24 @@ def _truth(
 
 
 def _estimates(
-    run: RecordedTables, trackers: list[str], own: Mapping[str, FloatArray], plane: TangentPlane
+    run: RecordedTables,
+    trackers: list[str],
+    own_s: FloatArray,
+    own: FloatArray,
+    plane: TangentPlane,
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
     status = np.array(run.values("state_tracks", "track_status"), dtype=object)
     keep = np.flatnonzero(status != "deleted")
 
     def column(name: str) -> FloatArray:
-        return np.asarray(run.values("state_tracks", name), dtype=float)[keep]
+        return run.numbers("state_tracks", name)[keep]
 
     time_s = column("time_s")
-    ned_m = np.stack([column(name) for name in ("north_m", "east_m", "down_m")])
-    ends = offset_positions(ned_m, [column(name) for name in ORIGIN])
+    origin = run.stacked("state_tracks", ORIGIN, keep)
+    ends = offset_positions(run.stacked("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
-    pose = _pose_at(own, time_s)
-    from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))
+    from_east, from_north = plane.east_north_m(*_pose_at(own_s, own, time_s)[:3])
     return {
         "time_s": time_s,
         "number": np.asarray(run.values("state_tracks", "track"))[keep],
@@ -266,36 +256,29 @@ def _estimates(
     }
 
 
-def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, FloatArray]:
-    """Return the ownship's latest pose at some times, NaN before the first."""
-    row = np.searchsorted(own["time_s"], time_s, side="right") - 1
-    result = {}
-    for name in _OWN:
-        values = np.append(own[name], np.nan)
-        result[name] = values[row]
-    return result
+def _pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Return the ownship's latest poses at some times, (6, n), NaN before the first."""
+    row = np.searchsorted(own_s, time_s, side="right") - 1
+    return np.stack([np.append(values, np.nan)[row] for values in own])
 
 
 def _seen(
-    table: Mapping[str, Any], pose: Mapping[str, Any], plane: TangentPlane
+    run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
     Bearings are from north; what is not known is NaN.
     """
-    at = [np.asarray(pose[name], dtype=float) for name in _OWN]
-    azimuth, elevation, range_m = (
-        np.asarray(table[name], dtype=float) for name in ("azimuth_rad", "elevation_rad", "range_m")
-    )
-    from_east, from_north = plane.east_north_m(*at[:3])
-    bearing, end = sights(azimuth, elevation, range_m, at)
+    line = run.stacked(table, LINE)
+    from_east, from_north = plane.east_north_m(*pose[:3])
+    bearing, end = sights(line, pose)
     east_m, north_m = plane.east_north_m(*end)
     return {
         "from_east_m": from_east,
         "from_north_m": from_north,
         "bearing_rad": bearing,
-        "elevation_rad": elevation,
-        "range_m": range_m,
+        "elevation_rad": line[1],
+        "range_m": line[2],
         "east_m": east_m,
         "north_m": north_m,
         "alt_m": end[2],

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.well_clear.relative_motion import horizontal_of, time_to_closest_s
-from components.well_clear.volume import FOOT_M, Relative
+from components.well_clear.volume import Relative
 from dsa_des.arrays.types import FloatArray
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.well_clear.relative_motion import (
     Span,
     discriminant,
@@ -14,7 +15,7 @@ from components.well_clear.relative_motion import (
     surely_less,
     vertical_span,
 )
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M, Relative
+from components.well_clear.volume import Relative
 from dsa_des.arrays.types import FloatArray, IntArray
 
 

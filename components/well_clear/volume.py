@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.well_clear.relative_motion import (
     Horizontal,
     Span,
@@ -23,9 +24,6 @@ from components.well_clear.relative_motion import (
     within_time,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray
-
-FOOT_M = 0.3048
-NAUTICAL_MILE_M = 1852.0
 
 #: How time enters the horizontal condition.
 TIME_VARIABLES = ("modified_tau", "time_to_closest", "time_to_entry", "none")

@@ -79,7 +79,7 @@ def same_bits(some: AnyArray, others: AnyArray) -> bool:
     """Return whether two columns are the same, NaN and the sign of 0 too; differing ends tell."""
     if some.dtype != others.dtype or len(some) != len(others):
         return False
-    bits = f"u{some.itemsize}"
+    bits = _BITS[some.itemsize]
     some, others = some.view(bits), others.view(bits)
     if some[0] != others[0] or some[-1] != others[-1]:
         return False
@@ -90,7 +90,7 @@ def repeats(values: AnyArray, one: AnyArray) -> bool:
     """Return whether all rows hold what `one` (1,) does, NaN and the sign of 0 too."""
     if values.dtype != one.dtype:
         return False
-    bits = f"u{one.itemsize}"
+    bits = _BITS[one.itemsize]
     values, value = values.view(bits), one.view(bits)[0]
     if values[-1] != value or values[0] != value:
         return False
@@ -98,10 +98,11 @@ def repeats(values: AnyArray, one: AnyArray) -> bool:
 
 
 def constant(value: Any, rows: int, kind: Any) -> AnyArray:
-    """Return a column that holds the same in all rows: one value, seen `rows` times."""
+    """Return a column that holds the same in all rows: one value or array, seen `rows` times."""
     one = np.array(value, dtype=kind)
     one.flags.writeable = False
-    column: AnyArray = np.ndarray((rows,), one.dtype, buffer=one, strides=(0,))
+    shape, strides = (rows, *one.shape), (0, *one.strides)
+    column: AnyArray = np.ndarray(shape, one.dtype, buffer=one, strides=strides)
     return column
 
 
@@ -131,6 +132,9 @@ def picked(values: AnyArray, rows: IntArray) -> AnyArray:
         return constant(values[0], len(rows), values.dtype)
     return values.take(rows)
 
+
+#: Whole numbers that hold the bits of values of so many bytes.
+_BITS = {size: np.dtype(f"u{size}") for size in (1, 2, 4, 8)}
 
 # Of fewer rows, to look whether they are the same costs more than they do.
 _MANY = 64

@@ -216,7 +216,9 @@ class Message(_Found):
             return
         if not isinstance(offsets, np.ndarray) or offsets.dtype.kind not in "iu":
             raise TypeError(f"{_of(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed")
-        if offsets.shape != (rows + 1,) or (rows > 1 and bool((offsets[1:] < offsets[:-1]).any())):
+        if offsets.shape != (rows + 1,) or (
+            rows > 1 and np.count_nonzero(offsets[1:] < offsets[:-1])
+        ):
             raise ValueError(
                 f"{_of(self, 'offsets')} of shape {offsets.shape} must be ascending, one more than "
                 f"the {rows} rows"

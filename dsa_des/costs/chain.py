@@ -15,7 +15,7 @@ from dsa_des.block.ladder import Unavailable
 from dsa_des.costs.climb import Comparison, RungCost, on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks
+from dsa_des.record.drawing import RED, drawing, figure_text, plain_log_ticks
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -157,7 +157,7 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: st
         errors = [row["error_p95"] for row in rows]
         # A log axis has no zero: runs that are alike stand on a floor of their own.
         floor = 0.2 * min([e for e in errors if e > 0.0], default=1e-3)
-        for front, colour, size in ((False, "#999999", 12), (True, "#D55E00", 36)):
+        for front, colour, size in ((False, "#999999", 12), (True, RED, 36)):
             chosen = [row for row in rows if row["pareto"] is front]
             axes.scatter(
                 [row["cpu_us_per_target_scan"] for row in chosen],

@@ -10,7 +10,7 @@ from typing import Any
 
 from dsa_des.costs.climb import Comparison, RungCost, shown
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import RED, drawing, figure_text, plain_log_ticks, tight
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
@@ -163,7 +163,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
         if on_floor:
             label += ": error unknown" if math.isnan(error) else f": {_tiny(error)} {quantity.unit}"
         at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
-        colour = "#D55E00" if cost.pareto else "#777777"
+        colour = RED if cost.pareto else "#777777"
         axes.errorbar(
             *at, xerr=cost.cpu_spread_us, fmt="o", color=colour, capsize=2, zorder=3,
             markerfacecolor="white" if on_floor else colour,
@@ -171,7 +171,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
         labels.append((label, at, cost.cpu_spread_us, colour))
         points.append((at, cost.pareto))
     front = [at for at, pareto in points if pareto]
-    axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2)
+    axes.plot(*zip(*front, strict=True), color=RED, linewidth=1, zorder=2)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))

@@ -40,9 +40,9 @@ class Variants:
         duration_s: object = None,
     ) -> None:
         scene_file = read_scene_file(path)
-        changes, problems = read_changes(sets, swaps, seed, duration_s)
-        wrong, self.dropped = apply_changes(scene_file, changes)
-        stated = check_scene(scene_file.copy(), problems + wrong)
+        changes, scene_file.problems = read_changes(sets, swaps, seed, duration_s)
+        self.dropped = apply_changes(scene_file, changes)
+        stated = check_scene(scene_file.copy())
         #: What ``[accuracy]`` of the scene allows.
         self.tolerance: Mapping[str, float] = stated.tolerance
         scene_file.data.pop(_CHOOSES_BY_ITSELF, None)
@@ -71,9 +71,9 @@ class Variants:
             block.pop(key, None)
         values = choice.rung.changes(self._blocks[choice.block])
         if choice.rung.type_name:
-            problems, _ = swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
-            if problems:
-                raise Unavailable("; ".join(_brief(problem) for problem in problems))
+            swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
+            if scene_file.problems:
+                raise Unavailable("; ".join(_brief(problem) for problem in scene_file.problems))
         _set(scene_file, choice.block, values)
         for table, keys in choice.rung.sections.items():
             for key, value in keys.items():

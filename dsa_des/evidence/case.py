@@ -181,9 +181,8 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     where the case states none.
     """
     file = read_scene_file(path)
-    problems = apply_sets(file, sets)
-    if problems:
-        raise SceneError(problems)
+    apply_sets(file, sets)
+    file.refuse()
     for key, takes_it in (("blocks", "run"), ("axes", "study")):
         if key in file.data and "requirements" not in file.data:
             raise SceneError(
@@ -212,9 +211,9 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
         varied, studies[SENSITIVITY] = _sensitivity(file, tables, studies[ASSESSED])
     results = {name: {r.name: r for r in results_of(study)} for name, study in studies.items()}
     case = EvidenceCase(file, tables, studies, results, varied)
-    problems = [*_unknown_results(case), *_without_source(case)]
-    if problems:
-        raise SceneError(problems)
+    _check_results(case)
+    _check_sources(case)
+    file.refuse()
     return case
 
 
@@ -271,9 +270,8 @@ def written(value: Any) -> str:
     return set_text(value) if isinstance(value, list | dict) else as_text(value)
 
 
-def _unknown_results(case: EvidenceCase) -> list[Any]:
-    """Return a problem for every result that no study gives."""
-    problems = []
+def _check_results(case: EvidenceCase) -> None:
+    """Report every result that no study gives."""
     named = [
         (("requirements", index), one.study, one.result)
         for index, one in enumerate(case.tables.requirements)
@@ -284,44 +282,40 @@ def _unknown_results(case: EvidenceCase) -> list[Any]:
         if study not in case.studies or study == SENSITIVITY:
             known = [name for name in case.studies if name != SENSITIVITY]
             message = f"the case has no such study{did_you_mean(study, known)}"
-            problems.append(case.file.problem((*at, "study"), message, study))
+            case.file.report((*at, "study"), message, study)
             continue
         known = [r.name for r in case.results[study].values() if r.summed_up]
         if name not in known:
             message = f"the study gives no such result{did_you_mean(name, known)}"
-            problems.append(case.file.problem((*at, "result") if inside else at, message, name))
+            case.file.report((*at, "result") if inside else at, message, name)
         elif inside and len(case.studies[study].cells) != 1:
             message = f"has {len(case.studies[study].cells)} cells; a requirement is held to one"
-            problems.append(case.file.problem((*at, "study"), message, study))
+            case.file.report((*at, "study"), message, study)
         elif inside:
-            problems += _limit_beyond(case, at, study, name)
-    return problems
+            _check_limit(case, at, study, name)
 
 
-def _limit_beyond(
-    case: EvidenceCase, at: tuple[str, int], study: str, result: str
-) -> list[Problem]:
-    """Return a problem where a limit says nothing: no value of its result is as low, or as high."""
+def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: str) -> None:
+    """Report a limit that says nothing: no value of its result is as low, or as high."""
     asked = case.tables.requirements[at[1]]
     low, high = case.results[study][result].bounds
     if low <= asked.limit <= high:
-        return []
+        return
     allowed = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
     sense = "most" if asked.most is not None else "least"
     message = f"no value of {result} lies there; allowed: {allowed}"
-    return [case.file.problem((*at, sense), message, asked.limit)]
+    case.file.report((*at, sense), message, asked.limit)
 
 
-def _without_source(case: EvidenceCase) -> list[Any]:
-    """Return a problem for every block whose scene states a value that no source covers."""
-    problems = []
+def _check_sources(case: EvidenceCase) -> None:
+    """Report every block whose scene states a value that no source covers."""
     sources, scene = case.tables.sources, case.assessed.scene(0)
     for key in flat(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:
             hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
             message = f"the scene has no block {parts[0]!r}{hint}"
-            problems.append(case.file.problem(("sources", key), message))
+            case.file.report(("sources", key), message)
     for name, block in scene.blocks.items():
         stated = block.parameters.model_fields_set
         missing = [key for key in sorted(stated) if source_of(sources, name, key) is None]
@@ -329,11 +323,10 @@ def _without_source(case: EvidenceCase) -> list[Any]:
             message = (
                 f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
             )
-            problems.append(case.file.problem(("sources", name), message))
+            case.file.report(("sources", name), message)
     if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
         message = "is missing: nobody says where delays and losses of wires come from"
-        problems.append(case.file.problem(("sources", WIRES), message))
-    return problems
+        case.file.report(("sources", WIRES), message)
 
 
 def wires_with_options(scene: Scene) -> list[dict[str, Any]]:

@@ -237,9 +237,9 @@ def _base_of(
     swaps = [(k.removeprefix(SWAP), v) for k, v in changes if k.startswith(SWAP)]
     sets = list({k: v for k, v in changes if not k.startswith(SWAP)}.items())
     changed, ordered = file.copy(), file.copy()
-    problems, _ = apply_changes(changed, changes)
-    more, _ = apply_changes(ordered, [*((SWAP + block, name) for block, name in swaps), *sets])
-    same = not problems and not more and ordered.data == changed.data
+    apply_changes(changed, changes)
+    apply_changes(ordered, [*((SWAP + block, name) for block, name in swaps), *sets])
+    same = not changed.problems and not ordered.problems and ordered.data == changed.data
     with suppress(SceneError):
         if same:
             changed_scene(file, swaps, sets, "study")

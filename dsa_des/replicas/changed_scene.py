@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block_table import Block, BlockOptions
-from dsa_des.scene.checks import check_times
+from dsa_des.scene.checks import check_times, read_clocks
 from dsa_des.scene.keys import no_item, place_of, unquoted
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
@@ -46,19 +46,16 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
     try:
         blocks, sections, duration = _all_changed(scene, replica.changes, paths)
     except (ValidationError, ValueError, LookupError, TypeError):
-        problems: list[Problem] = []
-        blocks, sections, duration = _each_changed(scene, replica.changes, paths, problems)
-        if problems:
-            raise SceneError(problems) from None
+        blocks, sections, duration = _each_changed(scene, replica.changes, paths)
     wires = scene.wires
     if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
         wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
     ticks_per_s = scene.ticks_per_s
     if wires is not scene.wires or duration is not scene.duration_s or _times_differ(scene, blocks):
-        problems = []
-        ticks_per_s = check_times(SceneFile(scene.path, {}), blocks, wires, duration, problems)
-        if problems:
-            raise SceneError(problems)
+        file = SceneFile(scene.path, {})
+        clocks = read_clocks(file, blocks)
+        ticks_per_s = check_times(file, blocks, clocks, wires, duration)
+        file.refuse()
     return replace(
         scene,
         seed=replica.seed,
@@ -101,10 +98,16 @@ def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, A
     return blocks, sections, duration
 
 
-def _each_changed(
-    scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any], problems: list[Problem]
-) -> _Changed:
-    """Make one change after the other, and say what is wrong with each."""
+#: Keys of a scene that are no changes of its replicas, and why not.
+_THE_SAME = {
+    "seed": "cannot be drawn: every replica has a seed of its own, of the study's",
+    "wires": "cannot be drawn: wires are the same in all replicas, and can be an axis",
+}
+
+
+def _each_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
+    """Make one change after the other; `SceneError` says what is wrong with each."""
+    problems: list[Problem] = []
     blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
     for key, value in changes.items():
         path = paths[key]
@@ -119,13 +122,16 @@ def _each_changed(
             else:
                 known = [f"blocks.{name}" for name in blocks] + [*sections, "duration_s"]
                 hint = did_you_mean(".".join(map(str, path[:2])), known)
-                problems.append(_problem(scene, key, f"is no key of this scene{hint}", value))
+                why = _THE_SAME.get(str(path[0]), f"is no key of this scene{hint}")
+                problems.append(_problem(scene, key, why, value))
         except ValidationError as error:
             file = SceneFile(scene.path, {})
             for problem in explain(file, (), key, BlockOptions, error):
                 problems.append(_problem(scene, key, problem.message, value))
         except (ValueError, LookupError, TypeError) as error:
             problems.append(_problem(scene, key, str(error), value))
+    if problems:
+        raise SceneError(problems) from None
     return blocks, sections, duration
 
 

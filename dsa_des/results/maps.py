@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import RED, drawing, figure_text, tight
 from dsa_des.results.labels import axis_label, readable, value_label
 from dsa_des.results.summary import Line
 
@@ -150,7 +150,7 @@ def _contours(axes: Any, parts: dict[str, FloatArray], limits: Sequence[float]) 
         crossed = [limit for limit in limits if known.min() < limit < known.max()]
         if crossed:
             drawn = axes.contour(
-                np.ma.masked_invalid(grid), levels=sorted(crossed), colors="#D55E00",
+                np.ma.masked_invalid(grid), levels=sorted(crossed), colors=RED,
                 linestyles=style, linewidths=1.6 if part == "value" else 1.1,
             )  # fmt: skip
             if part == "value":

@@ -206,10 +206,13 @@ class DrawRecord(StrictRecord):
     numeric: bool
 
 
-class FigureRecord(StrictRecord):
-    """A figure; see `read_figures`."""
+FigureKind = Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series", "run"]
 
-    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series", "run"]
+
+class FigureRecord(StrictRecord):
+    """A figure; a study file says `limits` as ``limit``."""
+
+    kind: FigureKind
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
@@ -217,7 +220,8 @@ class FigureRecord(StrictRecord):
     x: str | None = None
     y: str | None = None
     limits: list[float] = []
-    freedom: float | None = None
+    #: Degrees of freedom.
+    freedom: Annotated[float, Field(gt=0, le=1e6)] | None = None
     cell: _Whole = 0
     replica: _Whole = 0
 

@@ -14,7 +14,7 @@ from dsa_des.block.component import Parameters
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.registry import NotImported, UnknownType, find, section_models
 from dsa_des.block.source_file import absolute
-from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.errors import did_you_mean, nearest
 from dsa_des.scene.block_table import Block, BlockOptions, ProcessorParameters, split_options
 from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.overrides import drop_of_other_type
@@ -32,24 +32,22 @@ if TYPE_CHECKING:
 _A_DAY = Fraction(86400)
 
 
-def check_lookalikes(
-    scene: SceneFile, key: Key, given: Any, parsed: Any, problems: list[Problem]
-) -> None:
-    """Add values that pydantic quietly converted: ``true`` or ``"5"`` for a number, 1 for true."""
+def check_lookalikes(scene: SceneFile, key: Key, given: Any, parsed: Any) -> None:
+    """Report values that pydantic quietly converted: ``true`` or ``"5"`` for 5, 1 for true."""
     if isinstance(given, Mapping):
         fields = vars(parsed) if isinstance(parsed, BaseModel) else parsed
         for name, value in given.items():
             if isinstance(fields, Mapping) and name in fields:
-                check_lookalikes(scene, (*key, name), value, fields[name], problems)
+                check_lookalikes(scene, (*key, name), value, fields[name])
     elif isinstance(given, list) and isinstance(parsed, list | tuple):
         for index, pair in enumerate(zip(given, parsed, strict=False)):
-            check_lookalikes(scene, (*key, index), *pair, problems)
+            check_lookalikes(scene, (*key, index), *pair)
     elif isinstance(parsed, bool) != isinstance(given, bool):
         if isinstance(parsed, bool | int | float):
             needed = "true or false" if isinstance(parsed, bool) else "a number"
-            problems.append(scene.problem(key, f"must be {needed}", _plain(given)))
+            scene.report(key, f"must be {needed}", _plain(given))
     elif isinstance(given, str) and isinstance(parsed, int | float):
-        problems.append(scene.problem(key, "must be a number", _plain(given)))
+        scene.report(key, "must be a number", _plain(given))
 
 
 def _plain(value: Any) -> Any:
@@ -59,95 +57,91 @@ def _plain(value: Any) -> Any:
 def check_times(
     scene: SceneFile,
     blocks: "Mapping[str, Block]",
+    clocks: Mapping[str, ClockSpec | None],
     wires: Sequence[Wire],
     duration_s: Fraction | None,
-    problems: list[Problem],
     processors: "Mapping[str, ProcessorParameters] | None" = None,
 ) -> int:
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
-    clocks = _clocks(scene, blocks, problems)
     late = [wire for wire in wires if wire.total_delay_s or wire.jitter_s]
     times = [wire.total_delay_s for wire in late]
-    for spec in clocks.values():
+    known = {name: spec for name, spec in clocks.items() if spec is not None}
+    for spec in known.values():
         times += spec.exact_times()
     ticks_per_s = resolution(times)
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
         shown = (
             shortened(f"{name} {spec.rate_hz} Hz + {spec.offset_s} s", 100)
-            for name, spec in clocks.items()
+            for name, spec in known.items()
         )
         message = (
             "these clocks have no common tick that fits 64 bits for the whole run: "
             f"{', '.join(shown)}; give offsets to fewer digits or rates as simpler fractions"
         )
-        problems.append(scene.problem(("blocks",), message))
+        scene.report(("blocks",), message)
         return ticks_per_s
     limit = f"must be at most {float(longest_s):.4g} s: that is how far this scene's ticks reach"
     if duration_s is not None and 1 + duration_s >= longest_s:
         value = scene.data.get("duration_s")
-        problems.append(scene.problem(("duration_s",), limit, value))
+        scene.report(("duration_s",), limit, value)
     for wire in late:
         if wire.total_delay_s + wire.jitter_s >= longest_s:
-            problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
+            scene.report(("wires",), f"{wire}: delay_s {limit}")
     for name, processor in (processors or {}).items():
         for what in ("service_s", "service_spread_s"):
             if (time_s := getattr(processor, what)) >= longest_s:
                 key: Key = ("processors", name, what)
-                problems.append(scene.problem(key, limit, str(time_s)))
+                scene.report(key, limit, str(time_s))
     for name, block in blocks.items():
         for what, value in block.parameters:
             # Exact times of a block's own, such as gates and pauses, are counted in ticks too.
             own = isinstance(value, Fraction) and what.endswith("_s") and what != "offset_s"
             if own and abs(value) >= longest_s:
-                problems.append(scene.problem(("blocks", name, what), limit, str(value)))
-    for name, spec in clocks.items():
-        _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)
+                scene.report(("blocks", name, what), limit, str(value))
+    for name, spec in known.items():
+        _check_clock(scene, ("blocks", name), spec, ticks_per_s)
     return ticks_per_s
 
 
-def _clocks(
-    scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]
-) -> dict[str, ClockSpec]:
-    """Return the scan clock of every block that has one; a class that cannot say is a problem."""
-    clocks: dict[str, ClockSpec] = {}
+def read_clocks(scene: SceneFile, blocks: "Mapping[str, Block]") -> dict[str, ClockSpec | None]:
+    """Return every block's scan clock, None of one without; none of a class that cannot say."""
+    clocks: dict[str, ClockSpec | None] = {}
     for name, block in blocks.items():
         try:
             with foreign_code():
                 spec = block.cls.clock_of(block.parameters)
         except ForeignFailure as error:
             message = f"{block.cls.path()} cannot say its clock (clock_of): {error}"
-            problems.append(scene.problem(("blocks", name), message))
+            scene.report(("blocks", name), message)
             continue
-        if isinstance(spec, ClockSpec):
+        if spec is None or isinstance(spec, ClockSpec):
             clocks[name] = spec
-        elif spec is not None:
+        else:
             message = f"{block.cls.path()} gives no clock: clock_of must return a ClockSpec or None"
-            problems.append(scene.problem(("blocks", name), message))
+            scene.report(("blocks", name), message)
     return clocks
 
 
-def _check_clock(
-    scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int, problems: list[Problem]
-) -> None:
+def _check_clock(scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int) -> None:
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     speed = 1 + spec.rate_error_ppm / 1_000_000 if spec.rate_error_ppm else 1
     if speed <= 0:
         message = "must be greater than -1000000: a clock cannot stand still or run backwards"
-        problems.append(scene.problem((*key, "rate_error_ppm"), message, str(spec.rate_error_ppm)))
+        scene.report((*key, "rate_error_ppm"), message, str(spec.rate_error_ppm))
     elif spec.period_s / speed >= longest_s:
         message = f"is too slow: the time between scans must be below {float(longest_s):.4g} s"
-        problems.append(scene.problem((*key, "scan_rate_hz"), message, str(spec.rate_hz)))
+        scene.report((*key, "scan_rate_hz"), message, str(spec.rate_hz))
     elif spec.period_s / speed * ticks_per_s < 1:
         message = f"is too fast: there are {ticks_per_s} ticks per second"
-        problems.append(scene.problem((*key, "scan_rate_hz"), message, str(spec.rate_hz)))
+        scene.report((*key, "scan_rate_hz"), message, str(spec.rate_hz))
     if spec.offset_s >= longest_s:
         message = f"must be below {float(longest_s):.4g} s"
-        problems.append(scene.problem((*key, "offset_s"), message, str(spec.offset_s)))
+        scene.report((*key, "offset_s"), message, str(spec.offset_s))
 
 
-def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]) -> None:
-    """Add effects that no hook calls, and those of one block that share a name."""
+def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]") -> None:
+    """Report effects that no hook calls, and those of one block that share a name."""
     for name, block in blocks.items():
         cls, hooks = block.cls, block.cls.all_hooks()
         said = [
@@ -162,20 +156,17 @@ def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]", problems: lis
             for twice in sorted({n for n in names if names.count(n) > 1})
         ]
         key = ("blocks", name, "type")
-        problems += [scene.problem(key, message, block.type_name) for message in said]
+        for message in said:
+            scene.report(key, message, block.type_name)
 
 
 def check_activity(
     scene: SceneFile,
     blocks: "Mapping[str, Block]",
+    clocks: Mapping[str, ClockSpec | None],
     wires: Sequence[Wire],
-    problems: list[Problem],
 ) -> None:
-    """Add blocks that would never run, and wires that hold a message for a queued input."""
-    faults: list[Problem] = []
-    clocks = _clocks(scene, blocks, faults)
-    if faults:  # reported before
-        return
+    """Report blocks that would never run, and wires that hold a message for a queued input."""
     woken = {
         wire.target
         for wire in wires
@@ -183,12 +174,12 @@ def check_activity(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
-        if not alive and name not in clocks:
+        if not alive and name in clocks and clocks[name] is None:
             message = (
                 "would never run: it has no scan clock, no process of its own, and no wire into "
                 "a trigger input"
             )
-            problems.append(scene.problem(("blocks", name), message))
+            scene.report(("blocks", name), message)
     for wire in wires:
         if isinstance(wire.holds, dict) and wire.target in blocks:
             declared = blocks[wire.target].cls.inputs[wire.input]
@@ -197,39 +188,39 @@ def check_activity(
                     f"{wire}: holds must be 'nothing': only a sampled or trigger input with one "
                     "writer can hold a message"
                 )
-                problems.append(scene.problem(("wires",), message))
+                scene.report(("wires",), message)
                 continue
             try:
                 with foreign_code(TypeError, ValueError):
                     declared.message.initial(wire.holds)
             except (TypeError, ValueError, ForeignFailure) as error:
-                problems.append(scene.problem(("wires",), f"{wire}: holds: {error}"))
+                scene.report(("wires",), f"{wire}: holds: {error}")
 
 
 _MAX_SEED = 2**63
-_Model = TypeVar("_Model", bound=Parameters)
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
-def read_text(scene_file: SceneFile, key: str, problems: list[Problem]) -> str:
+def read_text(scene_file: SceneFile, key: str) -> str:
     """Return a text of a scene, such as its title; empty where there is none."""
     value = scene_file.data.get(key, "")
     if not isinstance(value, str):
-        problems.append(scene_file.problem((key,), "must be text", value))
+        scene_file.report((key,), "must be text", value)
         return ""
     return str(value)
 
 
-def read_seed(scene_file: SceneFile, problems: list[Problem]) -> int:
+def read_seed(scene_file: SceneFile) -> int:
     """Return the seed; 0 where there is none."""
     seed = scene_file.data.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < _MAX_SEED:
         message = f"must be a whole number from 0 to {_MAX_SEED - 1}"
-        problems.append(scene_file.problem(("seed",), message, seed))
+        scene_file.report(("seed",), message, seed)
         return 0
     return seed
 
 
-def read_duration(scene_file: SceneFile, problems: list[Problem]) -> Fraction | None:
+def read_duration(scene_file: SceneFile) -> Fraction | None:
     """Return the length of the run in s, or None where it is left to the sources."""
     if "duration_s" not in scene_file.data:
         return None
@@ -239,52 +230,53 @@ def read_duration(scene_file: SceneFile, problems: list[Problem]) -> Fraction | 
         if duration <= 0:
             raise ValueError("must be greater than 0")
     except ValueError as error:
-        problems.append(scene_file.problem(("duration_s",), str(error), value))
+        scene_file.report(("duration_s",), str(error), value)
         return None
     return duration
 
 
-def read_sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, Parameters]:
+def read_sections(scene_file: SceneFile) -> dict[str, Parameters]:
     """Return the tables that belong to no block, also those with their defaults only."""
     read = {
-        name: _read_table(scene_file, (name,), model, scene_file.data.get(name, {}), problems)
+        name: read_table(scene_file, (name,), model, scene_file.data.get(name, {}))
         for name, model in section_models().items()
     }
     return {name: section for name, section in read.items() if section is not None}
 
 
-def _read_table(
-    scene_file: SceneFile, key: Key, model: type[_Model], table: Any, problems: list[Problem]
+def read_table(
+    scene_file: SceneFile, key: Key, model: type[_Model], table: Any, what: str = ""
 ) -> _Model | None:
-    """Return a table as its model; None where anything is wrong with it."""
+    """Return a table as its model; where anything is wrong with it, report that, and None.
+
+    Messages call it `what`, by default by its key.
+    """
     if not isinstance(table, dict):
-        problems.append(scene_file.problem(key, "must be a table", table))
+        scene_file.report(key, "must be a table", table)
         return None
     try:
         read = model.model_validate(table)
     except ValidationError as error:
-        problems += explain(scene_file, key, f"[{dotted(key)}]", model, error)
+        scene_file.problems += explain(scene_file, key, what or f"[{dotted(key)}]", model, error)
         return None
-    check_lookalikes(scene_file, key, table, read, problems)
+    check_lookalikes(scene_file, key, table, read)
     return read
 
 
-def read_blocks(
-    scene_file: SceneFile, problems: list[Problem], notes: list[str]
-) -> tuple[dict[str, Any], dict[str, Block]]:
+def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any], dict[str, Block]]:
     """Return the class of each block, None where it is not known, and the faultless blocks."""
     tables = scene_file.data.get("blocks", {})
     classes: dict[str, Any] = {}
     blocks: dict[str, Block] = {}
     if not isinstance(tables, dict) or not tables:
-        problems.append(scene_file.problem(("blocks",), "a scene needs at least one block"))
+        scene_file.report(("blocks",), "a scene needs at least one block")
         return classes, blocks
     for name in sorted(tables):
         key: Key = ("blocks", name)
         table = tables[name]
         classes[name] = None
         if not isinstance(table, dict):
-            problems.append(scene_file.problem(key, "must be a table", table))
+            scene_file.report(key, "must be a table", table)
             continue
         type_name = table.get("type")
         if not isinstance(type_name, str):
@@ -292,14 +284,14 @@ def read_blocks(
             close = nearest(str(name), typed)
             message = 'needs a type, for example type = "radar.swerling"'
             message += f"; or did you mean the block {close!r}?" if close else ""
-            problems.append(scene_file.problem((*key, "type"), message))
+            scene_file.report((*key, "type"), message)
             continue
         try:
             cls = find(type_name, dotted((*key, "type")), (scene_file.path.parent,))
         except NotImported:
             continue
         except UnknownType as error:
-            problems.append(scene_file.problem((*key, "type"), str(error), str(type_name)))
+            scene_file.report((*key, "type"), str(error), str(type_name))
             continue
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
@@ -318,14 +310,14 @@ def read_blocks(
                 cls = classes[name] = cls.class_for(parameters)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
-            problems += explain(scene_file, key, str(type_name), cls.Parameters, error)
+            scene_file.problems += explain(scene_file, key, str(type_name), cls.Parameters, error)
             continue
         except ForeignFailure as error:
             message = f"{cls.path()} cannot take its parameters: {error}"
-            problems.append(scene_file.problem(key, message))
+            scene_file.report(key, message)
             continue
-        check_lookalikes(scene_file, key, given, parameters, problems)
-        check_lookalikes(scene_file, key, extra, options, problems)
+        check_lookalikes(scene_file, key, given, parameters)
+        check_lookalikes(scene_file, key, extra, options)
         blocks[name] = Block(name, str(absolute(type_name)), cls, parameters, options)
     return classes, blocks
 
@@ -343,17 +335,15 @@ def _as_written(
 
 
 def read_processors(
-    scene_file: SceneFile, blocks: Mapping[str, Block], problems: list[Problem]
+    scene_file: SceneFile, blocks: Mapping[str, Block]
 ) -> dict[str, ProcessorParameters]:
     """Return the shared processors; blocks must name none besides."""
     tables = scene_file.data.get("processors", {})
     if not isinstance(tables, dict):
-        problems.append(scene_file.problem(("processors",), "must hold one table per processor"))
+        scene_file.report(("processors",), "must hold one table per processor")
         return {}
     read = {
-        name: _read_table(
-            scene_file, ("processors", name), ProcessorParameters, tables[name], problems
-        )
+        name: read_table(scene_file, ("processors", name), ProcessorParameters, tables[name])
         for name in sorted(tables)
     }
     for name, block in blocks.items():
@@ -361,5 +351,5 @@ def read_processors(
         if wanted is not None and wanted not in tables:
             declared = did_you_mean(wanted, tables) or f"; [processors.{wanted}] would declare it"
             message = f"the scene has no such processor{declared}"
-            problems.append(scene_file.problem(("blocks", name, "processor"), message, str(wanted)))
+            scene_file.report(("blocks", name, "processor"), message, str(wanted))
     return {name: processor for name, processor in read.items() if processor is not None}

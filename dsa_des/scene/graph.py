@@ -10,7 +10,6 @@ from collections.abc import Collection, Mapping, Sequence, Set
 import networkx as nx
 
 from dsa_des.block.component import Component
-from dsa_des.errors import Problem
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import Wire
 
@@ -40,10 +39,9 @@ def check_graph(
     scene: SceneFile,
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
     unsure: Set[str] = frozenset(),
 ) -> None:
-    """Add everything that is wrong with the wiring to `problems`.
+    """Report everything that is wrong with the wiring.
 
     Required inputs without a wire, blocks that no source reaches, cycles without a delay (each
     hop listed), and feedback wires that do not say what they hold before the first message.
@@ -57,13 +55,13 @@ def check_graph(
                 message = (
                     f"input {port!r} ({declared.message.__name__}) is required and has no wire"
                 )
-                problems.append(scene.problem(("blocks", name), message))
-    _check_cycles(scene, graph, problems)
+                scene.report(("blocks", name), message)
+    _check_cycles(scene, graph)
     if known == set(classes) and not unsure:
-        _check_reach(scene, graph, classes, problems)
+        _check_reach(scene, graph, classes)
 
 
-def _check_cycles(scene: SceneFile, graph: nx.DiGraph, problems: list[Problem]) -> None:
+def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
     now = undelayed(graph)
     for group in nx.strongly_connected_components(now):
         first = min(group)
@@ -78,7 +76,7 @@ def _check_cycles(scene: SceneFile, graph: nx.DiGraph, problems: list[Problem]) 
             f"a cycle without delay: {'; '.join(hops)}. Give one of these wires a delay "
             '(delay_s, or delay = "1 scan")'
         )
-        problems.append(scene.problem(("wires",), message))
+        scene.report(("wires",), message)
     looped = in_cycles(graph)
     for source, target, wires in graph.edges(data="wires"):
         if source in looped and target in looped and looped[source] == looped[target]:
@@ -88,31 +86,30 @@ def _check_cycles(scene: SceneFile, graph: nx.DiGraph, problems: list[Problem]) 
                         f"{wire} is a feedback wire: say what it holds before the first "
                         "message (holds = 'nothing' or a table)"
                     )
-                    problems.append(scene.problem(("wires",), message))
+                    scene.report(("wires",), message)
 
 
 def _check_reach(
     scene: SceneFile,
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
 ) -> None:
     sources = [
         name for name in graph if not any(port.required for port in classes[name].inputs.values())
     ]
     if not sources and len(graph):
         message = "no block is a source (has no required inputs)"
-        problems.append(scene.problem(("blocks",), message))
+        scene.report(("blocks",), message)
         return
     reached = set(sources).union(*(nx.descendants(graph, name) for name in sources))
     for name in sorted(set(graph) - reached):
         message = "no source reaches this block over the wires; wire it or remove it"
-        problems.append(scene.problem(("blocks", name), message))
+        scene.report(("blocks", name), message)
     if len(graph) > 1:
         for name in sources:
             if graph.out_degree(name) == 0 and not classes[name].stands_alone:
                 message = "this source is wired to nothing; wire it or remove it"
-                problems.append(scene.problem(("blocks", name), message))
+                scene.report(("blocks", name), message)
 
 
 def in_cycles(graph: nx.DiGraph) -> dict[str, int]:

@@ -96,33 +96,30 @@ def apply_changes(
     source: str = COMMAND_LINE,
     swap_source: str = COMMAND_LINE,
     option: str = "--swap",
-) -> tuple[list[Problem], list[str]]:
-    """Make changes of a scene's tables; return what is wrong and which parameters swaps dropped.
+) -> list[str]:
+    """Make changes of a scene's tables; return which parameters swaps dropped.
 
     Messages say that values are from `source` and types from `swap_source`, there named `option`.
     """
-    problems: list[Problem] = []
     dropped: list[str] = []
     for key, value in changes:
         if key.startswith(SWAP):
             name = key.removeprefix(SWAP)
-            wrong, gone = swap_type(scene, name, value, swap_source, option)
-            problems += wrong
-            dropped += gone
+            dropped += swap_type(scene, name, value, swap_source, option)
         else:
-            problems += set_value(scene, key, deepcopy(value), source)
-    return problems, dropped
+            scene.problems += _set_value(scene, key, deepcopy(value), source)
+    return dropped
 
 
-def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> list[Problem]:
-    """Apply all ``--set`` to the scene's tables and return what is wrong with them."""
-    result, problems = read_sets(assignments)
-    for text, value in result:
-        problems += set_value(scene, text, value, COMMAND_LINE)
-    return problems
+def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> None:
+    """Apply all ``--set`` to tables."""
+    values, problems = read_sets(assignments)
+    scene.problems += problems
+    for text, value in values:
+        scene.problems += _set_value(scene, text, value, COMMAND_LINE)
 
 
-def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
+def _set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
     """Put a value at a dotted key of the scene's tables and return what is wrong with that.
 
     Items of lists go by number or name: ``blocks.traffic.intruders[0].east_m``, or
@@ -180,29 +177,33 @@ def _extended(value: Any, source: str) -> Any:
 
 def swap_type(
     scene: SceneFile, name: str, type_name: str, source: str, option: str = "--swap"
-) -> tuple[list[Problem], list[str]]:
-    """Put another type into a block; return what is wrong, and the keys that the type lacks."""
+) -> list[str]:
+    """Put another type into a block; return the keys that it had and the type lacks."""
     if not isinstance(type_name, SourcedText):
         type_name = sourced(type_name, Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
-        return [Problem(source, option or name, f"the scene has no such block{hint}", name)], []
+        message = f"the scene has no such block{hint}"
+        scene.problems.append(Problem(source, option or name, message, name))
+        return []
     try:
         cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
         blocks[name]["type"] = type_name
         scene.sources[_type_key(name)] = source
-        return [], []
+        return []
     except UnknownType as error:
-        return [Problem(source, f"{option} {name}".strip(), str(error), str(type_name))], []
+        key = f"{option} {name}".strip()
+        scene.problems.append(Problem(source, key, str(error), str(type_name)))
+        return []
     block = blocks[name]
     dropped = sorted(key for key in block if key not in _known_keys(cls))
     for parameter in dropped:
         del block[parameter]
     block["type"] = type_name
     scene.sources[_type_key(name)] = source
-    return [], [f"blocks.{name}.{parameter}" for parameter in dropped]
+    return [f"blocks.{name}.{parameter}" for parameter in dropped]
 
 
 def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import SchemaValidator
 
 from dsa_des.block.component import Parameters, as_written
-from dsa_des.errors import Disagreements, Problem, did_you_mean, nearest
+from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 
@@ -108,7 +108,8 @@ def explain(
             instead = None if inside else getattr(model, "former", {}).get(name)
             allowed = _sibling_names(model, item["loc"])
             hint = f"; {instead}" if instead else did_you_mean(name, allowed)
-            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
+            kind = "parameter" if key else "key"
+            problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
         elif length := _list_length(model, item):
             given = _at(scene_file, at)
             problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
@@ -126,12 +127,16 @@ def explain(
         elif not item["loc"] and item["type"] == "value_error":
             texts = all_disagreements(model, item)
             problems += [_refused(scene_file, at, text, item["input"]) for text in texts]
+        elif isinstance(text := str(item.get("ctx", {}).get("error")), Lines):
+            problems.append(_refused(scene_file, at, text, item["input"]))
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)
             message = message.replace(
                 "a valid number, unable to parse string as a number", "a number"
             )
+            message = message.replace("a valid string", "text")
+            message = re.sub("a valid integer(, unable.*)?", "a whole number", message)
             message = re.sub("a valid boolean(, unable.*)?", "true or false", message)
             message = re.sub(r"a valid dictionary.*", "a table", message)
             message = re.sub("a valid (list|tuple)", "a list", message)
@@ -249,7 +254,7 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
 
 def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
     """Return the names allowed where `loc` points, following nested models as far as they go."""
-    names = list(model.model_fields)
+    names = [field.alias or name for name, field in model.model_fields.items()]
     for part in loc[:-1]:
         field = model.model_fields.get(part) if isinstance(part, str) else None
         if field is not None:

@@ -19,6 +19,7 @@ from dsa_des.scene.checks import (
     check_effects,
     check_times,
     read_blocks,
+    read_clocks,
     read_duration,
     read_processors,
     read_sections,
@@ -272,9 +273,9 @@ def load_tables(
     duration_s: object = None,
 ) -> Scene:
     """Override and check tables that were read; see `load_scene`."""
-    changes, problems = read_changes(sets, swaps, seed, duration_s)
-    wrong, dropped = apply_changes(scene_file, changes)
-    scene = check_scene(scene_file, problems + wrong)
+    changes, scene_file.problems = read_changes(sets, swaps, seed, duration_s)
+    dropped = apply_changes(scene_file, changes)
+    scene = check_scene(scene_file)
     scene.dropped = dropped
     return scene
 
@@ -282,21 +283,20 @@ def load_tables(
 def changed_tables(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
     """Return the checked scene that a program's changes make of tables; those stay as they are."""
     changed = file.copy()
-    problems, dropped = apply_changes(changed, changes, _SET, _SWAP, "")
-    scene = check_scene(changed, problems)
+    dropped = apply_changes(changed, changes, _SET, _SWAP, "")
+    scene = check_scene(changed)
     scene.dropped, scene._origin = dropped, (file, changes)
     return scene
 
 
-def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) -> Scene:
+def check_scene(scene_file: SceneFile) -> Scene:
     """Validate merged tables into a `Scene`.
 
     Raises
     ------
     SceneError
-        With every problem found, after those given.
+        With every problem found, after those that reading and changing it had.
     """
-    problems = [] if problems is None else problems
     data = scene_file.data
     for key, what, command in (("scene", "study", "study"), ("study", "case", "evidence")):
         if key in data and "blocks" not in data:
@@ -306,28 +306,28 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     for key in data:
         if key not in known:
             hint = did_you_mean(key, known)
-            problems.append(scene_file.problem((key,), f"unknown key of a scene{hint}"))
-    title = read_text(scene_file, "title", problems) or Path(scene_file.path).stem
-    description = read_text(scene_file, "description", problems)
-    seed = read_seed(scene_file, problems)
-    duration = read_duration(scene_file, problems)
-    sections = read_sections(scene_file, problems)
+            scene_file.report((key,), f"unknown key of a scene{hint}")
+    title = read_text(scene_file, "title") or Path(scene_file.path).stem
+    description = read_text(scene_file, "description")
+    seed = read_seed(scene_file)
+    duration = read_duration(scene_file)
+    sections = read_sections(scene_file)
     notes: list[str] = []
-    classes, blocks = read_blocks(scene_file, problems, notes)
+    classes, blocks = read_blocks(scene_file, notes)
     unsure: set[str] = set()
-    processors = read_processors(scene_file, blocks, problems)
+    processors = read_processors(scene_file, blocks)
     wires = with_latencies(
-        read_wires(scene_file, classes, problems, unsure),
+        read_wires(scene_file, classes, unsure),
         {name: block.options for name, block in blocks.items()},
     )
     graph = build_graph(list(classes), wires)
-    check_graph(scene_file, graph, classes, problems, unsure)
-    ticks_per_s = check_times(scene_file, blocks, wires, duration, problems, processors)
-    check_effects(scene_file, blocks, problems)
+    check_graph(scene_file, graph, classes, unsure)
+    clocks = read_clocks(scene_file, blocks)
+    ticks_per_s = check_times(scene_file, blocks, clocks, wires, duration, processors)
+    check_effects(scene_file, blocks)
     if not unsure:
-        check_activity(scene_file, blocks, wires, problems)
-    if problems:
-        raise SceneError(problems)
+        check_activity(scene_file, blocks, clocks, wires)
+    scene_file.refuse()
     return Scene(
         Path(scene_file.path),
         title,

@@ -54,12 +54,15 @@ class SceneFile:
     beside: dict[Key, dict[str, Any]] = field(default_factory=dict)
     #: Lists that take the place of inherited ones → the named items that are gone with these.
     replaced: dict[Key, list[str]] = field(default_factory=dict)
+    #: What is wrong with it: whoever reads it adds to them, and refuses it in the end.
+    problems: list[Problem] = field(default_factory=list)
 
     def copy(self) -> "SceneFile":
         """Return tables that can be changed without changing these."""
-        data, beside = deepcopy(self.data), dict(self.beside)
-        of_other_type, replaced = dict(self.of_other_type), dict(self.replaced)
-        return SceneFile(self.path, data, dict(self.sources), of_other_type, beside, replaced)
+        tables = replace(self, data=deepcopy(self.data), problems=[*self.problems])
+        for name in ("sources", "of_other_type", "beside", "replaced"):
+            setattr(tables, name, dict(getattr(self, name)))
+        return tables
 
     def source_of(self, key: Key) -> str:
         """Return the file in which `key`, or the nearest table around it, was written."""
@@ -71,6 +74,15 @@ class SceneFile:
     def problem(self, key: Key, message: str, *value: Any) -> Problem:
         """Return a `Problem` at `key`, naming the file that holds it."""
         return Problem(self.source_of(key), dotted(key), message, *value)
+
+    def report(self, key: Key, message: str, *value: Any) -> None:
+        """Add a problem at `key`."""
+        self.problems.append(self.problem(key, message, *value))
+
+    def refuse(self) -> None:
+        """Raise a `SceneError` of all problems, each said once, if there are any."""
+        if self.problems:
+            raise SceneError({str(problem): problem for problem in self.problems}.values())
 
 
 def read_scene_file(path: Path | str) -> SceneFile:

@@ -93,19 +93,17 @@ class Wire:
 def read_wires(
     scene: SceneFile,
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
-    unsure: set[str] | None = None,
+    unsure: set[str],
 ) -> list[Wire]:
-    """Return the wires of a scene, sorted; what is wrong is added to `problems`.
+    """Return the wires of a scene, sorted; what is wrong with them is reported.
 
     Wires of blocks whose class is None, not known, are not judged. `unsure` receives the blocks
     that a faulty wire meant to feed.
     """
     entries = scene.data.get("wires", [])
     if not isinstance(entries, list):
-        problems.append(scene.problem(("wires",), "must be a list of wires", entries))
-        if unsure is not None:
-            unsure.update(classes)  # its targets are unknown
+        scene.report(("wires",), "must be a list of wires", entries)
+        unsure.update(classes)  # its targets are unknown
         return []
     wires: list[Wire] = []
     for position, entry in enumerate(entries):
@@ -113,9 +111,8 @@ def read_wires(
         try:
             hops = _hops(entry)
         except _WireError as error:
-            problems.append(scene.problem((*key, *error.key), str(error), *error.value))
-            if unsure is not None:
-                unsure.update(classes)  # its target is unknown
+            scene.report((*key, *error.key), str(error), *error.value)
+            unsure.update(classes)  # its target is unknown
             continue
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
@@ -128,11 +125,11 @@ def read_wires(
                 wire = None
             if wire is not None:
                 wires.append(wire)
-            elif unsure is not None:
+            else:
                 name = target.partition(".")[0]
                 unsure.add(name if name in classes else nearest(name, classes) or name)
-        problems += of_wire
-    _two_writers(scene, wires, classes, problems)
+        scene.problems += of_wire
+    _two_writers(scene, wires, classes)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
 
@@ -246,7 +243,6 @@ def _two_writers(
     scene: SceneFile,
     wires: list[Wire],
     classes: Mapping[str, type[Component]],
-    problems: list[Problem],
 ) -> None:
     writers: dict[tuple[str, str], list[Wire]] = {}
     for wire in wires:
@@ -256,10 +252,10 @@ def _two_writers(
         if len(set(ends)) < len(ends):
             twice = sorted(end for end, count in Counter(ends).items() if count > 1)
             message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
-            problems.append(scene.problem(("wires",), message))
+            scene.report(("wires",), message)
         elif len(result) > 1 and not classes[target].inputs[input_name].many:
             message = f"{target}.{input_name} has {len(result)} writers: {', '.join(sorted(ends))}"
-            problems.append(scene.problem(("wires",), message))
+            scene.report(("wires",), message)
 
 
 def with_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:

@@ -200,5 +200,5 @@ def changed_scene(
     """Return the checked scene that swaps and values make of a scene's tables."""
     file, folder = base.copy(), Path(source).parent
     types = [(SWAP + block, sourced(name, folder)) for block, name in swaps]
-    problems, _ = apply_changes(file, [*types, *sets], source, source, "swap")
-    return check_scene(file, problems)
+    apply_changes(file, [*types, *sets], source, source, "swap")
+    return check_scene(file)

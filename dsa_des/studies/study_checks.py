@@ -1,7 +1,7 @@
 """Checks of a study that need its scenes: every value of every axis, its draws and its metrics."""
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -25,50 +25,45 @@ _MOST_DRAWN = 10_000
 _MOST_SCENES = 64
 
 
-def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
+def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    Problems name `file`, the study's, and the `scene` without axes is checked where no cell has
-    one that fits. Names of results are checked only where the `whole` study could be read.
+    Problems are those of `file`, the study's, and the `scene` without axes is checked where no cell
+    has one that fits. Names of results are checked only where the whole study could be read.
     """
-    problems: list[Problem] = []
-
-    def add(key: Key, message: str, *value: Any) -> None:
-        problems.append(file.problem(key, message, *value))
-
-    _check_axes(study, add)
+    whole, before = not file.problems, len(file.problems)
+    _check_axes(study, file)
     scenes: list[Scene] = []
     for cell in one_per_value(study):
         try:
             scenes.append(study.scene(cell))
         except SceneError as error:
-            problems += error.problems
+            file.problems += error.problems
     scenes = scenes or [scene]
     first = scenes[0]
-    _check_draws(study, first, add)
+    _check_draws(study, first, file)
     results: dict[str, Result] = {}
     for one in _different(scenes):
         where = "" if one is first else f" (with {_types(one, first)})"
-        built = _build_metrics(study, one, where, add)
+        built = _build_metrics(study, one, where, file)
         if one is first:
             for metric in built:
                 for result in metric.results():
                     if result.name in results:
-                        add(("metrics",), f"two metrics give the result {result.name}")
+                        file.report(("metrics",), f"two metrics give the result {result.name}")
                     results[result.name] = result
         if len(built) < len(study.metrics):
             whole = False
             break
     if whole:
-        _check_names(study, results, add)
-    if not problems:
-        problems += _check_set_up(study, scenes, file)
-    if not problems:
-        _check_ends(study, scenes, add)
-    return problems
+        _check_names(study, results, file)
+    if len(file.problems) == before:
+        _check_set_up(study, scenes, file)
+    if len(file.problems) == before:
+        _check_ends(study, scenes, file)
 
 
-def _check_ends(study: Study, scenes: list[Scene], add: Callable[..., None]) -> None:
+def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
     """Set up the last run of each sequence: what it counts may end before, as a file does."""
     last = study.replicas - 1
     for draw in study.draws:
@@ -84,7 +79,9 @@ def _check_ends(study: Study, scenes: list[Scene], add: Callable[..., None]) -> 
                 text = str(error)
             else:
                 continue
-            add(("draws", draw.key), f"of the last of {study.replicas} replicas: {text}", value)
+            file.report(
+                ("draws", draw.key), f"of the last of {study.replicas} replicas: {text}", value
+            )
             break
 
 
@@ -99,8 +96,8 @@ def _endless(study: Study, scans: float) -> str:
     )
 
 
-def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
-    """Set up a run, and return what is wrong with it or with the metrics.
+def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
+    """Set up a run, and report what is wrong with it or with the metrics.
 
     Where a metric needs something of the blocks, one scene of the study that has it is enough. Of
     many files one may be damaged: its runs fail by themselves.
@@ -113,7 +110,8 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
             recorder = Recorder([], wanted=dict.fromkeys(_tables_read(study, scene), ()))
             simulation = Simulation(scene_of(scene, study.replica(0)), recorder=recorder)
             if wrong is None and (said := _endless(study, simulation.scans)):
-                return [file.problem(("replicas",), said)]
+                file.report(("replicas",), said)
+                return
             blocks = simulation.components
         except (SceneError, BlockFailure) as error:
             if wrong is None:
@@ -122,7 +120,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
                 else:
                     broken.append(file.problem((), str(error)))
                 if not files:
-                    return broken
+                    break
             continue
         refused: dict[int, str] = {}
         for spec in study.metrics:
@@ -137,24 +135,25 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
         if not wrong:
             break
     if wrong is None:
-        return broken
+        file.problems += broken
     names = {spec.index: spec.name for spec in study.metrics}
-    return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
+    for k, text in (wrong or {}).items():
+        file.report(("metrics", k), text, names[k])
 
 
-def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
+def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
     names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.summed_up]
 
     def missing(key: Key, name: str) -> None:
-        add(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
+        file.report(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
 
     if study.stop_when and study.stop_when.metric not in names:
         missing(("stop_when", "metric"), study.stop_when.metric)
     weight = study.compare_weight
     if weight is not None and (weight not in results or results[weight].kind != NUMBER):
         message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
-        add(("compare", "weight"), message, weight)
+        file.report(("compare", "weight"), message, weight)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
             missing(("requirements", number, "metric"), wanted.metric)
@@ -162,7 +161,7 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
         if figure.kind == "series":
             if not of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
-                add(("figures", number, "metric"), message, str(figure.metric))
+                file.report(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
             missing(("figures", number, "metric"), str(figure.metric))
         elif figure.kind in ("histogram", "cdf") and (
@@ -173,20 +172,20 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
             what = {"event": "an event, 0 or 1"}.get(results[str(figure.metric)].kind, "a ratio")
             message = f"is {what}: a {figure.kind} shows how numbers are spread"
             message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""
-            add(("figures", number, "metric"), message, str(figure.metric))
+            file.report(("figures", number, "metric"), message, str(figure.metric))
 
 
-def _check_axes(study: Study, add: Callable[..., None]) -> None:
+def _check_axes(study: Study, file: SceneFile) -> None:
     """Report a key that two axes set: the second would win without a word."""
     owner: dict[tuple[str | int, ...], str] = {}
     for axis in study.axes:
         for key in {key for sets in axis.sets for key, _ in sets}:
             first = owner.setdefault(key_in(study.base.data, key), axis.key)
             if first != axis.key:
-                add(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
+                file.report(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
 
 
-def _check_draws(study: Study, scene: Scene, add: Callable[..., None]) -> None:
+def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
     """Report draws of values that the scene does not allow, and of keys that are axes."""
     tables = study.base.data
     on_axes = {
@@ -197,14 +196,14 @@ def _check_draws(study: Study, scene: Scene, add: Callable[..., None]) -> None:
     }
     for draw in study.draws:
         if axis := on_axes.get(key_in(tables, draw.key)):
-            add(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
+            file.report(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
         for value in _worst(draw, study):
             try:
                 scene_of(scene, Replica(0, {draw.key: value}))
             except SceneError as error:
                 for problem in error.problems:
                     shown = float(value) if isinstance(value, Fraction) else value
-                    add(("draws", draw.key), problem.message, shown)
+                    file.report(("draws", draw.key), problem.message, shown)
                 if draw.kind != "choice":
                     break
 
@@ -225,16 +224,14 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     return list(dict.fromkeys([min(drawn), max(drawn)]))
 
 
-def _build_metrics(
-    study: Study, scene: Scene, where: str, add: Callable[..., None]
-) -> list[Metric]:
+def _build_metrics(study: Study, scene: Scene, where: str, file: SceneFile) -> list[Metric]:
     """Return the study's metrics for a scene; what the scene lacks is a problem."""
     built: list[Metric] = []
     for spec in study.metrics:
         try:
             built.append(spec.build(scene))
         except ValueError as error:
-            add(("metrics", spec.index), f"{error}{where}", spec.name)
+            file.report(("metrics", spec.index), f"{error}{where}", spec.name)
     return built
 
 

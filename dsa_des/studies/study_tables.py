@@ -1,15 +1,14 @@
-"""Tables of a study file: figures, requirements, draws, and paths seen from anywhere."""
+"""Tables of a study file: its keys, figures and requirements, and paths seen from anywhere."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from dsa_des.block.component import SourcedText
-from dsa_des.errors import did_you_mean
-from dsa_des.results.record import FigureRecord, Requirement, as_text
-from dsa_des.scene.scene_file import Key
-from dsa_des.studies.axes import Axis
+from dsa_des.results.record import FigureKind, FigureRecord, as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
@@ -73,6 +72,79 @@ def json_safe(value: Any) -> Any:
     return as_text(value)
 
 
+def _listed(items: Any) -> Any:
+    if not isinstance(items, list):
+        raise ValueError("must be a list of tables, each under its name in [[ ]]")
+    return items
+
+
+def _named(name: Any) -> Any:
+    if not isinstance(name, str):
+        raise ValueError("must be the name of a result")
+    return name
+
+
+_Tables = Annotated[list[Any], BeforeValidator(_listed)]
+_ResultName = Annotated[str, BeforeValidator(_named)]
+_Whole = Annotated[int, Field(ge=0)]
+
+
+class _Table(BaseModel):
+    """A table of a study file, as far as it can be judged without the scene."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+
+class StudyKeys(_Table):
+    """The keys of a study file; of those without a type the values are judged one by one."""
+
+    title: Any = None
+    description: Any = None
+    scene: Any = None
+    set: dict[str, Any] = {}
+    swap: dict[str, Any] = {}
+    seed: _Whole = 0
+    replicas: int = Field(default=1, ge=1)
+    axes: dict[str, Any] = {}
+    draws: dict[str, Any] = {}
+    metrics: Any = None
+    figures: _Tables = []
+    requirements: _Tables = []
+    stop_when: Any = None
+    compare: Any = None
+    over: str | list[str] | None = None
+    confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
+    interval: Literal["t", "bootstrap"] = "t"
+    runs_per_chunk: int | None = Field(default=None, ge=1)
+
+
+class StopWhenTable(_Table):
+    """When a cell has enough replicas."""
+
+    metric: _ResultName
+    half_width: float = Field(gt=0)
+    batch: int | None = Field(default=None, ge=2)
+
+
+class CompareTable(_Table):
+    """With which value of which axis the others are compared."""
+
+    axis: str
+    baseline: Any
+    weight: _ResultName | None = None
+
+
+def _several(limits: Any) -> Any:
+    return limits if isinstance(limits, list) else [limits]
+
+
+class FigureTable(FigureRecord):
+    """A figure as a study file states it; `FIGURES` has the keys of each kind."""
+
+    kind: FigureKind = "axis"
+    limits: Annotated[list[float], BeforeValidator(_several)] = Field(default=[], alias="limit")
+
+
 FIGURES = {
     "axis": ("metric", "axis", "lines"),
     "heat": ("metric", "x", "y"),
@@ -83,136 +155,20 @@ FIGURES = {
     "series": ("metric", "freedom", "limit"),
     "run": ("cell", "replica"),
 }
-_MOST_FREEDOM = 1e6
-_AXES = ("axis", "lines", "x", "y")
+AXES_OF_FIGURES = ("axis", "lines", "x", "y")
 
 
-def _each_table(
-    name: str, items: Any, add: Callable[..., None]
-) -> Iterator[tuple[Key, dict[str, Any]]]:
-    """Give key and content of each table of a list; what else it holds is a problem."""
-    if not isinstance(items, list):
-        add((name,), f"must be a list of tables ([[{name}]])")
-        return
-    for number, item in enumerate(items):
-        if isinstance(item, dict):
-            yield (name, number), item
-        else:
-            add((name, number), f"must be a table ([[{name}]])", item)
+class RequirementTable(_Table):
+    """A limit on a result, and the axis along which the cheapest value is looked for."""
 
+    metric: _ResultName
+    axis: str
+    most: float | None = None
+    least: float | None = None
+    cheaper: Literal["first", "last"] = "first"
 
-def read_figures(
-    items: Any,
-    axes: tuple[Axis, ...],
-    replicas: int,
-    column: Callable[[Key, Any, tuple[Axis, ...]], str | None],
-    add: Callable[..., None],
-) -> tuple[FigureRecord, ...]:
-    """Return the figures of a study.
-
-    `column` gives the column of the axis that a name means, or reports that there is none; `add`
-    takes the key, the message and the value of a problem.
-    """
-    most = {"cell": math.prod(len(axis.labels) for axis in axes), "replica": replicas}
-    figures: list[FigureRecord] = []
-    for key, item in _each_table("figures", items, add):
-        kind = item.get("kind", "axis")
-        if not isinstance(kind, str) or kind not in FIGURES:
-            add((*key, "kind"), f"there is no such figure{did_you_mean(str(kind), FIGURES)}", kind)
-            continue
-        figure: dict[str, Any] = {"kind": str(kind)}
-        for name, value in item.items():
-            allowed = ("kind", "title", *FIGURES[kind])
-            if name not in allowed:
-                hint = did_you_mean(name, allowed)
-                add((*key, name), f"unknown key of a {kind} figure{hint}")
-            elif name in _AXES:
-                figure[name] = column((*key, name), value, axes) or ""
-            elif name in most:
-                whole = isinstance(value, int) and not isinstance(value, bool)
-                if not whole or not 0 <= value < most[name]:
-                    message = f"must be the number of a {name} of this study: 0 to {most[name] - 1}"
-                    add((*key, name), message, value)
-                figure[name] = value
-            elif name == "freedom":
-                degrees = number_of(value)
-                if degrees is None or not 0.0 < degrees <= _MOST_FREEDOM:
-                    message = "must be degrees of freedom: above 0, at most "
-                    add((*key, name), f"{message}{_MOST_FREEDOM:g}", value)
-                figure[name] = degrees
-            elif name == "limit":
-                figure["limits"] = _limits(value)
-                if not figure["limits"]:
-                    add((*key, name), "must be a finite number, or a list of them", value)
-            elif name != "kind":
-                figure[name] = value
-        if kind != "run" and "metric" not in figure:
-            add(key, "needs a metric: the name of a result")
-            figure["metric"] = ""
-        if kind in ("heat", "map") and len(axes) < 2:
-            what = "heat map" if kind == "heat" else "map"
-            add(key, f"a {what} needs two axes; the study has {len(axes)}")
-        chosen = [axis for axis in axes if figure.get("axis", axes[0].column) == axis.column]
-        if kind == "polar" and chosen and not chosen[0].numeric:
-            add(key, f"a polar figure needs an axis in degrees; {chosen[0].column} is no number")
-        # What is wrong with it is reported, and then no study is made.
-        figures.append(FigureRecord.model_construct(**figure))
-    return tuple(figures)
-
-
-def _limits(value: Any) -> list[float]:
-    """Return the limits that a figure draws contours of; none where one is no finite number."""
-    numbers = [number_of(item) for item in (value if isinstance(value, list) else [value])]
-    limits = [number for number in numbers if number is not None]
-    return limits if len(limits) == len(numbers) else []
-
-
-_KEYS = ("metric", "axis", "most", "least", "cheaper")
-
-
-def read_requirements(
-    items: Any,
-    axes: tuple[Axis, ...],
-    column: Callable[[Key, Any, tuple[Axis, ...]], str | None],
-    add: Callable[..., None],
-) -> tuple[Requirement, ...]:
-    """Return the requirements of a study file.
-
-    `column` and `add` are those of `read_figures`.
-    """
-    requirements = []
-    for key, item in _each_table("requirements", items, add):
-        for name in item:
-            if name not in _KEYS:
-                add((*key, name), f"unknown key of a requirement{did_you_mean(name, _KEYS)}")
-        limits = [name for name in ("most", "least") if name in item]
-        if len(limits) != 1:
-            add(key, "needs one limit: most = NUMBER, or least = NUMBER")
-            continue
-        limit = number_of(item[limits[0]])
-        if limit is None:
-            add((*key, limits[0]), "must be a finite number", item[limits[0]])
-        said = {
-            "metric": "the name of a result", "axis": "along which the cheapest is looked for",
-        }  # fmt: skip
-        for name, what in said.items():
-            if not isinstance(item.get(name), str):
-                add((*key, name), f"is required: {what}")
-        cheaper = item.get("cheaper", "first")
-        if cheaper not in ("first", "last"):
-            message = "must be 'first' or 'last': which end of the axis is the cheap one"
-            add((*key, "cheaper"), message, cheaper)
-        if not isinstance(item.get("axis"), str) or not isinstance(item.get("metric"), str):
-            continue
-        along = column((*key, "axis"), item["axis"], axes)
-        if along is not None and limit is not None:
-            below, last = limits[0] == "most", cheaper == "last"
-            requirements.append(Requirement(str(item["metric"]), along, limit, below, last))
-    return tuple(requirements)
-
-
-def number_of(value: Any) -> float | None:
-    """Return a finite number of a file, or None."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return None
-    return float(value)
+    @model_validator(mode="after")
+    def _one_limit(self) -> Self:
+        if (self.most is None) == (self.least is None):
+            raise ValueError("needs one limit: most = NUMBER, or least = NUMBER")
+        return self

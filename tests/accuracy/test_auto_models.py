@@ -8,13 +8,11 @@ from typing import Any
 import pytest
 from accuracy_scenes import Listener, run, true_errors, write_scene
 from click.testing import CliRunner
+from same_runs import same_as_alone
 
 from components.line_of_sight.rungs import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -226,16 +224,5 @@ def test_replicas_in_lock_step_pick_the_same_models_as_separate_runs(tmp_path: P
         load_scene(path, seed=seed, sets=[f"blocks.radar.reference_pd={0.8 + 0.01 * seed}"])
         for seed in (1, 2)
     ]
-    together = MemorySink()
-    simulation = lock_step(scenes, recorder=Recorder([together]))
-    simulation.run()
+    simulation = same_as_alone(scenes)
     assert simulation.components["transform"].rung.earth == "flat_earth"
-    rows = together.tables()["detections"].to_pylist()
-    for number, scene in enumerate(scenes):
-        alone = MemorySink()
-        Simulation(scene, recorder=Recorder([alone])).run()
-        expected = alone.tables()["detections"].to_pylist()
-        assert expected
-        assert [row for row in rows if row["replica"] == number] == [
-            {"replica": number, **row} for row in expected
-        ]

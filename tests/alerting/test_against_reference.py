@@ -7,8 +7,8 @@ from components.alert_configuration.conf_file import read_conf
 from components.alerting.alert_tables import alert_table, without_memory
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import alert_levels
+from components.arguments.units import FOOT_M
 from components.well_clear.tcas import tcas_span
-from components.well_clear.volume import FOOT_M
 from tests.alerting.reference_data import reference_file, reference_text, rows
 
 TIMES = slice(5, 8)

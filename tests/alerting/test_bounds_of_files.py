@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dsa_des
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.encounter import _bounds, read_encounter
 from tests.alerting.conf_text import CONF
@@ -65,3 +66,18 @@ def test_a_sample_at_another_instant_than_the_ownship_s_is_left_out(tmp_path: Pa
     assert [found.relative[row][0, 0] for row in (0, 1)] == pytest.approx(
         [-0.03 * 60 * 1852 * math.cos(math.radians(41.29)), -0.02 * 60 * 1852], rel=1e-3
     )
+
+
+def test_problems_of_a_configuration_in_a_scene_are_said_line_by_line(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.conf"
+    wrong.write_text("lookahed_time = 180 [s]\nturn_rate = -3 [deg/s]\n")
+    for scene, key in (
+        ("alerting/first_light", "blocks.alerting.conf"),
+        ("avoidance/crossing", "blocks.avoidance.conf"),
+    ):
+        with pytest.raises(dsa_des.SceneError) as caught:
+            dsa_des.load_scene(scene, sets=[f"{key}={wrong}"])
+        (problem,) = caught.value.problems
+        first, *rest = str(problem).splitlines()
+        assert f"{key} = " in first and first.endswith(f": {wrong}: 3 problems")
+        assert [line.split(":")[0] for line in rest[:2]] == ["  line 1", "  line 2"]

@@ -295,7 +295,7 @@ def test_daa_holds_every_row_in_its_units():
         ("kml", "scans", "own_roll_rad", None, "there is no column 'own_roll_rad'"),
         ("kml", "detections", "time_s", 1e300, "detections.parquet: time_s in row 0 is 1e+300"),
         ("view", "truth", "lat_deg", None, "truth.parquet: there is no column 'lat_deg'"),
-        ("view", "detections", "azimuth_rad", "x", "its tables are not those of a run"),
+        ("view", "detections", "azimuth_rad", "x", "azimuth_rad holds no numbers"),
     ],
 )
 def test_damaged_run_folders_are_said(run, tmp_path, to, table, column, value, said):

@@ -5,25 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.field_of_view import inside
+from components.geometry import FieldOfView
 
-GOOD = {
-    "azimuth_min_rad": -1.0,
-    "azimuth_max_rad": 1.0,
-    "elevation_min_rad": -0.5,
-    "elevation_max_rad": 0.5,
-}
+GOOD = {"azimuth_rad": (-1.0, 1.0), "elevation_rad": (-0.5, 0.5)}
 
 
-def seen(p_deg, low_deg, high_deg, q_deg=0.0):
-    return inside(
-        np.radians(p_deg),
-        np.radians(q_deg),
-        azimuth_min_rad=np.radians(low_deg),
-        azimuth_max_rad=np.radians(high_deg),
-        elevation_min_rad=np.radians(-30),
-        elevation_max_rad=np.radians(30),
-    )
+def seen(p_deg, low_deg, high_deg):
+    """Whether an azimuth is seen; whole turns are taken off in degrees, which is exact."""
+    field = FieldOfView(tuple(np.radians([low_deg, high_deg])), tuple(np.radians([-30, 30])))
+    p_deg = np.asarray(p_deg, dtype=float)
+    p_deg = p_deg - 360.0 * np.ceil((p_deg - 180.0) / 360.0)
+    return field.holds(np.radians(p_deg), np.zeros(p_deg.shape))
 
 
 # field (deg), azimuths inside, azimuths outside
@@ -54,13 +46,11 @@ def test_fields(field, within, outside):
 
 def test_bounds_without_a_turn_are_exact():
     low, high = np.radians(-50.0), np.radians(50.0)
-    field = GOOD | {"azimuth_min_rad": low, "azimuth_max_rad": high}
-    assert inside(low, -0.5, **field)
-    assert inside(high, 0.5, **field)
-    assert not inside(np.nextafter(low, -1), 0, **field)
-    assert not inside(np.nextafter(high, 1), 0, **field)
-    assert not inside(0, np.nextafter(0.5, 1), **field)
-    assert not inside(0, np.nextafter(-0.5, -1), **field)
+    field = FieldOfView((low, high), (-0.5, 0.5))
+    assert field.holds(np.array([low, high]), np.array([-0.5, 0.5])).all()
+    azimuth = np.array([np.nextafter(low, -1), np.nextafter(high, 1), 0.0, 0.0])
+    elevation = np.array([0.0, 0.0, np.nextafter(0.5, 1), np.nextafter(-0.5, -1)])
+    assert not field.holds(azimuth, elevation).any()
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
@@ -74,9 +64,8 @@ def test_against_arithmetic_in_whole_degrees(azimuth, low, width):
 
 
 def test_shapes():
-    grid = seen([[0.0], [60.0]], -10, 10, [0.0, 20.0, 40.0])
-    assert grid.tolist() == [[True, True, False], [False, False, False]]
-    assert seen([[0.0], [60.0]], -180, 180, 0.0).shape == (2, 1)
+    assert seen([[0.0], [60.0]], -10, 10).tolist() == [[True], [False]]
+    assert seen([[0.0], [60.0]], -180, 180).shape == (2, 1)
     assert seen([], -10, 10).shape == (0,)
 
 
@@ -92,14 +81,13 @@ def test_shapes():
     ],
 )
 def test_bad_bounds_are_named(name, value):
+    angle, end, _ = name.split("_")
+    bounds = list(GOOD[f"{angle}_rad"])
+    bounds[end == "max"] = value
     with pytest.raises(ValueError, match=f"^{name} is {value}: it must"):
-        inside(0.0, 0.0, **(GOOD | {name: value}))
+        FieldOfView(**(GOOD | {f"{angle}_rad": tuple(bounds)}))
 
 
-def test_other_bad_input_is_named():
+def test_a_sector_of_more_than_a_turn_is_named():
     with pytest.raises(ValueError, match=r"azimuth_min_rad is 6\.2: it must be at most one turn"):
-        inside(0, 0, **(GOOD | {"azimuth_min_rad": 6.2, "azimuth_max_rad": -1.0}))
-    with pytest.raises(ValueError, match="azimuth_rad is nan"):
-        inside(np.nan, 0, **GOOD)
-    with pytest.raises(ValueError, match="elevation_rad is inf"):
-        inside(0, np.inf, **GOOD)
+        FieldOfView((6.2, -1.0), (-0.5, 0.5))

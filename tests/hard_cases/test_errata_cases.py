@@ -14,7 +14,7 @@ import pytest
 from pydantic import ValidationError
 
 from components.aircraft.aspect_tables import RcsTable, dbsm_to_m2
-from components.geometry.field_of_view import inside
+from components.geometry import FieldOfView
 from components.radar.detection import (
     detection_probability,
     detection_threshold,
@@ -184,16 +184,11 @@ FIELDS = [
 
 @pytest.mark.parametrize(("source", "field", "seen", "unseen"), FIELDS)
 def test_field_of_view(source, field, seen, unseen):
-    limits = {
-        "azimuth_min_rad": field[0] * DEG,
-        "azimuth_max_rad": field[1] * DEG,
-        "elevation_min_rad": -0.5,
-        "elevation_max_rad": 0.5,
-    }
-    for azimuth in seen:
-        assert inside(azimuth * DEG, 0.0, **limits), azimuth
-    for azimuth in unseen:
-        assert not inside(azimuth * DEG, 0.0, **limits), azimuth
+    looked = FieldOfView((field[0] * DEG, field[1] * DEG), (-0.5, 0.5))
+    # A bearing of -180 is that of 180: azimuths are in (-180, 180].
+    azimuth = np.array([180 if deg == -180 else deg for deg in (*seen, *unseen)]) * DEG
+    inside = looked.holds(azimuth, np.zeros(len(azimuth)))
+    assert inside.tolist() == [True] * len(seen) + [False] * len(unseen)
 
 
 TABLE = RcsTable.from_rows([350, 10, 350, 10], [0, 0, 90, 90], [0.0, 10.0, 20.0, 20.0])

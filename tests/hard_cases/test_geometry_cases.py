@@ -6,11 +6,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from components.geometry import ellipsoid
+from components.geometry import FieldOfView, ellipsoid
 from components.geometry.angles import longitude_difference_deg
 from components.geometry.attitude import body_angles, relative_attitude
 from components.geometry.earth_models import EARTH_MODELS, LineOfSight
-from components.geometry.field_of_view import inside
 from components.geometry.sensor_axes import sensor_angles
 
 DEG = math.pi / 180
@@ -179,12 +178,6 @@ def test_aspect_does_not_depend_on_our_own_heading():
 def test_afrl_field_of_view_is_220_degrees():
     # errata 23b: 220 degrees (±110), wider than a half turn
     p = np.array([-111, -110, -90, 0, 110, 111, 180]) * DEG
-    got = inside(
-        p,
-        0.0,
-        azimuth_min_rad=-110 * DEG,
-        azimuth_max_rad=110 * DEG,
-        elevation_min_rad=-30 * DEG,
-        elevation_max_rad=30 * DEG,
-    )
+    field = FieldOfView((-110 * DEG, 110 * DEG), (-30 * DEG, 30 * DEG))
+    got = field.holds(p, np.zeros(len(p)))
     assert got.tolist() == [False, True, True, True, True, False, False]

@@ -181,7 +181,7 @@ def test_a_shipped_study_is_found_by_its_name_and_changed_by_sets():
     [
         ("first_light", {}, "first_light.toml: is a scene, not a study"),
         ({"blocks": {}}, {}, "study: metrics: is missing"),
-        ("radar_scan_rate", {"replicas": 0}, "replicas = 0: must be a whole number of 1 or more"),
+        ("radar_scan_rate", {"replicas": 0}, "replicas = 0: must be greater than or equal to 1"),
         ("radar_scan_rate", {"titel": "x"}, "titel: unknown key of a study; did you mean 'title'"),
         ("radar_scan_ratte", {}, "did you mean the shipped 'radar_scan_rate'"),
         ("first_light", {"metrics": ["first_detection"], "sets": ["seed=1"]}, "study: sets"),

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from same_runs import tables_of
 
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
@@ -16,13 +17,6 @@ SCENE = "configs/benchmark/manoeuvres.toml"
 MANY = "blocks.traffic.intruders=30"
 
 
-def run(scene, **kwargs):
-    sink = MemorySink()
-    simulation = Simulation(scene, recorder=Recorder([sink]), **kwargs)
-    simulation.run()
-    return simulation, sink.tables()
-
-
 @pytest.mark.parametrize(
     "sets",
     [
@@ -34,9 +28,9 @@ def run(scene, **kwargs):
 )
 def test_any_window_gives_the_same_rows(sets):
     scene = load_scene(SCENE, sets=sets, duration_s="90")
-    _, scan_by_scan = run(scene, window=1)
+    _, scan_by_scan = tables_of(scene, window=1)
     for window in (None, 64):
-        simulation, tables = run(scene, window=window)
+        simulation, tables = tables_of(scene, window=window)
         assert all(node.windowed for node in simulation.nodes.values())
         for table, rows in scan_by_scan.items():
             assert tables[table].equals(rows), (window, table)
@@ -65,7 +59,7 @@ def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
     from components.flights.many_flights import SteeredFleet
 
     scene = load_scene(SCENE, sets=[MANY], duration_s="90")
-    _, expected = run(scene)
+    _, expected = tables_of(scene)
     first_turn_s = expected["manoeuvres"]["time_s"][0].as_py() + 0.5
     straight = SteeredFleet.each
 
@@ -75,7 +69,7 @@ def test_a_failure_after_a_rewound_instant_never_happened(monkeypatch):
         return straight(self, aircraft, time_s, known)
 
     monkeypatch.setattr(SteeredFleet, "each", refuse_to_go_straight)
-    _, tables = run(scene)
+    _, tables = tables_of(scene)
     assert all(tables[name].equals(rows) for name, rows in expected.items())
 
 
@@ -92,7 +86,7 @@ def test_a_failure_that_happens_is_reported(monkeypatch):
 
     monkeypatch.setattr(TrackerStub, "run", fails)
     with pytest.raises(BlockFailure, match="out of tracks") as caught:
-        run(scene)
+        tables_of(scene)
     assert "t = 40.000 s" in str(caught.value)
 
 
@@ -142,7 +136,7 @@ def failing_from(monkeypatch, block, time_s):
 
 def test_blocks_that_no_loop_leads_to_run_ahead(cued):
     """Few long windows for them, and those of the delay for the loop; the rows are the same."""
-    _, scan_by_scan = run(cued, window=1)
+    _, scan_by_scan = tables_of(cued, window=1)
     calls = dict.fromkeys(("traffic", "gate", "eo", "radar", "tracker", "cues"), 0)
 
     class Counted(Simulation):
@@ -173,4 +167,4 @@ def test_who_runs_ahead_fails_when_its_time_has_come(cued, monkeypatch, gate_s, 
     failing_from(monkeypatch, Gate, gate_s)
     failing_from(monkeypatch, Cues, cues_s)
     with pytest.raises(BlockFailure, match=said):
-        run(cued)
+        tables_of(cued)

@@ -163,6 +163,8 @@ def test_the_side_is_the_smaller_one_four_times_of_five():
     down = [steering((-60.0, 50.0), False, Draws(0.9, u, 0.5)) < 0.0 for u in uniforms(1000)]
     assert np.mean(down) == pytest.approx(0.5, abs=0.002)
     assert steering(near, True, None) == pytest.approx(-0.30 - TURN.fixed)
+    assert steering((-0.3, 0.3), True, None) == pytest.approx(0.3 + TURN.fixed)
+    assert steering((-3.0, 3.1), True, None) == -math.pi
     assert steering((-math.inf, 0.2), True, Draws(0.9, 0.0, 0.5)) > 0.0
     assert steering((-math.inf, math.inf), True, None) == 0.0
     assert steering((-10.0, 20.0), False, None) == pytest.approx(-10.0 - CLIMB.fixed)

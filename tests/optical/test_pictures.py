@@ -12,7 +12,7 @@ from same_runs import same_as_alone, same_in_any_window
 
 import components.optical.image as image
 from components.optical.flow import find_spot
-from components.optical.picture import Pinhole, coverage, target_outlines, union_coverage
+from components.optical.picture import Pinhole, coverages, target_outlines, union_coverage
 from components.optical.silhouette import union_area
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
@@ -73,6 +73,13 @@ def test_a_pinhole_keeps_lines_straight_and_comes_back():
     assert row == pytest.approx(1000.0 * share)
     assert pinhole.direction(column, row) == pytest.approx((azimuth, elevation))
     assert np.isnan(pinhole.pixel(0.4 + 2.0, 0.0)).all()  # behind
+
+
+def coverage(corners, rows, columns):
+    picture = np.zeros((rows, columns))
+    ((box, share),) = coverages(corners[np.newaxis], rows, columns)
+    picture[box] = share
+    return picture
 
 
 def test_pixels_are_covered_by_the_exact_share():

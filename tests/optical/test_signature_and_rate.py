@@ -69,37 +69,6 @@ def test_angle_between_against_40_digits(first, step, exponent):
     assert angle == pytest.approx(angle_between(*second, *first), rel=1e-13, abs=1e-300)
 
 
-def test_wrap_is_no_jump_in_either_model():
-    for model in ("exact", "thesis"):
-        rate = line_of_sight_rate(-np.pi + 1e-4, 0.0, np.pi - 1e-4, 0.0, 0.05, model=model)
-        assert rate == pytest.approx(2e-4 / 0.05, rel=1e-9)
-
-
-def test_overhead_pass_is_fast_only_by_the_thesis():
-    # Errata, numerical facts: overhead at 89.9 degrees, 20 Hz: azimuth turns by half a circle
-    # between frames, the line of sight by 0.2 degrees.
-    look = (np.pi, np.radians(89.9), 0.0, np.radians(89.9), 0.05)
-    assert line_of_sight_rate(*look, model="thesis") == pytest.approx(np.pi * 20.0, rel=1e-12)
-    assert line_of_sight_rate(*look) == pytest.approx(np.radians(0.2) * 20.0, rel=1e-12)
-    # At 60 degrees elevation the thesis's rate is twice the truth.
-    look = (1e-4, np.radians(60.0), 0.0, np.radians(60.0), 0.05)
-    ratio = line_of_sight_rate(*look, model="thesis") / line_of_sight_rate(*look)
-    assert ratio == pytest.approx(2.0, rel=1e-6)
-
-
-def test_first_look_has_no_rate_and_missed_frames_divide_by_their_time():
-    rate = line_of_sight_rate(
-        [0.1, 0.1, 0.1],
-        0.0,
-        [0.0, np.nan, 0.0],
-        [0.0, np.nan, 0.0],
-        [0.05, np.nan, 0.15],
-        seen_before=[True, False, True],
-    )
-    np.testing.assert_allclose(rate, [2.0, 0.0, 0.1 / 0.15], rtol=1e-14)
-    assert line_of_sight_rate(0.1, 0.0, 9.0, 9.0, 0.0, seen_before=False) == 0.0
-
-
 def test_each_replica_s_targets_are_compared_with_their_own_look_before():
     """Windows of three replicas at once, against a dictionary of the last look of each target."""
     rng = np.random.default_rng(4)
@@ -127,16 +96,6 @@ def test_each_replica_s_targets_are_compared_with_their_own_look_before():
                 wanted.append(apart / (tick[k] - before_tick) * ticks_per_s)
             last[scanned] = (now, tick[k])
         np.testing.assert_allclose(together(cells), wanted, rtol=1e-12)
-
-
-def test_closed_form_range_is_where_confidence_changes_sign():
-    area = np.array([0.5, 12.0, 42.0, 90.0, 740.0])
-    for b_v in (0.0, 0.4):
-        distance = detection_range(area, **PIXEL, contrast_gain=0.7, dynamic_signature=b_v)
-        for factor, sign in ((1 - 1e-9, 1.0), (1 + 1e-9, -1.0)):
-            pixels = pixels_covered(area, distance * factor, **CAMERA)
-            signature = total_signature(pixels, b_v, contrast_gain=0.7, dynamic_weight=1.0)
-            assert np.all(np.sign(confidence(signature)) == sign)
 
 
 def test_detection_range_at_its_ends():

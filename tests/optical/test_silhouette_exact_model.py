@@ -88,15 +88,6 @@ def test_area_is_never_negative_and_turns_with_the_circle(
         assert turned == pytest.approx(area, abs=1e-6 * (1.0 + front + side + horizontal))
 
 
-def test_back_is_shown_when_it_flies_away():
-    sizes = {"front_m2": 7.0, "back_m2": 14.0, "side_m2": 14.0, "horizontal_m2": 37.16}
-    for model in ("exact", "thesis", "convex_hull"):
-        assert visible_area(0.0, 0.0, 0.0, 0.0, **sizes, model=model) == pytest.approx(14.0)
-        assert visible_area(np.pi, 0.0, 0.0, 0.0, **sizes, model=model) == pytest.approx(7.0)
-        abeam = visible_area(np.pi / 2, 0.0, 0.0, 0.0, **sizes, model=model)
-        assert abeam == pytest.approx(10.5 + 14.0)
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [

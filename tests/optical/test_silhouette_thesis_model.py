@@ -2,7 +2,6 @@
 
 import mpmath
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -49,24 +48,3 @@ def test_equals_the_exact_model_abeam_and_in_the_horizontal():
         thesis = visible_area(heading, 0.0, 0.0, el, **sizes, model="thesis")
         exact = visible_area(heading, 0.0, 0.0, el, **sizes, model="exact")
         np.testing.assert_allclose(thesis, exact, rtol=1e-14)
-
-
-def test_projects_the_plane_twice_head_on():
-    # Errata 9: sin² where the truth is sin.
-    plane = {"front_m2": 0.0, "side_m2": 0.0, "horizontal_m2": 100.0}
-    elevation = np.array([-0.5, 0.1, 0.7])
-    thesis = visible_area(np.pi, 0.0, 0.0, elevation, **plane, model="thesis")
-    np.testing.assert_allclose(thesis, 100.0 * np.sin(elevation) ** 2, rtol=1e-12)
-    exact = visible_area(np.pi, 0.0, 0.0, elevation, **plane, model="exact")
-    np.testing.assert_allclose(exact, 100.0 * np.abs(np.sin(elevation)), rtol=1e-12)
-
-
-def test_shows_side_of_a_target_that_climbs_straight_at_us():
-    # Errata 9: 5 degrees nose up, coming head on along its own axis; the side is hidden but the
-    # small-angle form subtracts pitch with the wrong sign here and shows 17 % of it.
-    side = {"front_m2": 0.0, "side_m2": 1.0, "horizontal_m2": 0.0}
-    five = np.radians(5.0)
-    assert visible_area(np.pi, five, 0.0, -five, **side) == pytest.approx(0.0, abs=1e-15)
-    shown = visible_area(np.pi, five, 0.0, -five, **side, model="thesis")
-    # Eq. 12 for a side of 1 m²: sin of twice the climb.
-    assert shown == pytest.approx(np.sin(2 * five), rel=1e-12)

@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 import wired
 from covering import covers
+from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
 from components.sensor.acquisition import Acquired, AcquisitionRange
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.running.simulation import Simulation
 
 KIND = "radar.range_boundary"
 RANGES = [
@@ -101,23 +97,11 @@ def test_who_turns_aside_is_kept_and_who_was_lost_is_acquired_anew():
 
 def test_windows_and_other_runs_change_nothing():
     loaded = dsa_des.load_scene(scene(TARGETS))
-
-    def recorded(*scenes, window=None):
-        sink = MemorySink()
-        if len(scenes) > 1:
-            lock_step(list(scenes), recorder=Recorder([sink])).run()
-        else:
-            Simulation(scenes[0], window=window, recorder=Recorder([sink])).run()
-        return sink.tables()["detections"]
-
-    assert recorded(loaded).equals(recorded(loaded, window=7))
+    one = same_in_any_window(loaded, (7,))["detections"]
     slower = {"blocks.traffic.intruders": [coming("slow_ahead", 50.0, 47.0), *TARGETS[1:]]}
-    scenes = [scene_of(loaded, Replica(1, {})), scene_of(loaded, Replica(2, slower))]
-    both = recorded(*scenes)
-    for number, one in enumerate(scenes):
-        mine = both.filter([replica == number for replica in both["replica"].to_pylist()])
-        assert first_seen(mine) == first_seen(recorded(one))
-    assert first_seen(recorded(scenes[0])) != first_seen(recorded(scenes[1]))
+    scenes = replicas_of(loaded, {}, slower)
+    same_as_alone(scenes)
+    assert first_seen(one) != first_seen(tables_of(scenes[1])[1]["detections"])
 
 
 @pytest.mark.parametrize(("ranges", "said"), [

@@ -57,7 +57,7 @@ def test_it_is_drawn_to_the_same_bytes(tmp_path: Path):
     ("figure", "said"),
     [
         ('metric = "first_detection_range_m"', "no such results with a number behind them"),
-        ('metric = "x.y"\nfreedom = 0', "must be degrees of freedom: above 0"),
+        ('metric = "x.y"\nfreedom = 0', "freedom = 0: must be greater than 0"),
         ('freedom = 6', "needs a metric"),
     ],
 )  # fmt: skip

@@ -2,7 +2,6 @@
 
 import itertools
 from collections import Counter
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -226,24 +225,3 @@ def test_gated_fusion_equals_a_slow_search(periods, offsets, gate_ticks, cuts, c
         for key, (who, range_m) in expected.items():
             assert found[key][0] == who
             assert found[key][1] == pytest.approx(range_m, nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    ("rate_1", "rate_2", "phase", "gate"),
-    [(5, 2, 0, 0), (5, 2, "1/20", "1/20"), (10, 3, "1/70", "1/35"), (20, 2, "0.013", "0.02")],
-)
-def test_the_share_of_fused_scans_follows_the_formula(rate_1, rate_2, phase, gate):
-    """errata, "Fused share of two periodic clocks": counted on exact clocks."""
-    phase, gate = Fraction(phase), Fraction(gate)
-    ratio = Fraction(rate_1, rate_2)
-    q = ratio.denominator
-    s = Fraction(1, q * rate_1)
-    rest = phase % s
-    formula = min(
-        Fraction(1), max(Fraction(0), Fraction((gate - rest) // s + (gate + rest) // s + 1, q))
-    )
-    seconds = 40 * q
-    first = {Fraction(k, rate_1) for k in range(-10, rate_1 * seconds + 10)}
-    second = [Fraction(k, rate_2) + phase for k in range(rate_2 * seconds)]
-    met = sum(any(abs(t - f) <= gate for f in first) for t in second)
-    assert Fraction(met, len(second)) == formula

@@ -16,6 +16,7 @@ from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Window, Windows
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.runs import Runs
+from tests.running.window_cost import window_cost_s
 
 LOOP = "configs/benchmark/manoeuvres.toml"
 FEEDBACK = '{ from = "end", to = "cue.cue", delay = "1 scan", holds = "nothing" }'
@@ -220,3 +221,8 @@ def test_an_end_found_in_a_window_that_is_undone_was_never_found():
     assert runs.early and runs.ended_by == {0: "over"}
     rewinder.restore()
     assert not runs.early and runs.ended_by == {} and runs.ends.tolist() == [100]
+
+
+def test_what_a_window_costs_is_measured_over_all_of_them():
+    windows, cost_s = window_cost_s(3.0, 1)
+    assert windows == 30 and cost_s > 0.0

@@ -195,6 +195,8 @@ def test_who_comes_while_it_is_busy(when_busy, entered, scans):
     done = rows(found, "processing", outcome="done")
     assert [row["entered_s"] for row in done] == pytest.approx(entered)
     assert len(rows(found, "scans")) == scans
+    rest = {"wait": set(), "drop_oldest": {"dropped"}, "skip": {"skipped"}}[when_busy]
+    assert {row["outcome"] for row in rows(found, "processing")} == {"done"} | rest
 
 
 @covers("update_rate_hz", of=("traffic.scripted",))

@@ -90,6 +90,21 @@ def test_a_curve_of_pd_from_a_folder_lies_within_the_bounds_of_the_model():
     assert curve[0] > 0.9 and curve[-1] < 0.3 and curve == sorted(curve, reverse=True)
 
 
+@pytest.mark.parametrize("kind", ["radar.swerling", "radar.threshold"])
+def test_a_look_at_what_gives_no_echo_has_no_snr_and_no_chance(kind):
+    """Closer than the minimum range; of an SNR of 0 dB, or of noise, it would have had some."""
+    radar = {**FADING, "type": kind, "scan_rate_hz": 2, "minimum_range_m": 3500.0}
+    radar["false_alarm_probability"] = 0.3
+    scene = chain({"radar": radar}, targets=away(1)["blocks"]["traffic"]["intruders"],
+                  duration_s=4, record=ON)  # fmt: skip
+    near = [row for row in tables(scene)["looks"].to_pylist() if row["true_range_m"] < 3500.0]
+    far = [row for row in tables(scene)["looks"].to_pylist() if row["true_range_m"] > 3500.0]
+    assert len(near) >= 2 and all(row["evaluated"] and not row["detected"] for row in near)
+    assert {(row["snr_db"], row["confidence"]) for row in near} == {(None, None)}
+    assert {row["detection_probability"] or 0.0 for row in near} == {0.0}
+    assert far and all(row["snr_db"] is not None for row in far)
+
+
 def test_a_value_of_neither_kind_is_one_problem():
     scene = chain({"radar": HEARS_ALL}, record={"truth": "maybe"})
     with pytest.raises(dsa_des.SceneError, match=r"'maybe': must be true or false or 'auto'$"):

@@ -61,7 +61,8 @@ ODD = {
                 looking="spells", beta_per_sr_s=1e5),
     "x": {"type": "surveillance.ads_b", "scan_rate_hz": 4, "reception": "fitted"},
     "z": sensor(**SWERLING, fluctuation_correlation_s=0.7),
-    "y": {"type": "surveillance.active", "scan_rate_hz": 4, "elevation_deg": [-90, 90]},
+    "y": {"type": "surveillance.active", "scan_rate_hz": 4, "elevation_deg": [-90, 90],
+          "near_s": 0.0, "far_every": 2},
 }  # fmt: skip
 #: Those that the ground beneath would hide or be refused by are not over it.
 OVER_GROUND = {
@@ -114,6 +115,17 @@ def test_a_sensor_sees_beside_others_what_it_sees_alone(together, name):
         for found in (rows(together, "scans", block=name), rows(alone, "scans"))
     ]
     assert looks[0] == looks[1]
+
+
+def test_a_target_is_seen_as_it_is_whoever_else_is_there_and_comes_first(together):
+    """Another one, far away, is there as well, and the rest come in the other order."""
+    far = {**crooked.ROLLING, "name": "far", "east_m": 2e5, "mode_s": True}
+    other = run(chain(ODD, targets=[*TARGETS[::-1], far], duration_s=2, **SECTIONS))
+    found = [
+        sorted((r for r in rows(each) if r["target"] != "far"), key=lambda r: str([*r.values()]))
+        for each in (together, other)
+    ]
+    assert found[0] == found[1]
 
 
 def test_none_of_them_sees_what_another_sees(together):

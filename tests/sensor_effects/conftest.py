@@ -115,21 +115,6 @@ class Runs:
         plan = Simulation(load_scene(path)).plan
         return {item.effect.name: item.sentence() for item in plan if item.block == block}
 
-    @staticmethod
-    def assert_same(one, other):
-        assert one.tables.keys() == other.tables.keys()
-        for name, table in one.tables.items():
-            assert table.schema == other.tables[name].schema
-            assert table.equals(other.tables[name]), name
-
-    def assert_grain_changes_nothing(self, path):
-        """Any window and every neutral effect: the same bytes. Returns the run."""
-        planned = self.run(path)
-        self.assert_same(planned, self.run(path, window=1))
-        self.assert_same(planned, self.run(path, window=37))
-        self.assert_same(planned, self.run(path, simulate_everything=True))
-        return planned
-
 
 @pytest.fixture(scope="session")
 def runs():

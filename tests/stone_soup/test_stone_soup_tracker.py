@@ -11,14 +11,12 @@ import crooked
 import numpy as np
 import pytest
 from covering import covers
-from same_runs import replicas_of, same_as_alone, same_in_any_window
+from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 from wired import chain, rows, run
 
 import dsa_des
 from components.stone_soup.tracker import StoneSoupTracker
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "stone-soup.md"
@@ -235,12 +233,6 @@ def test_the_extra_is_imported_only_where_it_is_used():
     subprocess.run([sys.executable, "-P", "-c", program], check=True, cwd=PAGE.parents[1])
 
 
-def tracks_of(kind, scenes, **options):
-    sink = MemorySink()
-    kind(scenes, recorder=Recorder([sink]), **options).run()
-    return sink.tables()["state_tracks"].combine_chunks()
-
-
 def test_windows_and_company_change_no_byte_and_names_are_not_seen(tmp_path, monkeypatch):
     loaded = dsa_des.load_scene(scene(documented(tmp_path), 2))
     alone = same_in_any_window(loaded, (3,))["state_tracks"]
@@ -257,4 +249,4 @@ def test_windows_and_company_change_no_byte_and_names_are_not_seen(tmp_path, mon
         return original(self, wake)
 
     monkeypatch.setattr(StoneSoupTracker, "run", blind)
-    assert tracks_of(Simulation, loaded).equals(alone)
+    assert tables_of(loaded)[1]["state_tracks"].equals(alone)

@@ -5,6 +5,8 @@ import re
 from collections import Counter
 from pathlib import Path
 
+from parsed import parsed
+
 ROOT = Path(__file__).parents[2]
 #: With what makes the pages, which calls the product as a user does.
 ROOMS = ("dsa_des", "components", "docs/make")
@@ -12,7 +14,7 @@ ROOMS = ("dsa_des", "components", "docs/make")
 
 def trees() -> dict[Path, ast.Module]:
     paths = [p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))]
-    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in paths}
+    return {path: parsed(path) for path in paths}
 
 
 def words(tree: ast.Module) -> Counter[str]:

@@ -4,6 +4,8 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
+from parsed import parsed
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -12,7 +14,7 @@ def classes(*folders: Path) -> dict[str, list[str]]:
     found = defaultdict(list)
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(parsed(path)):
                 if isinstance(node, ast.ClassDef):
                     found[node.name].append(f"{path.relative_to(folder.parent)}:{node.lineno}")
     return found

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import networkx as nx
 import pytest
+from parsed import parsed
 
 from dsa_des.block.message import Message
 
@@ -49,9 +50,8 @@ def folder_of(module: str) -> str:
     return module if modules()[module].name == "__init__.py" else module.rpartition(".")[0]
 
 
-@cache
 def tree_of(module: str) -> ast.Module:
-    return ast.parse(modules()[module].read_text(encoding="utf-8"))
+    return parsed(modules()[module])
 
 
 def docstrings(tree: ast.Module) -> set[int]:

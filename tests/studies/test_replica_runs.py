@@ -76,6 +76,8 @@ def test_wanted_columns_are_the_same_as_when_all_are_recorded(small: Path) -> No
         ("blocks.radar.offset_s", -1, "must be greater than or equal to 0"),
         ("blocks.traffic.intruders[3].east_m", 1, "the list has 1"),
         ("weathr.rain_rate_mm_h", 1, "is no key of this scene"),
+        ("seed", 3, "cannot be drawn: every replica has a seed of its own"),
+        ("wires[0].delay_s", 3, "cannot be drawn: wires are the same in all replicas"),
         ("blocks.radar.scan_rate_hz", Fraction(10**25 + 7, 10**24 + 9), "no common tick"),
     ],
 )

@@ -3,15 +3,12 @@
 import crooked
 import numpy as np
 import pytest
+from same_runs import same_as_alone, same_in_any_window, tables_of
 from wired import chain, rows, run
 
 import dsa_des
 from components.surveillance.ads_b import AdsB
 from components.surveillance.squitter_clock import SquitterClocks
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.running.simulation import Simulation
 from dsa_des.time.randomness import Streams, target_keys
 
 ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 10, "reception": "certain"}
@@ -19,14 +16,8 @@ ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-9
 TARGETS = [{**target, "mode_s": True, "ads_b": {"nacp": 9}} for target in crooked.TARGETS]
 
 
-def recorded(*scenes, window=None):
-    sink = MemorySink()
-    loaded = [dsa_des.load_scene(scene) for scene in scenes]
-    if len(loaded) == 1:
-        Simulation(loaded[0], recorder=Recorder([sink]), window=window).run()
-    else:
-        lock_step(loaded, recorder=Recorder([sink])).run()
-    return sink.tables()
+def recorded(scene):
+    return tables_of(dsa_des.load_scene(scene))[1]
 
 
 @pytest.mark.parametrize(
@@ -67,16 +58,10 @@ def test_replicas_together_are_those_alone(sensor):
     for seed, clock in enumerate(({}, {"jitter_s": 0.03}, {"offset_s": 0.25}, {})):
         one = chain({"one": {**sensor, **clock}}, targets=TARGETS, duration_s=15)
         one["blocks"]["traffic"]["ownship"] = dict(crooked.OWNSHIP)
-        scenes.append({**one, "seed": 11 * seed})
-    together = recorded(*scenes)["detections"].to_pylist()
-    for number, scene in enumerate(scenes):
-        alone = recorded(scene)["detections"].to_pylist()
-        assert len(alone) > 10
-        mine = [row for row in together if row.pop("replica", number) == number]
-        assert repr(mine[: len(alone)]) == repr(alone)
-        together = together[len(alone) :]
-        if number in (1, 2):
-            assert repr(recorded(scene, window=3)["detections"].to_pylist()) == repr(alone)
+        scenes.append(dsa_des.load_scene({**one, "seed": 11 * seed}))
+    same_as_alone(scenes)
+    for scene in scenes[1:3]:
+        assert same_in_any_window(scene, (3,))["detections"].num_rows > 10
 
 
 def test_latency_hides_nobody_at_the_start():

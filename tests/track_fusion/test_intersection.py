@@ -11,7 +11,7 @@ from components.estimation.covariance_intersection import intersected, inverse
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.track_association import MatchRules, without_strays
+from components.track_fusion.track_association import MatchRules, gate_share, without_strays
 
 
 def covariances(seed, count):
@@ -134,3 +134,42 @@ def test_a_direction_leaves_beyond_three_times_its_own_gate():
         azimuth_rad=np.array([0.0, 2.99, -3.01]) * gate_rad, elevation_variance_rad2=variance,
     )  # fmt: skip
     assert without_strays(RULES, tracks, np.zeros(3)).system.tolist() == [7, 7, 0]
+
+
+def test_a_pair_s_distance_is_its_own_whoever_stands_beside_it():
+    random = np.random.default_rng(2)
+    some = LocalTracks.joined([
+        tracks_of(
+            state=random.normal(0.0, 500.0, (6, 3)), ranged=random.random(3) < 0.5,
+            azimuth_rad=random.uniform(-3.0, 3.0, 3), elevation_rad=random.uniform(-1.4, 1.4, 3),
+            azimuth_variance_rad2=random.uniform(1e-4, 1e-2, 3), time_s=random.uniform(0.0, 1.0, 3),
+            elevation_variance_rad2=random.uniform(1e-4, 1e-2, 3),
+            own_m=random.normal(0.0, 50.0, (3, 3)),
+        )
+        for _ in range(4)
+    ])  # fmt: skip
+    pairs, when = np.triu_indices(12, 1), np.full(66, 1.5)
+
+    def share(one, other):
+        return gate_share(RULES, some.take(one), some.take(other), when[: len(one)])
+
+    together = share(*pairs)
+    alone = [share(*(each[[k]] for each in pairs))[0] for k in range(66)]
+    assert together == pytest.approx(alone, rel=1e-9)
+    # Which of two leads counts where neither has a range alone: by whose elevation a turn counts.
+    ranged = some.ranged[pairs[0]] | some.ranged[pairs[1]]
+    assert share(*pairs[::-1])[ranged] == pytest.approx(together[ranged], rel=1e-9)
+    assert np.count_nonzero(~ranged) > 5 and len(set(zip(*some.ranged[[*pairs]], strict=True))) == 4
+
+
+def test_two_directions_may_have_turned_since_the_more_the_steeper():
+    two = tracks_of(
+        ranged=np.zeros(3, dtype=bool), azimuth_rad=np.array([0.1, 0.2, 0.0]),
+        elevation_rad=np.array([1.2, 1.23, 0.0]), azimuth_variance_rad2=np.full(3, 1e-4),
+        elevation_variance_rad2=np.full(3, 1e-4), time_s=np.array([1.0, 4.0, 0.0]),
+    )  # fmt: skip
+    first, second = (two.take(np.array([k])) for k in (0, 1))
+    turned = (0.01 * 3.0) ** 2
+    wanted = 0.1**2 / (2e-4 + turned / np.cos(1.2) ** 2) + 0.03**2 / (2e-4 + turned)
+    found = gate_share(RULES, first, second, np.array([4.0]))
+    assert found[0] == pytest.approx(wanted / chi2.ppf(0.9, 2))

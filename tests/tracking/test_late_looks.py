@@ -1,10 +1,14 @@
 """Looks that come late, in scenes whose cameras' messages take their time."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pyarrow.compute as pc
 import pytest
+from same_runs import tables_of
 
 import dsa_des
+from components.tracking.out_of_sequence import plan_of_late, straight_plan
 from docs.make.track_consistency import (
     NEARLY,
     NOISY,
@@ -13,11 +17,7 @@ from docs.make.track_consistency import (
     Case,
     scene_of_case,
 )
-from dsa_des.record.recording import Recorder
-from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 NEARER = [
@@ -36,11 +36,9 @@ def scene(*sets, kind="tracking.ekf", duration_s="4"):
     )
 
 
-def tracked(simulation_type, scene, **options):
-    sink = MemorySink()
-    simulation = simulation_type(scene, recorder=Recorder([sink]), **options)
-    simulation.run()
-    return simulation, sink.tables()["state_tracks"].combine_chunks()
+def tracked(scene):
+    simulation, tables = tables_of(scene)
+    return simulation, tables["state_tracks"]
 
 
 @pytest.mark.parametrize("kind", ["tracking.ekf", "tracking.imm"])
@@ -50,8 +48,8 @@ def test_the_state_at_the_end_is_the_same_to_the_bit(kind):
             "blocks.ir.offset_s=0.1", "blocks.radar.scan_rate_hz=5"]  # fmt: skip
     rerun = ["blocks.tracker.late='rerun'"]
     delays = ["blocks.eo.latency_s=0.23", "blocks.ir.latency_s=0.29"]
-    _, on_time = tracked(Simulation, scene(*stop, kind=kind, duration_s="3.45"))
-    _, late = tracked(Simulation, scene(*stop, *delays, *rerun, kind=kind, duration_s="3.45"))
+    _, on_time = tracked(scene(*stop, kind=kind, duration_s="3.45"))
+    _, late = tracked(scene(*stop, *delays, *rerun, kind=kind, duration_s="3.45"))
     # At 3.4 s the radar's scan is the newest of both; the cameras' last were at 3.05 and 3.1 s.
     rows = [
         {r["track"]: r for r in t.to_pylist() if r["time_s"] == pytest.approx(3.4)}
@@ -61,7 +59,7 @@ def test_the_state_at_the_end_is_the_same_to_the_bit(kind):
     for number, row in rows[0].items():
         assert {**row, "tick": 0} == {**rows[1][number], "tick": 0}
     drop = ["blocks.tracker.late='drop'"]
-    _, dropped = tracked(Simulation, scene(*stop, *delays, *drop, kind=kind, duration_s="3.45"))
+    _, dropped = tracked(scene(*stop, *delays, *drop, kind=kind, duration_s="3.45"))
     assert "radar+eo" not in "".join(dropped["contributors"].to_pylist())
 
 
@@ -74,7 +72,7 @@ def test_one_step_is_near_what_working_on_all_again_gives(kind):
         stop.append("blocks.tracker.association='jpda'")
     tables = {}
     for late in ("drop", "one_step", "rerun"):
-        _, table = tracked(Simulation, scene(*stop, f"blocks.tracker.late='{late}'", kind=kind))
+        _, table = tracked(scene(*stop, f"blocks.tracker.late='{late}'", kind=kind))
         rows = {(r["tick"], r["track"]): r for r in table.to_pylist() if r["time_s"] > 2.0}
         tables[late] = rows
     newest = {}
@@ -95,7 +93,7 @@ def test_one_step_is_near_what_working_on_all_again_gives(kind):
 
 def test_looks_older_than_the_lag_are_left_out_and_counted():
     def left_out(*sets):
-        simulation, table = tracked(Simulation, scene(*LATE, *sets, duration_s="2"))
+        simulation, table = tracked(scene(*LATE, *sets, duration_s="2"))
         block = simulation.nodes["tracker"].component
         assert np.isfinite(table["existence"].to_numpy()).all()
         late = block.report()["late_looks"]["tracker"]
@@ -114,15 +112,29 @@ def test_looks_older_than_the_lag_are_left_out_and_counted():
     assert left_out() == left_out("blocks.tracker.lag_s=0.31") == 0
 
 
+@pytest.mark.parametrize("rerun", [False, True])
+def test_a_look_as_late_as_the_lag_still_counts_and_no_later_one(rerun):
+    """Ticks 0, 10 and 20 came in time; what is as old as the lag is worked on, and remembered."""
+    looks = SimpleNamespace(
+        tick=np.array([0, 10, 20, 10, 9]), sensors=np.array([1, 1, 1, 2, 2]), row=np.arange(5)
+    )
+    plan, left_out, kept = plan_of_late(looks, np.zeros(5, dtype=int), 0, 10, rerun=rerun)
+    assert left_out == [4] and set(plan.look.tolist()) == {0, 1, 2, 3}
+    assert kept == ([1, 3, 2] if rerun else [1, 2])
+
+
+def test_where_late_looks_are_left_out_one_of_the_newest_instant_is_not_late():
+    looks = SimpleNamespace(tick=np.array([20, 19, 25, 25]), row=np.arange(4))
+    plan, left_out = straight_plan(looks, np.zeros(4, dtype=int), np.array([20]))
+    assert plan.look.tolist() == [0, 2, 3] and left_out == [1]
+
+
 def test_looks_of_the_future_wait_and_are_counted():
     """A sweeping radar's scan is reported as it begins, with the instants of its beam."""
     swept = scene("blocks.radar.beam_sweep=true", "blocks.radar.scan_rate_hz=1", duration_s="3")
-    simulation, table = tracked(Simulation, swept)
-    sink = MemorySink()
-    Simulation(swept, recorder=Recorder([sink])).run()
-    seen = sink.tables()["detections"].filter(
-        pc.equal(sink.tables()["detections"]["block"], "radar")
-    )
+    simulation, tables = tables_of(swept)
+    table, seen = tables["state_tracks"], tables["detections"]
+    seen = seen.filter(pc.equal(seen["block"], "radar"))
     after = seen["illuminated_s"].to_numpy() > seen["time_s"].to_numpy()
     report = simulation.nodes["tracker"].component.report()
     assert report["early_looks"]["tracker"] == after.sum() > 0
@@ -138,8 +150,8 @@ def test_one_step_finds_its_tracks_whoever_else_is_there():
     traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": NEARLY}
     one = dsa_des.load_scene({**scene_of_case(case, traffic), "duration_s": 5})
     scenes = [scene_of(one, Replica(1 + i, {})) for i in range(3)]
-    _, together = tracked(lock_step, scenes)
-    _, alone = tracked(Simulation, scenes[0])
+    _, together = tracked(scenes)
+    _, alone = tracked(scenes[0])
     first = together.filter(pc.equal(together["replica"], 0)).drop_columns(["replica"])
     assert first.combine_chunks().equals(alone)
     assert max(alone["track"].to_pylist()) > 2

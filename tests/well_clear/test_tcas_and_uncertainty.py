@@ -4,9 +4,10 @@ import mpmath
 import numpy as np
 import pytest
 
+from components.arguments.units import FOOT_M
 from components.well_clear.detection import Bounds, uncertain_violation_span
 from components.well_clear.tcas import RESOLUTION_ADVISORY, TRAFFIC_ADVISORY, tcas_span
-from components.well_clear.volume import FOOT_M, Volume, violation_span
+from components.well_clear.volume import Volume, violation_span
 from tests.well_clear.test_violation_spans import random_states, span_by_bisection
 
 END_S = 60.0

@@ -5,12 +5,12 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from components.foreign.fmu.units import Scale, scale_of
 from dsa_des.errors import did_you_mean
+from dsa_des.files.input_files import read_once
 
 _KINDS = {"Real": "Float64", "Integer": "Int32"}
 #: Kinds whose values are no numbers.
@@ -137,6 +137,7 @@ class FmuModel:
         return known.factor / to.factor, (known.offset - to.offset) / to.factor
 
 
+@read_once(64)
 def read_fmu(path: Path) -> FmuModel:
     """Return what an FMU says of itself.
 
@@ -146,14 +147,9 @@ def read_fmu(path: Path) -> FmuModel:
         If it is no FMU that can run here: the reason, and what there is instead.
     """
     try:
-        state = path.stat()
+        path.stat()
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
-    return _read(path, state.st_mtime_ns, state.st_size)
-
-
-@lru_cache(maxsize=64)
-def _read(path: Path, changed: int, size: int) -> FmuModel:
     try:
         import fmpy
     except ImportError:

@@ -3,12 +3,14 @@
 import math
 from dataclasses import dataclass
 
+from components.arguments.units import FOOT_M, KNOT_M_S
+
 #: Names of our units: powers of (m, s, rad), and how large each is in SI units.
 _UNITS: dict[str, tuple[tuple[int, int, int], float]] = {
-    "m": ((1, 0, 0), 1.0), "km": ((1, 0, 0), 1e3), "ft": ((1, 0, 0), 0.3048),
+    "m": ((1, 0, 0), 1.0), "km": ((1, 0, 0), 1e3), "ft": ((1, 0, 0), FOOT_M),
     "m2": ((2, 0, 0), 1.0), "s": ((0, 1, 0), 1.0), "ms": ((0, 1, 0), 1e-3),
     "rad": ((0, 0, 1), 1.0), "deg": ((0, 0, 1), math.pi / 180),
-    "m/s": ((1, -1, 0), 1.0), "km/h": ((1, -1, 0), 1 / 3.6), "kn": ((1, -1, 0), 1852 / 3600),
+    "m/s": ((1, -1, 0), 1.0), "km/h": ((1, -1, 0), 1 / 3.6), "kn": ((1, -1, 0), KNOT_M_S),
     "m/s2": ((1, -2, 0), 1.0), "m2/s2": ((2, -2, 0), 1.0), "rad2": ((0, 0, 2), 1.0),
     "deg2": ((0, 0, 2), (math.pi / 180) ** 2), "rad/s": ((0, -1, 1), 1.0),
     "deg/s": ((0, -1, 1), math.pi / 180), "Hz": ((0, -1, 0), 1.0), "1/s": ((0, -1, 0), 1.0),

@@ -7,13 +7,13 @@ import numpy as np
 import pyarrow.compute as pc
 
 import dsa_des
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.geometry import line_of_sight
 from docs.make.published import degas_bands, degas_sensors
 from docs.make.published.rows import PublishedRow, table
 
 TITLE = "DEGAS, from encounter to metric"
 ORDER = 1
-FOOT_M = 0.3048
 #: Well clear of aircraft that do not say where they are (DO-365): a cylinder.
 WELL_CLEAR_FT = (2200.0, 450.0)
 
@@ -116,7 +116,7 @@ def mitigated(scene: Any = SCENE) -> list[PublishedRow]:
 
 def section(images: Path, runs: Any = None) -> str:
     """Run the encounter, and the study of its sensors or take its `runs`; return the section."""
-    across_ft = 125.0 * (10_000.0 - 1852.0 / FOOT_M) + 250.0
+    across_ft = 125.0 * (10_000.0 - NAUTICAL_MILE_M / FOOT_M) + 250.0
     return "\n".join(
         [
             _HEAD,

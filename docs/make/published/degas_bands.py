@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
+from components.arguments.units import FOOT_M
 from components.guidance.bands import guidance_of_many
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "published" / "degas"
-FOOT_M = 0.3048
 _CODE = {"NONE": 0, "RECOVERY": 1, "MID": 3, "NEAR": 4}
 # An edge counts for either side of it: of positions, rad and m.
 _EDGE = 1e-9

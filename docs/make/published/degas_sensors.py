@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 import dsa_des
+from components.arguments.units import FOOT_M
 from components.thesis.drawing import GREY, legend_below, panels
 from dsa_des.record.drawing import BLUE, GREEN, ORANGE, RED
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
 #: Of the study as it is shipped.
 SEEDS = 1000
-FOOT_M = 0.3048
 #: By the study's axis: what it is called, and its colour.
 SENSORS = {
     "radar": ("radar", BLUE),

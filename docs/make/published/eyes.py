@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 import dsa_des
+from components.arguments.units import FOOT_M, KNOT_M_S, NAUTICAL_MILE_M
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import Pairs, PairSampler, set_of_pairs
 from components.formats.set_file import write_set
 from components.visual.acquisition import VISUAL_RANGE_DEPTH, closing_opportunity, round_share
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.seen_in_time import Eyes, shares_unseen
 from docs.make.published.volumes import VOLUMES, violates
@@ -28,7 +28,6 @@ ORDER = 5
 SCENE = "published/see_and_avoid"
 CREWED = (Path(__file__).parents[4] / "shared" / "data" / "encounters" / "models"
           / "uncor_1200code_v1.txt")  # fmt: skip
-KT_MPS = NAUTICAL_MILE_M / 3600.0
 #: Probability to see and avoid an aircraft of 40 ft by closing speed in kt, of an observer who
 #: scans all, two thirds and a third of the time (Morris 2005, abstract).
 MORRIS = {200: (0.91, 0.60, 0.30), 300: (0.49, 0.32, 0.16), 400: (0.28, 0.18, 0.09),
@@ -58,7 +57,7 @@ _OF_BOTH = (
 
 def in_closed_form(speed_kt: float, looking: float, size_ft: float = SIZE_FT) -> float:
     """Return the probability to see an aircraft in time, of a search that comes round."""
-    speed = speed_kt * KT_MPS
+    speed = speed_kt * KNOT_M_S
     shown_m = size_ft * FOOT_M / math.radians(SMALLEST_ARCMIN / 60.0)
     return round_share(
         speed, from_m=shown_m, to_m=NEEDED_S * speed, round_s=ROUND_S, looking=looking
@@ -67,7 +66,7 @@ def in_closed_form(speed_kt: float, looking: float, size_ft: float = SIZE_FT) ->
 
 def by_rate(speed_kt: float, area_ft2: float, visual_range_nmi: float) -> float:
     """Return the same by Andrews's rate, of one who looks out all the time."""
-    speed = speed_kt * KT_MPS
+    speed = speed_kt * KNOT_M_S
     return -math.expm1(
         -closing_opportunity(
             area_ft2 * FOOT_M**2, speed, from_m=math.inf, to_m=NEEDED_S * speed,
@@ -78,7 +77,7 @@ def by_rate(speed_kt: float, area_ft2: float, visual_range_nmi: float) -> float:
 
 def course(speed_kt: float, looking: float, size_ft: float = SIZE_FT) -> dict[str, Any]:
     """Return a scene of two aircraft that fly at each other until it is too late to avoid."""
-    speed = speed_kt * KT_MPS
+    speed = speed_kt * KNOT_M_S
     disc_m2 = math.pi / 4.0 * (size_ft * FOOT_M) ** 2
     blocks = {
         "traffic": {

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from components.arguments.units import KNOT_M_S
 from components.thesis.drawing import GREY, panels
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.turn_flights import (
-    KT_MPS,
     LeastRange,
     closing_speeds,
     counted_m,
@@ -86,7 +86,7 @@ def grid_courses(found: list[LeastRange], intruder_kt: float) -> GridCourses:
         at_deg = np.array([one.azimuth_deg for one in mine])
         off_m = np.array([one.range_m - one.geometry_m for one in mine])
         for azimuth in np.arange(GRID_DEG, 180.0, GRID_DEG).tolist():
-            closing = closing_speeds(azimuth, intruder_kt * KT_MPS)
+            closing = closing_speeds(azimuth, intruder_kt * KNOT_M_S)
             if len(closing) <= course:
                 continue
             speed, flown_m, needed_m = closing[course], math.inf, math.inf
@@ -198,7 +198,7 @@ def differences_s(found: dict[int, list[LeastRange]], *, as_flown: bool = False)
 def by_geometry(intruder_kt: float) -> list[LeastRange]:
     """Return least ranges of one azimuth's courses that need what geometry says, unflown."""
     azimuth = AZIMUTHS_DEG[0]
-    closing = closing_speeds(azimuth, intruder_kt * KT_MPS)
+    closing = closing_speeds(azimuth, intruder_kt * KNOT_M_S)
     return [
         LeastRange(azimuth, course, speed, least_range_m(azimuth, speed, turns_deg(azimuth)))
         for course, speed in enumerate(closing)
@@ -214,7 +214,7 @@ def counted_alike() -> tuple[int, int, float]:
     off = [
         (counted_m(azimuth, closing[course], 0.0) - theirs_m) / closing[course]
         for (kt, azimuth, course), theirs_m in published_ranges().items()
-        if 0.0 < azimuth < 180.0 and len(closing := closing_speeds(azimuth, kt * KT_MPS)) > course
+        if 0.0 < azimuth < 180.0 and len(closing := closing_speeds(azimuth, kt * KNOT_M_S)) > course
     ]
     return sum(abs(one) < 0.01 for one in off), len(off), max(map(abs, off))
 

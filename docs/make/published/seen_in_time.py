@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.encounters.pairing import Pairs
 from components.optical.silhouette import visible_area
 from components.visual.acquisition import (
@@ -19,7 +20,6 @@ from components.visual.acquisition import (
     acquisition_rate,
     angular_size_rad,
 )
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
 from dsa_des.arrays.types import FloatArray
 
 _GRAVITY_FT_S2 = 32.174

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 
 import dsa_des
+from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.thesis.drawing import panels
-from components.well_clear.volume import FOOT_M
 from dsa_des.record.drawing import BLUE, GREEN, ORANGE
 
 TITLE = "Does an open tracker pass DO-365?"
 ORDER = 2
 STUDY = "do365_tracks"
 FIGURE = "published_track_bounds.png"
-KT_MPS, FT_MIN_MPS = 1852.0 / 3600.0, FOOT_M / 60.0
 RANGES_NMI = (1, 2, 3, 4, 5, 6)
 TRACKERS = {"tracking.ekf": BLUE, "tracking.ukf": GREEN, "tracking.imm": ORANGE}
 
@@ -29,20 +28,20 @@ BOUNDS: Mapping[str, tuple[Bound, ...]] = {
     "radar": (
         ("error_across_m", "across", "m", lambda r: (250 + 125 * (r - 1)) * FOOT_M),
         ("error_vertical_m", "in height", "m", lambda r: (150 + 100 * (r - 1)) * FOOT_M),
-        ("error_horizontal_rate_m_s", "horizontal rate", "m/s", lambda r: (40 + 10 * r) * KT_MPS),
+        ("error_horizontal_rate_m_s", "horizontal rate", "m/s", lambda r: (40 + 10 * r) * KNOT_M_S),
         ("error_vertical_rate_m_s", "vertical rate", "m/s",
-         lambda r: (800 + 280 * (r - 1)) * FT_MIN_MPS),
+         lambda r: (800 + 280 * (r - 1)) * FOOT_PER_MINUTE_M_S),
     ),
     "active surveillance": (
         ("error_horizontal_m", "horizontal", "m", lambda r: (1250 + 1000 * (r - 0.5)) * FOOT_M),
         ("error_horizontal_rate_m_s", "horizontal rate", "m/s",
-         lambda r: (85 + 33 * (r - 0.5)) * KT_MPS),
+         lambda r: (85 + 33 * (r - 0.5)) * KNOT_M_S),
     ),
     "ADS-B": (
         ("error_horizontal_m", "horizontal", "m", lambda _: 900 * FOOT_M),
         ("error_vertical_m", "in height", "m", lambda _: 300 * FOOT_M),
-        ("error_horizontal_rate_m_s", "horizontal rate", "m/s", lambda _: 30 * KT_MPS),
-        ("error_vertical_rate_m_s", "vertical rate", "m/s", lambda _: 400 * FT_MIN_MPS),
+        ("error_horizontal_rate_m_s", "horizontal rate", "m/s", lambda _: 30 * KNOT_M_S),
+        ("error_vertical_rate_m_s", "vertical rate", "m/s", lambda _: 400 * FOOT_PER_MINUTE_M_S),
     ),
 }  # fmt: skip
 

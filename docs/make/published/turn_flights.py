@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import dsa_des
+from components.arguments.units import KNOT_M_S
 from components.geometry import line_of_sight
 from docs.make.published.turn_geometry import (
     BEFORE_S,
@@ -22,7 +23,6 @@ from docs.make.published.turn_geometry import (
 from docs.make.published.turn_geometry import least_range_m as by_geometry_m
 
 SCENE = "published/least_range"
-KT_MPS = 1852.0 / 3600.0
 #: Turns that are tried: by 90 deg, or somewhat less where the intruder comes from behind.
 _BEHIND_DEG, TURNS_DEG, TURNS_BEHIND_DEG = 140.0, (90.0,), (60.0, 75.0, 90.0)
 # From the disc to beyond where any of these turns is late; how far from a guess is looked first.
@@ -88,7 +88,7 @@ def table_of_courses(
     path.write_text(
         f"closest_s = {closest_s:g}\nduration_s = {closest_s + 40.0:g}\nhorizontal_m = 0\n"
         f"vertical_m = 0\nbearing_deg = [{bearings}]\ncourses = 'every'\n"
-        f"own_speed_kt = {OWN_MPS / KT_MPS:g}\nintruder_speed_kt = {intruder_kt:g}\n"
+        f"own_speed_kt = {OWN_MPS / KNOT_M_S:g}\nintruder_speed_kt = {intruder_kt:g}\n"
         "own_heading_deg = 217\nown_altitude_m = 1000\nat = [-41.3, 174.8]\n",
         encoding="utf-8",
     )
@@ -166,7 +166,7 @@ def least_ranges(intruder_kt: float, azimuths_deg: Iterable[float]) -> list[Leas
     courses = [
         (azimuth, course, speed)
         for azimuth in azimuths
-        for course, speed in enumerate(closing_speeds(azimuth, intruder_kt * KT_MPS))
+        for course, speed in enumerate(closing_speeds(azimuth, intruder_kt * KNOT_M_S))
     ]
     # Long enough that all begin well outside of what the slowest needs.
     slowest = min(speed for *_, speed in courses)

@@ -13,12 +13,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from components.well_clear.volume import FOOT_M
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M, STANDARD_GRAVITY_M_S2
 from dsa_des.arrays.types import FloatArray
 
-OWN_MPS = 60.0 * 1852.0 / 3600.0
+OWN_MPS = 60.0 * NAUTICAL_MILE_M / 3600.0
 DISC_M = 500.0 * FOOT_M
-GRAVITY_MPS2 = 9.80665
 BANK_RAD, ROLL_RATE_RAD_S = math.radians(45.0), math.radians(10.0)
 #: Their simulations begin so long before the collision, go by such a step, and count a turn two
 #: steps later than the state that it begins from; they halve the time so many times.
@@ -30,7 +29,7 @@ _FINE_S, _UNTIL_S = 0.002, 40.0
 def turned_rad(time_s: FloatArray) -> FloatArray:
     """Return by how much the heading has turned so long after the turn began, if it never ends."""
     full_s = BANK_RAD / ROLL_RATE_RAD_S
-    scale = GRAVITY_MPS2 / OWN_MPS
+    scale = STANDARD_GRAVITY_M_S2 / OWN_MPS
     rolling = (
         -scale / ROLL_RATE_RAD_S * np.log(np.cos(ROLL_RATE_RAD_S * np.minimum(time_s, full_s)))
     )
@@ -109,7 +108,7 @@ def stepped_least_range_m(
 def _stepped_way(turn_deg: float, side: float) -> NDArray[np.complex128]:
     """Return where the ownship is at the ends of the steps of a turn, by their equations."""
     bank = ROLL_RATE_RAD_S * TIME_STEP_S * np.arange(1, round(_UNTIL_S / TIME_STEP_S))
-    angle = GRAVITY_MPS2 / OWN_MPS * np.tan(np.minimum(bank, BANK_RAD)) * TIME_STEP_S
+    angle = STANDARD_GRAVITY_M_S2 / OWN_MPS * np.tan(np.minimum(bank, BANK_RAD)) * TIME_STEP_S
     turns = 1.0 - 0.5 * angle**2 + 1j * side * angle
     taken = int((np.cumsum(np.abs(np.angle(turns))) <= math.radians(turn_deg)).sum())
     velocity = OWN_MPS * np.concatenate([[1.0], np.cumprod(turns[: taken - 1])])

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.encounters.model import LAYER, LAYERS_FT, EncounterModel
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules, StepDensity
 from components.encounters.pairing import Pairs, PairSampler
-from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M, PRESETS, Volume, violation_span
+from components.well_clear.volume import PRESETS, Volume, violation_span
 from docs.make.published.rows import PublishedRow, table
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.results.ratio import PairedRatio, paired_ratio

@@ -240,10 +240,16 @@ def test_rain_s_own_rates_spread_by_turbulence_fall_and_at_most_6_m_s_of_shear()
 
 @covers("beam_shape_loss", "beam_spacing", of=LINK_BUDGETS)
 @pytest.mark.parametrize("kind", LINK_BUDGETS)
-@pytest.mark.parametrize(("sweep", "spacing"), [(False, 1.0), (False, 0.5), (True, 1.0)])
-def test_a_target_between_beams_loses_what_the_beam_s_shape_takes(kind, sweep, spacing):
+@pytest.mark.parametrize(
+    ("sweep", "spacing", "azimuth_deg"),
+    [(False, 1.0, (-150, 150)), (False, 0.5, (-150, 150)), (True, 1.0, (-150, 150)),
+     (False, 1.0, (40, 36))],
+)  # fmt: skip
+def test_a_target_between_beams_loses_what_the_beam_s_shape_takes(
+    kind, sweep, spacing, azimuth_deg
+):
     """12 dB per beamwidth squared each way, off the nearest of columns and bars; 1.67 dB swept."""
-    keys = {**KEYS[kind], "azimuth_deg": [-150, 150], "elevation_deg": [-60, 60],
+    keys = {**KEYS[kind], "azimuth_deg": azimuth_deg, "elevation_deg": [-60, 60],
             "beam_sweep": sweep, "beam_spacing": spacing}  # fmt: skip
     looks = [
         first_look(chain({"radar": sensor(kind, **keys, beam_shape_loss=lossy)},
@@ -254,12 +260,18 @@ def test_a_target_between_beams_loses_what_the_beam_s_shape_takes(kind, sweep, s
         plain, lossy = (found[name] for found in looks)
         off = []
         for angle, low, width, beam in (
-            (plain["azimuth_rad"], -150.0, 300.0, AZIMUTH_DEG),
+            (
+                plain["azimuth_rad"],
+                azimuth_deg[0],
+                (azimuth_deg[1] - azimuth_deg[0]) % 360,
+                AZIMUTH_DEG,
+            ),
             (plain["elevation_rad"], -60.0, 120.0, ELEVATION_DEG),
         ):
             count = math.ceil(width / (beam * spacing) - 1e-9)
             centres = [low + (number + 0.5) * width / count for number in range(count)]
-            off.append(min(abs(math.degrees(angle) - centre) for centre in centres) / beam)
+            apart = [math.remainder(math.degrees(angle) - centre, 360.0) for centre in centres]
+            off.append(min(map(abs, apart)) / beam)
         # One way 3 dB at half a beamwidth; both ways four times 3 dB times the square of twice it.
         dip_db = [-10.0 * math.log10(0.25) * (2.0 * part) ** 2 for part in off]
         if sweep:

@@ -9,10 +9,10 @@ import pytest
 from scipy.integrate import simpson, solve_ivp
 from scipy.optimize import brentq
 
+from components.arguments.units import KNOT_M_S
 from docs.make.published import least_range
 from docs.make.published.least_range import RATIOS, grid_courses, main, ratio_rows
 from docs.make.published.turn_flights import (
-    KT_MPS,
     LeastRange,
     closing_speeds,
     least_ranges,
@@ -32,7 +32,7 @@ DATA = Path(os.environ.get("REFERENCE_DATA", Path(__file__).parents[5] / "shared
 
 def by_hand(azimuth_deg, closing_mps):
     """Least range of the better turn by 90 deg over a flat Earth: ψ' = g tan φ / v, φ = p t."""
-    v = 60.0 * KT_MPS
+    v = 60.0 * KNOT_M_S
     line = np.array([math.sin(math.radians(azimuth_deg)), math.cos(math.radians(azimuth_deg))])
     intruder = np.array([0.0, v]) - closing_mps * line
 
@@ -59,7 +59,7 @@ def by_hand(azimuth_deg, closing_mps):
 @pytest.mark.parametrize(("kt", "azimuth_deg"), [(35, 20.0), (140, 100.0)])
 def test_the_least_range_is_that_of_the_turn_by_hand(kt, azimuth_deg):
     found = least_ranges(kt, [azimuth_deg])
-    speeds = closing_speeds(azimuth_deg, kt * KT_MPS)
+    speeds = closing_speeds(azimuth_deg, kt * KNOT_M_S)
     assert [one.closing_mps for one in found] == speeds and len(speeds) == (2 if kt < 60 else 1)
     for one, speed in zip(found, speeds, strict=True):
         by_geometry = least_range_m(azimuth_deg, speed, [90.0])
@@ -69,7 +69,7 @@ def test_the_least_range_is_that_of_the_turn_by_hand(kt, azimuth_deg):
 
 
 def test_turns_from_behind_are_also_by_less():
-    speed = closing_speeds(172.0, 105 * KT_MPS)[0]
+    speed = closing_speeds(172.0, 105 * KNOT_M_S)[0]
     (one,) = least_ranges(105, [172.0])
     assert one.range_m == pytest.approx(least_range_m(172.0, speed, [60.0]), abs=0.3)
     assert one.range_m < least_range_m(172.0, speed, [75.0]) - 1.0
@@ -79,10 +79,10 @@ def test_turns_from_behind_are_also_by_less():
 def test_how_far_a_rolling_turn_has_turned():
     # The integral of g tan(p t) / v, by Simpson's rule, and a steady rate from 4.5 s on.
     time_s = np.linspace(0.0, 4.5, 201)
-    rate = 9.80665 * np.tan(np.radians(10.0) * time_s) / (60.0 * KT_MPS)
+    rate = 9.80665 * np.tan(np.radians(10.0) * time_s) / (60.0 * KNOT_M_S)
     assert turned_rad(np.array([4.5]))[0] == pytest.approx(simpson(rate, x=time_s), rel=1e-6)
     ahead = turned_rad(np.array([6.0, 7.0]))
-    assert ahead[1] - ahead[0] == pytest.approx(9.80665 / (60.0 * KT_MPS))
+    assert ahead[1] - ahead[0] == pytest.approx(9.80665 / (60.0 * KNOT_M_S))
 
 
 def test_a_search_ends_on_its_staircase():
@@ -106,7 +106,7 @@ def test_both_sides_are_alike():
 
 def stepped_by_hand(azimuth_deg, closing_mps, turn_deg, side):
     """The range from which on a turn by their equations, step by step, clears the disc."""
-    v, dt = 60.0 * KT_MPS, TIME_STEP_S
+    v, dt = 60.0 * KNOT_M_S, TIME_STEP_S
     line = np.array([math.sin(math.radians(azimuth_deg)), math.cos(math.radians(azimuth_deg))])
     intruder = np.array([0.0, v]) - closing_mps * line
 
@@ -142,7 +142,7 @@ def stepped_by_hand(azimuth_deg, closing_mps, turn_deg, side):
      (105, 172.0, 60.0, 1.0), (80, 60.0, 45.0, -1.0)],
 )  # fmt: skip
 def test_a_turn_by_steps_is_that_of_their_equations(kt, azimuth_deg, turn_deg, side):
-    speed = closing_speeds(azimuth_deg, kt * KT_MPS)[0]
+    speed = closing_speeds(azimuth_deg, kt * KNOT_M_S)[0]
     found = stepped_least_range_m(azimuth_deg, speed, [turn_deg], [side])
     assert found == pytest.approx(stepped_by_hand(azimuth_deg, speed, turn_deg, side), abs=0.01)
 
@@ -152,7 +152,7 @@ def as_geometry_says(kt, azimuths_deg, more_m=0.0):
     return [
         LeastRange(a, c, speed, least_range_m(a, speed, turns_deg(a)) + more_m)
         for a in azimuths_deg
-        for c, speed in enumerate(closing_speeds(a, kt * KT_MPS))
+        for c, speed in enumerate(closing_speeds(a, kt * KNOT_M_S))
     ]
 
 
@@ -173,7 +173,7 @@ def test_what_flights_need_more_goes_along_straight_lines():
     expected = np.interp(courses.azimuth_deg, list(more), list(more.values()))
     assert courses.flown_m - without.flown_m == pytest.approx(expected, abs=1e-9)
     assert np.abs(courses.counted_m - without.counted_m - expected).max() < courses.step_m.max()
-    assert courses.step_m[0] == pytest.approx(0.2 * closing_speeds(0.25, 105 * KT_MPS)[0])
+    assert courses.step_m[0] == pytest.approx(0.2 * closing_speeds(0.25, 105 * KNOT_M_S)[0])
 
 
 def test_needed_ranges_may_be_a_step_longer_or_as_flown():
@@ -202,7 +202,7 @@ def test_any_speed_is_asked_for_by_a_command(capsys):
     out = capsys.readouterr().out.splitlines()
     (azimuth, course, closing, flown, closed, _) = map(float, out[1].split(","))
     assert (azimuth, course) == (20.0, 0.0) and len(out) == 3
-    assert closing == pytest.approx(closing_speeds(20.0, 195 * KT_MPS)[0], abs=1e-4)
+    assert closing == pytest.approx(closing_speeds(20.0, 195 * KNOT_M_S)[0], abs=1e-4)
     assert flown == pytest.approx(closed, abs=0.4)
     assert out[-1].endswith("1200 m: 0.0000")
 
