@@ -216,8 +216,8 @@ class Scene:
         key: Key = ("blocks", name)
         if file is None:
             return self.problem(dotted(key), text)
-        for parameter, value in parameters:
-            if isinstance(value, Path) and text.startswith(f"{value}: "):
+        for parameter, path in parameters:
+            if isinstance(path, Path) and text.startswith(f"{path}: "):
                 return file.problem((*key, parameter), text)
         value: Any = file.data["blocks"][name]
         while begins := re.match(r"([\w.\[\]]+)(?:: | is \S+: )", text):
