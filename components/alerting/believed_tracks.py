@@ -48,9 +48,9 @@ class EstimatedFlights:
             replica=came.run[row_of_entries(tracks.offsets)],
             number=tracks.track,
             time_s=tracks.state_s,
-            state=np.stack([getattr(tracks, name) for name in STATE]),
-            covariance=np.stack([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
-            origin=np.stack([getattr(tracks, name) for name in ORIGIN]),
+            state=np.array([getattr(tracks, name) for name in STATE]),
+            covariance=np.array([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
+            origin=np.array([getattr(tracks, name) for name in ORIGIN]),
         )
         self._tracks = KeyedTable.joined([self._tracks, new.take(good)])
 
@@ -99,11 +99,11 @@ def _in_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) ->
         reference_alt_m=tracks.origin[2],
     )  # fmt: skip
     # The frame's axes are those of its origin; velocity counts along those of the target's place.
-    position_deg = np.stack([lat_deg, lon_deg])
+    position_deg = np.array([lat_deg, lon_deg])
     v_north, v_east, v_down = vectors_in_frame(position_deg, tracks.origin, tracks.state[3:])
     own_lat, own_lon, own_alt_m = own_place
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
-    return np.stack(
+    return np.array(
         [
             *east_north_m(lat, lon, own_lat, own_lon),
             alt_m - own_alt_m,

@@ -57,7 +57,7 @@ class OwnPoses:
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
         self._keep(
             self._poses.with_more(
-                came, tick=states.tick, place=np.stack(position), attitude=np.stack(angles)
+                came, tick=states.tick, place=np.array(position), attitude=np.array(angles)
             )
         )
 

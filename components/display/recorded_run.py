@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.messages.columns import POSE as POSE_COLUMNS
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import UsageError
 from dsa_des.record.run_folder import Run, with_columns_of_rows
 from dsa_des.scene.examples import find_example
@@ -126,23 +126,22 @@ class RecordedTables:
 
     def texts(self, table: str, name: str) -> list[str | None]:
         """Return a column of texts, as `numbers` does one of numbers."""
-        result = self._column(table, name).to_pylist()
-        if not all(text is None or isinstance(text, str) for text in result):
-            raise UsageError(
-                f"{self.folder}: {table}.parquet: {name} holds something else than text"
-            )
-        return result
-
-    def values(self, table: str, name: str) -> Any:
-        """Return a column of texts as a list, any other as an array of its own type."""
-        import pyarrow as pa
-
         if (table, name) not in self._kept:
-            column = self._column(table, name)
-            text = pa.types.is_string(column.type) or pa.types.is_dictionary(column.type)
-            result = column.to_pylist() if text else column.to_numpy(zero_copy_only=False)
+            result = self._column(table, name).to_pylist()
+            if not all(text is None or isinstance(text, str) for text in result):
+                raise UsageError(
+                    f"{self.folder}: {table}.parquet: {name} holds something else than text"
+                )
             self._kept[table, name] = result
-        return self._kept[table, name]
+        texts: list[str | None] = self._kept[table, name]
+        return texts
+
+    def values(self, table: str, name: str) -> AnyArray:
+        """Return a column of numbers or flags as an array of its own type; refuse any other."""
+        result: AnyArray = self._column(table, name).to_numpy(zero_copy_only=False)
+        if result.dtype.kind not in "biuf":
+            return self.numbers(table, name)
+        return result
 
     def _column(self, table: str, name: str) -> Any:
         columns = self.table(table)

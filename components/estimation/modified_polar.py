@@ -142,7 +142,7 @@ def _polar(
     away, velocity = state[:3] - sensor_m, state[3:6]
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     axes = _axes(away / distance)
-    by_range = np.stack([dot(axis, velocity) for axis in axes]) / distance
+    by_range = np.array([dot(axis, velocity) for axis in axes]) / distance
     return axes, distance, by_range, _to_polar(axes, distance, velocity)
 
 
@@ -236,7 +236,7 @@ def _from_polar(
 
 
 def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.stack(
+    return np.array(
         [
             one[1] * other[2] - one[2] * other[1],
             one[2] * other[0] - one[0] * other[2],

@@ -49,6 +49,8 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
     """Return the alerts of a run in the order in which they came; none where nothing alerts."""
     if "alerts" not in run.tables:
         return []
+    for name in ("time_s", "level"):
+        run.numbers("alerts", name)  # refuses what another program may have written
     on: dict[Any, Alert] = {}
     result = []
     rows = sorted(run.tables["alerts"].to_pylist(), key=_look)

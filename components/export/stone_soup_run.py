@@ -186,13 +186,13 @@ def _looks(
     ranged = set(block[np.isfinite(columns["range_m"])])
     result: dict[tuple[float, bool, str], list[int]] = {}
     for i, (name, when) in enumerate(zip(block.tolist(), time_s.tolist(), strict=True)):
-        result.setdefault((when, name not in ranged, name), []).append(i)
+        result.setdefault((when, name not in ranged, name or ""), []).append(i)
     sweeping = set(block[np.isfinite(columns["illuminated_s"])])
     if "scans" in run.tables:
-        names = run.values("scans", "block")
+        names = run.texts("scans", "block")
         for name, when in zip(names, run.numbers("scans", "time_s").tolist(), strict=True):
             if name not in sweeping:  # a scan of a sweeping beam has no one instant
-                result.setdefault((when, name not in ranged, name), [])
+                result.setdefault((when, name not in ranged, name or ""), [])
     values = np.stack([columns[name] for name in _MEASURED])
     variances = np.stack([columns[name] for name in _VARIANCES])
     for (when, _, name), rows_of in sorted(result.items()):

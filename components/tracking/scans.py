@@ -175,7 +175,7 @@ def scans_of(fused: FusedDetections) -> Scans:
     tick = fused.measured_tick
     pose = fused.pose_columns()
     own = (
-        np.stack([pose[name] for name in POSE]) if pose else np.full((len(POSE), len(row)), np.nan)
+        np.array([pose[name] for name in POSE]) if pose else np.full((len(POSE), len(row)), np.nan)
     )
     looks = fused.looks
     looked = 0
@@ -211,9 +211,9 @@ def scans_of(fused: FusedDetections) -> Scans:
     entries = np.argsort(of_entry, kind="stable")
     reported = np.full((len(TOLD), len(mask)), np.nan)
     if fused.told_by_target is not None:
-        reported = np.stack([fused.told_by_target[name] for name in TOLD])
-    measured = np.stack([*(getattr(fused, name) for name in _MEASURED), *reported[:3]])
-    variance = np.stack([*(getattr(fused, name) for name in _VARIANCES), *reported[3:6]])
+        reported = np.array([fused.told_by_target[name] for name in TOLD])
+    measured = np.array([*(getattr(fused, name) for name in _MEASURED), *reported[:3]])
+    variance = np.array([*(getattr(fused, name) for name in _VARIANCES), *reported[3:6]])
     seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
@@ -229,7 +229,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         variance=selected(variance, entries),
         reported=None if fused.told_by_target is None else selected(reported, entries),
         contributors=mask[entries],
-        source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
+        source=np.array([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )
 
 
@@ -237,7 +237,7 @@ def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArra
     """Return the ownship's velocity at each look, as the first of its entries has it."""
     velocity = np.full((3, count), np.nan)
     if fused.own_velocity is not None:
-        velocities = np.stack(list(fused.own_velocity.values()))
+        velocities = np.array(list(fused.own_velocity.values()))
         known = np.flatnonzero(~np.isnan(velocities).any(axis=0))[::-1]
         velocity[:, look[known]] = velocities[:, known]
     return velocity

@@ -58,7 +58,7 @@ def run_picture(folder: Path) -> RunPicture:
         return {name: run.values(table, name) for name in columns if run.has(table, name)}
 
     def about(table: str) -> dict[str, AnyArray]:
-        result = {"target": _codes(run.values(table, "target"), targets)}
+        result = {"target": _codes(run.texts(table, "target"), targets)}
         return result | _sources(run, table)
 
     tables = picture.tables
@@ -67,13 +67,13 @@ def run_picture(folder: Path) -> RunPicture:
         tables["truth"] = _truth(run, plane, targets)
     tables["scans"] = {
         "time_s": run.numbers("scans", "time_s"),
-        "sensor": _codes(run.values("scans", "block"), sensors),
+        "sensor": _codes(run.texts("scans", "block"), sensors),
         "detected": run.values("scans", "detected"),
     }
     tables["detections"] = {
         "time_s": run.numbers("detections", "time_s"),
-        "sensor": _codes(run.values("detections", "block"), sensors),
-        "target": _codes(run.values("detections", "target"), targets),
+        "sensor": _codes(run.texts("detections", "block"), sensors),
+        "target": _codes(run.texts("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
         **_seen(run, "detections", run.stacked("detections", POSE), plane),
     }
@@ -103,7 +103,7 @@ def run_picture(folder: Path) -> RunPicture:
     if "bands" in run.tables:
         columns = ("time_s", "low_rad", "high_rad", "low_m", "high_m")
         tables["bands"] = {name: run.values("bands", name) for name in columns}
-        tables["bands"]["region"] = _codes(run.values("bands", "region"), BAND_REGIONS)
+        tables["bands"]["region"] = _codes(run.texts("bands", "region"), BAND_REGIONS)
     return picture
 
 
@@ -119,7 +119,8 @@ def _json(path: Path) -> dict[str, Any]:
 
 def _texts(run: RecordedTables, table: str, name: str) -> set[str]:
     """Return the texts of a column, none where there is no such column."""
-    return {*run.values(table, name)} - {None} if run.has(table, name) else set()
+    texts = run.texts(table, name) if run.has(table, name) else []
+    return {text for text in texts if text is not None}
 
 
 def _blocks(run: RecordedTables, table: str) -> list[str]:
@@ -137,7 +138,7 @@ def _codes(column: list[str | None], names: Any) -> AnyArray:
 def _sources(run: RecordedTables, table: str) -> dict[str, AnyArray]:
     """Return by number which block each row is of."""
     names = _blocks(run, table)
-    return {"source": _codes(run.values(table, "block"), names)} if names else {}
+    return {"source": _codes(run.texts(table, "block"), names)} if names else {}
 
 
 def _whole(column: Any) -> AnyArray:
@@ -178,7 +179,7 @@ def _own(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
     table, names, rows = "detections", list(POSE), np.arange(run.tables["detections"].num_rows)
     true = [name.removeprefix("own_") for name in POSE]
     if run.has("truth", *true):
-        mine = np.array([name is None for name in run.values("truth", "target")], dtype=bool)
+        mine = np.array([name is None for name in run.texts("truth", "target")], dtype=bool)
         if mine.any():
             table, names, rows = "truth", true, np.flatnonzero(mine)
     time_s, first = np.unique(run.numbers(table, "time_s")[rows], return_index=True)
@@ -200,7 +201,7 @@ def _truth(
     run: RecordedTables, plane: TangentPlane, targets: Mapping[str, int]
 ) -> dict[str, AnyArray]:
     """Return the targets' true positions, by target and then by time."""
-    code, time_s = _codes(run.values("truth", "target"), targets), run.numbers("truth", "time_s")
+    code, time_s = _codes(run.texts("truth", "target"), targets), run.numbers("truth", "time_s")
     keep = np.flatnonzero((code >= 0) & np.isfinite(run.numbers("truth", "lat_deg")))
     keep = keep[np.lexsort((time_s[keep], code[keep]))]
     position = [run.values("truth", name)[keep] for name in ("lat_deg", "lon_deg", "alt_m")]
@@ -222,7 +223,7 @@ def _estimates(
     plane: TangentPlane,
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
-    status = np.array(run.values("state_tracks", "track_status"), dtype=object)
+    status = np.array(run.texts("state_tracks", "track_status"), dtype=object)
     keep = np.flatnonzero(status != "deleted")
 
     def column(name: str) -> FloatArray:
@@ -237,7 +238,7 @@ def _estimates(
         "time_s": time_s,
         "number": np.asarray(run.values("state_tracks", "track"))[keep],
         **(
-            {"source": _codes(run.values("state_tracks", "block"), trackers)[keep]}
+            {"source": _codes(run.texts("state_tracks", "block"), trackers)[keep]}
             if trackers
             else {}
         ),

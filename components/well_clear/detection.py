@@ -38,19 +38,18 @@ def uncertain_violation_span(
     As `violation_span`; where all four bounds are 0, with its result.
     """
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
-    known = np.all(np.stack(np.broadcast_arrays(*bounds)) == 0.0, axis=0)
     e = Bounds(*(np.maximum(bound, LEAST_BOUND) for bound in bounds))
     vertical = _vertical(volume, up, climb, e, end_s)
     motion = horizontal_of(east, north, v_east, v_north)
     horizontal = _horizontal(volume, (east, north, v_east, v_north), motion, e, end_s)
     entry = np.maximum(np.maximum(vertical.begin_s, horizontal.begin_s), begin_s)
     leave = np.minimum(vertical.end_s, horizontal.end_s)
+    span = _only(Span(entry, leave), surely_less(entry, leave))
+    known = np.asarray(sum(bounds) == 0.0)  # none is negative
+    if not known.any():
+        return span
     plain = violation_span(volume, relative, begin_s, end_s)
-    some = surely_less(entry, leave)
-    return Span(
-        np.where(known, plain.begin_s, np.where(some, entry, np.inf)),
-        np.where(known, plain.end_s, np.where(some, leave, -np.inf)),
-    )
+    return Span(*(np.where(known, *both) for both in zip(plain, span, strict=True)))
 
 
 def _vertical(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:

@@ -22,7 +22,7 @@ SECTIONS: list[tuple[str, Callable[[], list[NumericalCase]]]] = [
 
 _HEAD = """# Hard cases
 
-What the straightforward formula gives, what dsa_des gives, and what is true. Printed by
+The result of the straightforward formula, that of dsa_des, and the true value. Printed by
 `python -m docs.make.numerics` (needs the extra `test`); `--check` compares this page with
 what your machine computes. The naive column may differ in its last digits from machine to machine:
 those digits are the noise this page is about.

@@ -20,11 +20,13 @@ from scipy.spatial.transform import Rotation
 
 import dsa_des
 from components.display.recorded_run import RecordedTables
+from components.export.alert_levels import alerts_of
 from components.export.command import export
 from components.export.flight_files import daa_text, xyz_text
 from components.formats.daa_file import read_daa
 from components.view.command import view
 from docs.make.reference import recorded_tables
+from dsa_des.errors import UsageError
 from tests.view.test_page import SCENE
 
 NAME = "a<b&'c"
@@ -296,6 +298,8 @@ def test_daa_holds_every_row_in_its_units():
         ("kml", "detections", "time_s", 1e300, "detections.parquet: time_s in row 0 is 1e+300"),
         ("view", "truth", "lat_deg", None, "truth.parquet: there is no column 'lat_deg'"),
         ("view", "detections", "azimuth_rad", "x", "azimuth_rad holds no numbers"),
+        ("view", "scans", "detected", "x", "scans.parquet: detected holds no numbers"),
+        ("view", "scans", "block", 1.5, "block holds something else than text"),
     ],
 )
 def test_damaged_run_folders_are_said(run, tmp_path, to, table, column, value, said):
@@ -307,14 +311,20 @@ def test_damaged_run_folders_are_said(run, tmp_path, to, table, column, value, s
     if value is not None:
         values = (
             [value, *found[column].to_pylist()[1:]]
-            if isinstance(value, float)
-            else ["x"] * len(found)
+            if isinstance(value, float) and column != "block"
+            else [value] * len(found)
         )
         rest = rest.add_column(place, column, pa.array(values))
     pq.write_table(rest, folder / f"{table}.parquet")
     command, words = (view, []) if to == "view" else (export, ["--to", to])
     done = CliRunner().invoke(command, [str(folder), *words, "--out", str(tmp_path / "o.html")])
     assert done.exit_code == 2 and said in done.output and not (tmp_path / "o.html").exists()
+
+
+def test_alerts_of_another_program_are_said():
+    rows = {"time_s": [0.0], "block": ["alerting"], "target": ["a"], "level": ["x"]}
+    with pytest.raises(UsageError, match=r"run: alerts\.parquet: level holds no numbers"):
+        alerts_of(RecordedTables(Path("run"), {"alerts": pa.table(rows)}))
 
 
 @pytest.mark.parametrize("name", ["", "_x", "1x", "x y", "x" * 64])

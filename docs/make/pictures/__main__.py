@@ -14,8 +14,9 @@ import numpy as np
 from components.thesis.drawing import GREY
 from docs.make.pictures.bound import bound_table
 from docs.make.pictures.flow import flow_table
+from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import BLUE, PINK, drawing
+from dsa_des.record.drawing import drawing
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

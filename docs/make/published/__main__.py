@@ -20,7 +20,7 @@ _BEGIN, _END = "<!-- section: {} -->", "<!-- end -->"
 
 HEAD = """# Published results
 
-What others have published of the whole chain, and what our scenes and studies give. Made by
+Published results for the whole chain beside those of our scenes and studies. Made by
 `python -m docs.make.published` (in a working copy; with names of sections, those alone). Nothing
 was tuned to a number; what was chosen is said in each section, with its inputs, their licence, and
 what is not open. A row is *equal* if both differ by no more than is said, *inside* if what is

@@ -8,7 +8,7 @@ import numpy as np
 import dsa_des
 from components.arguments.units import FOOT_M
 from components.thesis.drawing import GREY, legend_below, panels
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE, RED
+from dsa_des.block.mark import BLUE, GREEN, ORANGE, RED
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
 #: Of the study as it is shipped.

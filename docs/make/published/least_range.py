@@ -26,7 +26,7 @@ from docs.make.published.turn_flights import (
 )
 from docs.make.published.turn_geometry import least_range_m
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 

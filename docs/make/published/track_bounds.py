@@ -13,7 +13,7 @@ import numpy as np
 import dsa_des
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.thesis.drawing import panels
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 TITLE = "Does an open tracker pass DO-365?"
 ORDER = 2
