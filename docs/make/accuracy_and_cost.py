@@ -215,7 +215,7 @@ includes the sensors' grids.
 
 ## The thesis's scene
 
-`dsa-des cost configs/first_light.toml --all`
+`dsa-des cost first_light --all`
 
 ![Error against cost, one panel per ladder](images/cost_first_light.png)
 
@@ -229,7 +229,7 @@ includes the sensors' grids.
 
 ## A flown encounter
 
-`dsa-des cost configs/replay_daa.toml --set blocks.traffic.file={encounter_name}`: {encounter_says}.
+`dsa-des cost replay_daa --set blocks.traffic.file={encounter_name}`: {encounter_says}.
 
 ![Error against cost, one panel per ladder](images/cost_encounter.png)
 
@@ -237,7 +237,7 @@ includes the sensors' grids.
 
 ## Trackers
 
-`dsa-des cost configs/tracking/architectures.toml --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
+`dsa-des cost tracking/architectures --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
 a radar at 1 Hz and two cameras, one of them delayed; two straight flights. Times are those of a
 tracker alone in a single run, in which a step's fixed cost dominates ([in lock
 step](performance.md#track-updates) an update is far cheaper). Errors are the distance of the
