@@ -227,7 +227,10 @@ class Scene:
                     value = value[part]
             except (LookupError, TypeError):
                 break
-            key, text = (*key, *inner), text[begins.end() :]
+            key = (*key, *inner)
+            if len(key) == 2 + len(inner) and " is " in begins[0]:  # a whole sentence of its own
+                return file.problem(key, text)
+            text = text[begins.end() :]
         return file.problem(key, text, *([] if isinstance(value, dict | list) else [value]))
 
     @property
