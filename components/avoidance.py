@@ -158,7 +158,7 @@ class TurnAwayParameters(Parameters):
     )
     direction: Literal["away", "towards", "left", "right"] = Field(
         default="away",
-        description="Away from the side on which the nearest is, towards it (behind who crosses), "
+        description="Away from the side of the nearest, towards it (behind a crossing one), "
         "or always the same way.",
     )
     pause_s: NonNegativeRational = Field(

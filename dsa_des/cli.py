@@ -37,7 +37,7 @@ _everything_option = click.option(
 )
 @click.version_option(__version__, prog_name="dsa-des")
 def main() -> None:
-    """Simulate a UAV's detect-and-sense chain: who saw the intruder, when, and how far away."""
+    """Simulate a UAV's detect-and-avoid chain: which sensor sees what, when, how far away."""
 
 
 @main.command()

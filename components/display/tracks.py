@@ -17,7 +17,8 @@ from components.messages.state_tracks import COVARIANCE, held
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import PALETTE, drawing, figure_text, tight
+from dsa_des.block.mark import PALETTE
+from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.running.simulation import Simulation
 
 #: Of trackers and tracks, in turn; black is the truth.

@@ -82,7 +82,7 @@ class RiskRatioParameters(RiskParameters):
     needless: bool = Field(
         default=False,
         description="Also the share of the encounters that stay well clear without manoeuvres in "
-        "which the ownship is told to manoeuvre.",
+        "which the ownship gets a manoeuvre.",
     )
 
 

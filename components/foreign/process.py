@@ -56,7 +56,7 @@ class ProcessParameters(Parameters):
         None, description="Where the program runs; by default the folder of the scene's file."
     )
     arguments: dict[str, Any] = Field(
-        {}, description="What the program is told when it starts, as it wants it."
+        {}, description="Passed on to the program when it starts; any keys that it expects."
     )
     scan_rate_hz: PositiveRational | None = Field(
         None, description="Calls per second besides those at which something arrives."

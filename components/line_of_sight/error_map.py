@@ -145,7 +145,8 @@ def _draw(
     from matplotlib.colors import LogNorm
     from matplotlib.lines import Line2D
 
-    from dsa_des.record.drawing import RED, drawing
+    from dsa_des.block.mark import RED
+    from dsa_des.record.drawing import drawing
 
     styles: list[Any] = list(zip(contours, ("#FFFFFF", RED), ("--", "-"), strict=True))
     # A column for each model, and one for the bar of shades.

@@ -42,8 +42,8 @@ _WELL_CLEAR, _NMAC = PRESETS["astm_f3442"], PRESETS["nmac"]
 #: Of metrics of losses; ``step_s`` of None looks between samples too.
 STEP: Any = Field(
     default=None, gt=0, le=10,
-    description="Take distances at this spacing only, s. By default entries are found between "
-    "samples too, to 1 ms.",
+    description="Take distances at this spacing only, s. By default entries between samples "
+    "count too, to 1 ms.",
 )  # fmt: skip
 
 
@@ -230,7 +230,7 @@ class AlertTimeParameters(TargetParameters, SizeParameters):
     step_s: float | None = STEP
     steered: bool = Field(
         default=False,
-        description="Take the flights as the ownship was told to fly them, not as planned.",
+        description="Take the flights with the ownship's manoeuvres, not as planned.",
     )
 
 

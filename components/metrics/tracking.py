@@ -22,10 +22,10 @@ _TABLE = "state_tracks"
 _MOST_STRETCHES = 400
 
 _RESULTS = {
-    "track_nees_mean": "mean normalised error squared of tracks' states; 6 where they are honest",
+    "track_nees_mean": "mean normalised error squared of tracks' states; 6 if consistent",
     "track_nees_inside": "share of them within the 95 % bounds of chi-square with 6 degrees",
-    "track_nis_per_freedom": "normalised innovations squared by the quantities measured; 1 where "
-    "what is expected of detections is honest",
+    "track_nis_per_freedom": "normalised innovations squared by the quantities measured; 1 if "
+    "predictions are consistent",
     "track_nis_inside": "share of them within the 95 % bounds of chi-square",
     "track_position_error_m": "distance of tracks from their targets, rms, m",
     "track_horizontal_error_m": "its horizontal part, rms, m",

@@ -102,7 +102,7 @@ class RadarParameters(ResolutionParameters):
 
     range_rate_folds: bool = Field(
         default=False,
-        description="Whether measured range rates are ambiguous, as those of one PRF are: what is "
+        description="Whether measured range rates are ambiguous, as those of one PRF are: a rate "
         "beyond the unambiguous velocity, wavelength * prf_hz / 4, folds back within.",
     )
 

@@ -5,8 +5,7 @@ Sensors see the same target in the same place: big open marks and small filled o
 visible.
 """
 
-from dsa_des.block.mark import Mark
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE, PINK, RED, SKY
+from dsa_des.block.mark import BLUE, GREEN, ORANGE, PINK, RED, SKY, Mark
 
 EO = Mark(BLUE, "o", 7.5)
 IR = Mark(ORANGE, "^", 6.0)

@@ -101,8 +101,8 @@ class ActiveParameters(CooperativeParameters):
     near_s: float = Field(
         default=60.0,
         ge=0,
-        description="Who would be met within this time, by measured ranges, is asked at every "
-        "scan, s; as is who is new.",
+        description="Aircraft that would be met within this time, by measured ranges, and new "
+        "ones are interrogated at every scan, s.",
     )
     far_every: int = Field(
         default=5, ge=1, le=1000, description="Of others, one scan in so many asks each."

@@ -57,7 +57,7 @@ class AdsBParameters(CooperativeParameters):
     )
     compact: bool = Field(
         default=True,
-        description="Whether what is sent is rounded as in the messages: compact positions, 25 ft, "
+        description="Whether values are rounded as in the messages: compact positions, 25 ft, "
         "whole knots, 64 ft/min.",
     )
     velocity_age_s: float = Field(

@@ -16,7 +16,7 @@ from components.thesis.drawing import GREY, panels
 from components.thesis.rows import Cells, Made, Row, calibrated, configured, predicted
 from components.thesis.scenes import aircraft, areas, eo_camera, ir_camera
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE, SKY
+from dsa_des.block.mark import BLUE, GREEN, ORANGE, SKY
 
 # Not printed; 9.5 km for the ascending Convair follows from it by the thesis's equations
 # (errata 23), and the King Air is taken to climb alike.

@@ -23,7 +23,7 @@ from components.thesis.scenes import (
     scene,
 )
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, ORANGE
+from dsa_des.block.mark import BLUE, ORANGE
 
 #: Aircraft file → name and class.
 TABLE_4_1 = {

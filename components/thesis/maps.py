@@ -25,7 +25,7 @@ from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Cells, Columns, Made, Row, configured, predicted
 from components.thesis.scenes import radar_parameters, run, scene
 from dsa_des.arrays.types import AnyArray
-from dsa_des.record.drawing import BLUE, ORANGE
+from dsa_des.block.mark import BLUE, ORANGE
 
 
 def _joined(

@@ -13,7 +13,7 @@ import numpy as np
 from components.thesis.drawing import FUSION, GREY, RADAR, legend_below, panels
 from components.thesis.rows import Cells, Made, Picture, Printed, Row, calibrated
 from components.thesis.scenes import areas, run, scene
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 #: Aircraft of Table 3.1, by file.
 AIRCRAFT = {"king_air": "King Air", "f_16": "F-16", "boeing_787": "Boeing 787"}

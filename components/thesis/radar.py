@@ -14,7 +14,7 @@ from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.rows import Cells, Made, Printed, Row, calibrated, predicted
 from components.thesis.scenes import radar_parameters, run, scene
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 NAUTICAL_MILE_KM = 1.852
 RCS_DBSM = 10.0 * float(np.log10(5.0))

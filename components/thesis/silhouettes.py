@@ -17,7 +17,7 @@ from components.thesis.silhouette_comparison import (
     compare_silhouettes,
     draw_comparison,
 )
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 # §3.5.3: "the parameters a and b are set to 1 and 1.5 for the plot and represent the size of the
 # back and front sphere respectively".

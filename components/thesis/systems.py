@@ -26,7 +26,7 @@ from components.thesis.scenes import (
     table,
 )
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE, PINK, SKY
+from dsa_des.block.mark import BLUE, GREEN, ORANGE, PINK, SKY
 from dsa_des.running.simulation import Simulation
 
 _PLACE = ("own_lat_deg", "own_lon_deg", "own_alt_m")

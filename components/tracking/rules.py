@@ -143,8 +143,8 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
     start_gate_probability: float = Field(
         default=0.999999, ge=0, lt=1,
-        description="Probability of a wider gate about confirmed tracks: what is detected in it "
-        "starts no track of its own; 0 for none.",
+        description="Probability of a wider gate about confirmed tracks: a detection in it "
+        "starts no new track; 0 for none.",
     )  # fmt: skip
     detection_probability: float = Field(
         default=0.9, gt=0, lt=1, description="Probability that a look at a target detects it."
@@ -187,8 +187,8 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
     assumed_range_m: float | None = Field(
         default=None, gt=0,
-        description="Range that is assumed of what is seen without one, m; its inverse is taken to "
-        "be known to 50 %. By default a quarter of the farthest reach of the sensors.",
+        description="Assumed range of detections without one, m; its inverse has a standard "
+        "deviation of 50 %. By default a quarter of the farthest reach of the sensors.",
     )  # fmt: skip
     passive_range_share: float | None = Field(
         default=None, gt=0, le=10,

@@ -101,7 +101,7 @@ class TrafficSource(Component):
         "manoeuvres": Input(
             Manoeuvres,
             "queued",
-            "Turns and climbs that the ownship is told to fly.",
+            "Turns and climbs that the ownship has to fly.",
             required=False,
         )
     }

@@ -55,17 +55,17 @@ class LookoutParameters(SensorParameters):
 
     azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
         default=(-110.0, 90.0),
-        description="Field of view of who sits on the left, clockwise from the first to the "
-        "second, deg; that of who sits on the right is its mirror image.",
+        description="Field of view from the left seat, clockwise from the first to the second, "
+        "deg; that from the right seat is its mirror image.",
     )
     elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
         default=(-20.0, 35.0), description="Field of view in elevation, lowest and highest, deg."
     )
     left_looking: float = Field(
-        default=1.0, ge=0, le=1, description="Share of time that who sits on the left looks out."
+        default=1.0, ge=0, le=1, description="Share of time in which the left pilot looks out."
     )
     right_looking: float = Field(
-        default=0.0, ge=0, le=1, description="The same of who sits on the right; 0: nobody."
+        default=0.0, ge=0, le=1, description="The same for the right pilot; 0: there is none."
     )
     looking: Literal["glances", "spells"] = Field(
         default="glances",
@@ -74,7 +74,7 @@ class LookoutParameters(SensorParameters):
     )
     search: Literal["random", "round"] = Field(
         default="random",
-        description="Whether an aircraft is found at Andrews's rate, or at the first look at its "
+        description="Whether an aircraft is seen at Andrews's rate, or at the first look at its "
         "place of a search that comes round.",
     )
     beta_per_sr_s: float = Field(

@@ -156,11 +156,11 @@ def error_map_section(images: Path) -> str:
     lines += [
         "",
         f"Flat Earth takes a sphere for the ellipsoid, which turns directions by up to "
-        f"{scale_deg:.2f}° at any range: a radar does not notice, a camera does wherever it looks "
-        "but within a kilometre near 75°. Local radii cure that. What they leave out, the "
-        "curvature, grows with range, and the convergence of the meridians with range and "
-        "tan(latitude): close to a pole neither holds at any range. Azimuths along the geodesic "
-        "with straight-line elevations miss the curvature only. The ellipsoid errs by less than "
+        f"{scale_deg:.2f}° at any range: negligible for a radar, not for a camera except within a "
+        "kilometre near 75°. Local radii remove this error. The curvature, which they neglect, "
+        "grows with range, and the convergence of the meridians with range and tan(latitude): "
+        "close to a pole neither model is valid at any range. Azimuths along the geodesic with "
+        "straight-line elevations neglect the curvature only. The ellipsoid errs by less than "
         f"1e{exact} rad, which is the rounding of the targets' positions.",
     ]
     return "\n".join(lines)
@@ -182,7 +182,7 @@ TRACKERS = ("tracking/architectures.toml", "blocks.eo.latency_s=0.3")
 
 _PAGE = """# What accuracy costs
 
-For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their time; cruder ones save fractions of a microsecond, dearer ones bring nothing:
+For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their cost; cruder ones save fractions of a microsecond, costlier ones gain nothing:
 {head}
 
 All numbers above are of one scene, the [flown encounter](#a-flown-encounter).
@@ -195,22 +195,23 @@ every rung in turn, everything else fixed, on common random numbers. Made by
 ## How to read the tables
 
 *First seen*: of all pairs of sensor and target, the largest change in the range of the first
-detection, and the change of its time. The radar's reference sees from the first scan on, in the
-thesis's scene (12 km) and in the flown encounter: what its rungs lose there is a lower bound.
-*Gained, lost*: detections (sensor, target, instant) that only
-the rung, only the reference has. *Fused*: share of fused rows with two sensors or more. **Bold**
-rungs are on the front: none is both cheaper and nearer to the reference. Costs that differ by less
-than 10 % come in another order in another run and are given one value.
+detection, and the change of its time. The radar's reference detects from the first scan on, in
+the thesis's scene (12 km) and in the flown encounter: the losses of its rungs there are lower
+bounds. *Gained, lost*: detections (sensor, target, instant) that only the rung, only the
+reference has. *Fused*: share of fused rows with two sensors or more. **Bold** rungs are on the
+front: none is both cheaper and nearer to the reference. Costs that differ by less than 10 %
+change order from run to run and are given one value.
 
-The *union* of sphere, cylinder and plate is the reference of cameras: one hides the other, where
-the thesis's model adds them up. The plate's shape is an assumption (`components/optical/silhouette.py`),
-so is the one-dimensional projection (`components/optical/sensors.py`), of which the thesis says
-no more than size, range and colour. A range boundary shows no area: the one that is just detected
-at the boundary stands for it. The Gram-Charlier series holds for steady targets: it is run on a
-sampled cross-section and compared with the exact Pd of the same sample. Fusion is compared with the
-truth at each instant, which includes the sensors' grids.
+The *union* of sphere, cylinder and plate is the reference of cameras: one hides the other,
+whereas the thesis's model adds them up. The plate's shape is an assumption
+(`components/optical/silhouette.py`), so is the one-dimensional projection
+(`components/optical/sensors.py`), for which the thesis gives only size, range and colour. A range
+boundary has no area: the area that is just detected at the boundary represents it. The
+Gram-Charlier series holds for steady targets: it is run on a sampled cross-section and compared
+with the exact Pd of the same sample. Fusion is compared with the truth at each instant, which
+includes the sensors' grids.
 
-## Where each model of the Earth is good enough
+## Validity of the Earth models
 
 {error_map}
 
@@ -239,11 +240,12 @@ truth at each instant, which includes the sensors' grids.
 ## Trackers
 
 `dsa-des cost configs/tracking/architectures.toml --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
-a radar at 1 Hz and two cameras, one of them late; two straight flights. Times are those of a tracker
-alone in a single run, where a step's fixed cost counts most ([in lock step](performance.md#track-updates)
-an update is far cheaper). Errors are the distance of the nearest confirmed track; the last rung of
-each ladder is the reference, which is not the truth either. Two flights of 20 s tell what
-rungs cost; they are too short to tell which is better. [What they mean](tracking.md#cost-of-filters-association-and-late-looks).
+a radar at 1 Hz and two cameras, one of them delayed; two straight flights. Times are those of a
+tracker alone in a single run, in which a step's fixed cost dominates ([in lock
+step](performance.md#track-updates) an update is far cheaper). Errors are the distance of the
+nearest confirmed track; the last rung of each ladder is the reference, which is not the truth
+either. Two flights of 20 s show the cost of the rungs; they are too short to show which is
+better. [Discussion](tracking.md#cost-of-filters-association-and-late-looks).
 
 {trackers}
 """

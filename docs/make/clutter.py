@@ -15,9 +15,9 @@ from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.rain import rain_reflectivity_per_m, rain_volume_m3
 from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.drawing import RADAR as RADAR_COLOUR
+from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.library.runs import run
-from dsa_des.record.drawing import BLUE, PINK
 from dsa_des.terminal.interruption import plain_ending
 
 #: A radar with a carrier and PRF for Doppler, a gain that is its beam's, and a Pfa as radars have.

@@ -12,8 +12,8 @@ import numpy as np
 from components.arguments.checks import FloatArray
 from components.radar.detection import detection_probability, first_declared
 from components.thesis.drawing import GREY, legend_below, panels
+from dsa_des.block.mark import BLUE, GREEN
 from dsa_des.library.study import study
-from dsa_des.record.drawing import BLUE, GREEN
 
 # Phases of the scan clock against the encounter; more change no digit that is shown.
 _PHASES = 32

@@ -22,9 +22,9 @@ SECTIONS: list[tuple[str, Callable[[], list[NumericalCase]]]] = [
 
 _HEAD = """# Hard cases
 
-The result of the straightforward formula, that of dsa_des, and the true value. Printed by
-`python -m docs.make.numerics` (needs the extra `test`); `--check` compares this page with
-what your machine computes. The naive column may differ in its last digits from machine to machine:
+Results of the straightforward formula and of dsa_des, and the true value. Printed by
+`python -m docs.make.numerics` (needs the extra `test`); `--check` compares this page with the
+results of your machine. The naive column may differ in its last digits from machine to machine:
 those digits are the noise this page is about.
 """
 

@@ -19,9 +19,9 @@ from docs.make.declaration_ranges import (
     mean_range_m,
     ranges_of_declaration,
 )
+from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.library.study import StudyResult, study
-from dsa_des.record.drawing import BLUE, PINK
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.study import changed_scene

@@ -3,6 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+#: Okabe and Ito's colours, told apart with any kind of colour vision.
+BLUE, RED, GREEN, ORANGE, PINK, SKY, BLACK = PALETTE = (
+    "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#000000",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -25,7 +30,7 @@ class Mark:
 #: Of blocks whose class says nothing: the colours of Okabe and Ito, and of Tol, that no class of
 #: ours has; told apart with any kind of colour vision.
 NEUTRAL = (
-    Mark("#56B4E9", "P"),
+    Mark(SKY, "P"),
     Mark("#777777", "X"),
     Mark("#882255", "v"),
     Mark("#999933", "p"),

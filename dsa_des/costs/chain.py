@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.ladder import Unavailable
+from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.drawing import RED, drawing, figure_text, plain_log_ticks
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation

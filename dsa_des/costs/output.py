@@ -8,9 +8,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, shown
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import RED, drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dsa_des.block.mark import BLUE, RED, SKY
 from dsa_des.evidence.findings import Finding, ParameterChange
-from dsa_des.record.drawing import BLUE, RED, SKY, drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 
 _BAND, _LINE, _LIMIT, _RULE = SKY, BLUE, RED, "#999999"
 _MOST_BARS = 24

@@ -114,10 +114,6 @@ def pictures_in(folder: Path) -> dict[str, PictureFile]:
     return {file.stem: PictureFile(file.stem, file.read_bytes()) for file in files}
 
 
-#: Okabe and Ito's colours, told apart with any kind of colour vision.
-BLUE, RED, GREEN, ORANGE, PINK, SKY, BLACK = PALETTE = (
-    "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#000000",
-)  # fmt: skip
 DPI = 110
 #: Longest name and longest line in a figure.
 MOST_OF_A_LABEL = 32

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, PALETTE, drawing, figure_text, tight
+from dsa_des.block.mark import BLUE, PALETTE
+from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.results.labels import axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds

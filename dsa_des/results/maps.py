@@ -8,7 +8,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import RED, drawing, figure_text, tight
+from dsa_des.block.mark import RED
+from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.results.labels import axis_label, readable, value_label
 from dsa_des.results.summary import Line
 

@@ -89,13 +89,13 @@ _ResultName = Annotated[str, BeforeValidator(_named)]
 _Whole = Annotated[int, Field(ge=0)]
 
 
-class _Table(BaseModel):
+class StudyTable(BaseModel):
     """A table of a study file, as far as it can be judged without the scene."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
-class StudyKeys(_Table):
+class StudyKeys(StudyTable):
     """The keys of a study file; of those without a type the values are judged one by one."""
 
     title: Any = None
@@ -118,7 +118,7 @@ class StudyKeys(_Table):
     runs_per_chunk: int | None = Field(default=None, ge=1)
 
 
-class StopWhenTable(_Table):
+class StopWhenTable(StudyTable):
     """When a cell has enough replicas."""
 
     metric: _ResultName
@@ -126,7 +126,7 @@ class StopWhenTable(_Table):
     batch: int | None = Field(default=None, ge=2)
 
 
-class CompareTable(_Table):
+class CompareTable(StudyTable):
     """With which value of which axis the others are compared."""
 
     axis: str
@@ -158,7 +158,7 @@ FIGURES = {
 AXES_OF_FIGURES = ("axis", "lines", "x", "y")
 
 
-class RequirementTable(_Table):
+class RequirementTable(StudyTable):
     """A limit on a result, and the axis along which the cheapest value is looked for."""
 
     metric: _ResultName

@@ -8,13 +8,13 @@ from pathlib import Path
 from fault import Fault
 from faulty_copy import CAUGHT, ROOT, SURVIVED, Outcome
 
-_HEAD = """# Do the tests notice?
+_HEAD = """# Mutation check
 
-A test that passes says little until it has been seen to fail. `tests/mutation/` lists faults that
-could be made by hand: a key that feeds the wrong function, a quantity in the wrong frame or unit, a
-clock a scan late, an effect that is planned but not called, a metric that takes one distance for
-another. A command puts each of them, one at a time, into a copy of the project and runs the tests
-nearest to it.
+A passing test is weak evidence until it has been seen to fail. `tests/mutation/` lists plausible
+programming faults: a key that feeds the wrong function, a quantity in the wrong frame or unit, a
+clock one scan late, an effect that is planned but not called, a metric that confuses two
+distances. A command puts each of them, one at a time, into a copy of the project and runs the
+tests nearest to it.
 
 <!-- not run: takes half an hour -->
 ```
@@ -22,14 +22,14 @@ python tests/mutation/run_faults.py --workers 2 --json /tmp/faults.json --page d
 ```
 
 It first runs those tests without a fault, and ends with 1 if one of the faults is not noticed.
-`--only metrics` tries one group, `--only TEXT` the faults of a file, of a class or function, or of
-that name; with `--json` what was found before is kept for the page.
+`--only metrics` tries one group, `--only TEXT` the faults of a file, of a class or function, or
+of that name; with `--json` earlier outcomes are kept for the page.
 
 The lists are `tests/mutation/faults/*.txt`. A fault is named by the class, method, function or
-constant that it is in (with the module before it where several are called alike), by what stands
-there once and by what takes its place. That is compared as a syntax tree, so neither its layout nor
-its file matters; tests are named without their folders. The suite checks only that every fault
-still fits, and that its tests are there.
+constant that it is in (prefixed by the module if several have the same name), by an expression
+that occurs there once and by its replacement. They are compared as syntax trees, so neither
+layout nor file matters; tests are named without their folders. The suite checks only that every
+fault still fits, and that its tests are there.
 
 """
 
@@ -37,19 +37,20 @@ still fits, and that its tests are there.
 _RANDOM = """
 ## Drawn at random
 
-The list above was written beside its tests. These faults nobody chose: a line is drawn of all that
-the tests execute, all alike, then a kind of mistake that it allows (a constant, a comparison, a
-sign, swapped arguments or operands, a dropped term, condition, keyword, filter or statement, one
-off, `and` for `or`, swapped branches, minimum for maximum, sine for cosine, degrees for radians).
-Tests that execute the line run until one fails, the nearest first, within a budget of time.
+The list above was written together with its tests. These faults were chosen at random: a line is
+drawn uniformly from all that the tests execute, then a kind of mistake that it allows (a
+constant, a comparison, a sign, swapped arguments or operands, a dropped term, condition, keyword,
+filter or statement, an off-by-one, `and` for `or`, swapped branches, minimum for maximum, sine
+for cosine, degrees for radians). Tests that execute the line run until one fails, the nearest
+first, within a budget of time.
 
 `python tests/mutation/coverage_map.py --workers 2` makes the map of lines (it needs coverage.py),
 `python tests/mutation/random_faults.py --workers 2 --count 300 --page docs/mutation.md` this table.
 
-The share noticed is of those that are not marked equivalent (`tests/mutation/equivalent.json`, each
-with its reason); beside it stands its 95 % interval by Wilson. What is not seen: lines that no test
-executes, what classes declare outside their methods, texts, errors raised, and mistakes of more
-than one place; a test that needs more time than the budget counts as one that notices nothing.
+The share noticed is of those that are not marked equivalent (`tests/mutation/equivalent.json`,
+each with its reason), with its 95 % interval by Wilson. Not covered: lines that no test executes,
+declarations of classes outside their methods, texts, errors raised, and mistakes in more than one
+place; a test that needs more time than the budget counts as not noticing the fault.
 
 """
 

@@ -14,8 +14,9 @@ import numpy as np
 from components.thesis.drawing import GREY
 from docs.make.pictures.bound import bound_table
 from docs.make.pictures.flow import flow_table
+from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import BLUE, PINK, drawing
+from dsa_des.record.drawing import drawing
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -173,111 +174,112 @@ camera = Pinhole.calibrated((1180.0, 1175.0), (1010.0, 540.0), columns=2048, row
 column, row = camera.pixel(*body_angles(*ned_to_body(*body, *mounting)))
 ```"""
 
-_HEAD = """# A camera that sees pictures
+_HEAD = """# Image-based camera
 
 `dsa-des run optical/pictures`, with `pip install 'dsa-des[image]'`
 
-`optical.image` renders what an electro-optical camera sees round every target, and searches it. It
-takes the keys of `optical.eo`. Each look is two frames: the target's outline with exact coverage of
-pixels, its smear over `exposure_s`, the blur, a background of `texture_contrast` that stands still
-in NED, and noise. OpenCV filters of several sizes find the spot, whose place is what is reported;
-detections have `column_px`, `row_px`, and the flow of the target between the frames in pixels,
-`flow_column_px` and `flow_row_px`, with the turn of the line of sight that follows from it,
-`flow_rate_rad_s`. The operator's display shows the patch.
+`optical.image` renders the image of an electro-optical camera around every target, and searches
+it for the target. It takes the keys of `optical.eo`. Each look is two frames: the target's
+outline with exact coverage of pixels, its smear over `exposure_s`, the blur, a background of
+`texture_contrast` that is fixed in NED, and noise. OpenCV filters of several sizes find the spot,
+whose position is reported; detections have `column_px`, `row_px`, and the flow of the target
+between the frames in pixels, `flow_column_px` and `flow_row_px`, with the turn of the line of
+sight that follows from it, `flow_rate_rad_s`. The operator's display shows the patch.
 
 ![Patches as the camera saw them](images/{seen})
 
-**Pixels of a flown run.** The picture is a pinhole's, so `true_column_px` and `true_row_px` say
-where a target is in a frame of any field of view, size and mounting. A file of flights in place of
-the traffic, a shipped one or yours, gives its path in pixels:
+**Pixels of a flown run.** The camera is a pinhole model, so `true_column_px` and `true_row_px`
+give a target's position in a frame of any field of view, size and mounting. A file of flights
+instead of the traffic, a shipped one or your own, gives the path in pixels:
 
 ```
 dsa-des run optical/pictures --swap traffic=traffic.daa_file --set \
 blocks.traffic.file=encounters/crossing.daa
 ```
 
-A camera that was calibrated, frames with time stamps of their own, and targets that were not
-detected: the same from Python, with a pose of both aircraft for each frame (tracks with other time
-stamps are interpolated first, as `np.interp` does; angles after `np.unwrap`). The mounting turns
-the aircraft's axes (nose, right wing, floor) into the camera's as azimuth, elevation and roll, in
+For a calibrated camera, frames with their own time stamps, and undetected targets, the same from
+Python, with a pose of both aircraft for each frame (tracks with other time stamps are
+interpolated first, as `np.interp` does; angles after `np.unwrap`). The mounting turns the
+aircraft's axes (nose, right wing, floor) into the camera's as azimuth, elevation and roll, in
 this order; the focal length and the principal point are in pixels from the upper left corner:
 
 {flown}
 
-**How exact.** The rendered area is that of the union of the bodies within 0.3 %. At a noise of 0.02
-of the target's contrast the flow of targets from 4 pixels agrees with the turning line of sight
-within 0.1 pixel, also where the platform's turn moves all of the picture by 139 pixels. Noise and
-clutter take from that ([below](#how-good-the-flow-is)). A spot of fewer than 3 pixels has a place
-and no flow.
+**Accuracy.** The rendered area is that of the union of the bodies within 0.3 %. At a noise of
+0.02 of the target's contrast the flow of targets from 4 pixels agrees with the turning line of
+sight within 0.1 pixel, also if the platform's turn moves the whole picture by 139 pixels. Noise
+and clutter reduce this accuracy ([below](#accuracy-of-the-flow)). A spot of fewer than 3 pixels
+has a position and no flow.
 
-**What is left out.** Only targets are rendered: false alarms are drawn as those of `optical.eo`,
-and clutter makes none. A search for a target that is too faint finds noise instead: through 4
-filters and 52 pixels above 3 deviations 5 times as often as in 12 independent places, which is what
-`optical.eo` counts. That is the law and no fault: a smooth field's peaks are above a level u some
-u² times as often as a single place of each cell (Adler, 1981), 9 times at 3 deviations; pixels are
-coarse for the finest filter, which comes to 3.5 times, and three coarser ones add the rest. A test
-compares it with draws of the 208 correlated values, within 99 % bounds. The background has no
-depth, so that it shows no parallax.
+**Limitations.** Only targets are rendered: false alarms are drawn as those of `optical.eo`, and
+clutter makes none. A search for a target that is too faint finds noise instead: through 4 filters
+and 52 pixels above 3 deviations 5 times as often as in 12 independent positions, the number that
+`optical.eo` counts. This is expected: a smooth field's peaks are above a level u some u² times as
+often as a single position of each cell (Adler, 1981), 9 times at 3 deviations; pixels are coarse
+for the finest filter, which gives 3.5 times, and three coarser ones add the rest. A test compares
+it with draws of the 208 correlated values, within 99 % bounds. The background has no depth, so it
+shows no parallax.
 
-## What the signature model gets wrong
+## Errors of the signature model
 
 `python -m docs.make.pictures`; of one scene, `dsa-des cost optical/pictures`
 
 The thesis simulates optical flow by a signature and recommends (5.3.1) to compare it with an
-algorithm that sees pictures. The target stands in the air and the camera comes nearer at the same
-share of the range in each case: the range is where half of the looks detect, at 0.0001 false alarms
-a frame and a pixel's noise of {noise:g}. Both cameras have the same noise and threshold.
+algorithm that works on images. The target is stationary and the camera approaches by the same
+share of the range in each case: the range is where half of the looks detect, at 0.0001 false
+alarms a frame and a pixel's noise of {noise:g}. Both cameras have the same noise and threshold.
 
 | | picture, km | signature, km | signature / picture |
 |---|---|---|---|
 """
 
 _FLOW = """
-## How good the flow is
+## Accuracy of the flow
 
 `python -m docs.make.pictures`: six seeds of four targets, from 3 to 150 pixels, straight on and
-then banked at heading 217° in the southern hemisphere, two frames 0.04 s apart; how far the flow is
-from the way of the true pixel. Noise of a pixel and clutter are in the target's contrast.
-`flow_deviation_px` says how good each flow is along the axis that pictures say least of. The last
-columns are the root of the mean square of what it is off over that, 1 where it is honest along
-either axis, and the share of flows within 2.45 of it, 95 % or more where it covers. Where the
-stated deviation is below 0.04, 95 % of flows are within 0.1 pixel. No flow is told where the spot
-is not found again, or the deviation is above 0.25.
+then banked at heading 217° in the southern hemisphere, two frames 0.04 s apart; the distance of
+the flow from the displacement of the true pixel. Noise of a pixel and clutter are in the target's
+contrast. `flow_deviation_px` is the standard deviation of each flow along the least observable
+axis. The last columns are the root mean square of the error over that deviation, 1 if it is
+consistent along either axis, and the share of flows within 2.45 of it, 95 % or more if it covers.
+If the stated deviation is below 0.04, 95 % of flows are within 0.1 pixel. No flow is reported if
+the spot is not found again, or the deviation is above 0.25.
 
-**What noise allows.** `python -m docs.make.pictures.bound`: no unbiased estimate from two frames
-is better than the Cramér-Rao bound 2 σ² (Σ ∇s ∇sᵀ)⁻¹ of the shift of a spot s in white noise of
+**Bound by noise.** `python -m docs.make.pictures.bound`: no unbiased estimate from two frames is
+better than the Cramér-Rao bound 2 σ² (Σ ∇s ∇sᵀ)⁻¹ of the shift of a spot s in white noise of
 deviation σ in each. At a noise of 0.05 (two seeds) 95 % of flows are within
 
 {bound}
 So 0.1 pixel at that noise is beyond any method for targets below 40 pixels; the bound grows with
-the noise, and is 0.067 for the smallest at 0.02. Flows that are off by most are those of outlines
-that say little along themselves: one of 0.85 pixel has a bound of 0.63 (95 %), and is not told.
+the noise, and is 0.067 for the smallest at 0.02. The largest errors are of outlines with little
+information along their length: one of 0.85 pixel has a bound of 0.63 (95 %), and is not reported.
 
 """
 
 _WHY = """
 ![Detection range by both, and how far the stated Pd holds](images/{figure})
 
-Means of six seeds, with their 95 % intervals; "never" where half of the looks never detect, with
-one of the seeds at least. On a calm background the signature sees about a sixth farther (why, see
-the next section), and large, faint targets more than that: it counts the signal of all pixels and
-the noise of a point, and to filters of their size the noise is that of all their pixels. From abeam
-both detect from the start of the run on, 4.4 km away. The signature knows neither smear nor
-clutter.
+Means of six seeds, with their 95 % intervals; "never" if half of the looks never detect, with one
+of the seeds at least. On a calm background the signature detects about a sixth farther (for the
+reason see the next section), and large, faint targets more than that: it counts the signal of all
+pixels and the noise of a point, whereas filters of their size have the noise of all their pixels.
+From abeam both detect from the start of the run on, 4.4 km away. The signature models neither
+smear nor clutter.
 
-**Price.** A look of a picture costs {image_us:.0f} µs of CPU time on one core here, and one of the
+**Cost.** A look of a picture costs {image_us:.0f} µs of CPU time on one core here, and one of the
 signature {signature_us:.2f} µs.
 
-## Is the stated probability right?
+## Calibration of the stated probability
 
-Method: looks of the signature model at a target and of pictures of it, at the same instants of all
-cases without clutter and smear, in bins of the Pd that the signature states (the table `looks`). Of
-a calibrated confidence the stated share is detected. {factor:.2f} times the signature states what
-pictures give (the median over bins from 0.05 to 0.999): a `contrast` that is so much smaller makes
-`optical.eo` a calibrated stand-in for this camera, where no clutter is. In the middle of a plane
-picture of 80° by 40° pixels are larger than its share of the field, so that a target covers 0.80
-times as many; a filter on pixels lets through 1.07 times the noise of one on a continuous picture;
-and spots fall between pixels, where a filter keeps 0.88 of them on average: 0.66 together.
+Method: looks of the signature model at a target and of pictures of it, at the same instants of
+all cases without clutter and smear, in bins of the Pd that the signature states (the table
+`looks`). If calibrated, the stated share is detected. {factor:.2f} times the signature states the
+Pd of pictures (the median over bins from 0.05 to 0.999): a `contrast` reduced by this factor
+makes `optical.eo` a calibrated substitute for this camera without clutter. In the middle of a
+plane picture of 80° by 40° pixels are larger than its share of the field, so that a target covers
+0.80 times as many; a filter on pixels lets through 1.07 times the noise of one on a continuous
+picture; and spots fall between pixels, where a filter keeps 0.88 of them on average: 0.66
+together.
 
 | stated Pd | detected in pictures | standard error | looks |
 |---|---|---|---|

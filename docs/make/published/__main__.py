@@ -22,9 +22,9 @@ HEAD = """# Published results
 
 Published results for the whole chain beside those of our scenes and studies. Made by
 `python -m docs.make.published` (in a working copy; with names of sections, those alone). Nothing
-was tuned to a number; what was chosen is said in each section, with its inputs, their licence, and
-what is not open. A row is *equal* if both differ by no more than is said, *inside* if what is
-published lies in our interval, and else *outside*.
+was tuned to a number; each section states the choices made, its inputs, their licence, and what
+is not open. A row is *equal* if both differ by no more than stated, *inside* if the published
+value lies in our interval, and else *outside*.
 """
 
 

@@ -21,10 +21,10 @@ SCENE = "published/degas"
 
 _HEAD = """
 DEGAS is MIT Lincoln Laboratory's encounter simulation. Its integration test
-([mit-ll/degas-core](https://github.com/mit-ll/degas-core), `code/integration_tests`, X11) flies one
-encounter of an uncrewed aircraft at 97.9 kt and an intruder at 69.6 kt, both level, through
+([mit-ll/degas-core](https://github.com/mit-ll/degas-core), `code/integration_tests`, X11) flies
+one encounter of an uncrewed aircraft at 97.9 kt and an intruder at 69.6 kt, both level, through
 surveillance, guidance, an m-of-n filter, a pilot, and the aircraft's dynamics. We fly the same
-encounter, stated by its own few numbers, and take distances ten times a second, as it does:
+encounter, from its few published numbers, and sample distances ten times a second, as it does:
 
 ```
 dsa-des run published/degas_unmitigated
@@ -33,30 +33,31 @@ dsa-des run published/degas
 """
 
 _CHOSEN = """
-**What was chosen.** The repository has parameters of its blocks and what they recorded; how they
-are wired is in files of Simulink, which we did not open. Four things were therefore read off the
-record of pilot commands: what is shown reaches the pilot a second later; it chooses when the time
-to execute begins, by the least way out and no buffer, rounded to five degrees; the next decision
+**Choices.** The repository has parameters of its blocks and their records; their wiring is in
+Simulink files, which we did not open. Four properties were therefore read off the record of pilot
+commands: a displayed alert reaches the pilot a second later; the pilot chooses when the time to
+execute begins, by the least turn out and no buffer, rounded to five degrees; the next decision
 comes in the tenth second after one (6 s and 3 s, and the next sample); and the command of the
-turn is 3/8 per second (3°/s within 8°, its `reducedTurnAngle_deg`) of what was left a second
-before. The bank is that of its point mass, by the published equations. Nothing else was set by
-what was recorded, and each of these is a key of its own: `alerting.m_of_n`, and `chooses`,
-`goes_beyond`, `track_step_deg` and `eases_deg` of `operator.stochastic`.
+turn is 3/8 per second (3°/s within 8°, its `reducedTurnAngle_deg`) of the turn left a second
+before. The bank is that of its point mass, by the published equations. Nothing else was set from
+the records, and each of these has its own key: `alerting.m_of_n`, and `chooses`, `goes_beyond`,
+`track_step_deg` and `eases_deg` of `operator.stochastic`.
 
-**Inputs and licence.** The encounter's numbers and its results, from the record of the test (X11);
-the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing that the
-rows need. Other encounters of the same source fly through the same scene by `traffic.daa_file`
-and `traffic.csv` in the place of its traffic.
+**Inputs and licence.** The encounter's numbers and its results, from the record of the test
+(X11); the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing
+that the rows need. Other encounters of the same source can be flown in the same scene with
+`traffic.daa_file` and `traffic.csv` instead of its traffic.
 """
 
 _TRACKED = """
-**Not compared: its tracked radar and tracked active surveillance.** Both state errors of tracks by
-DO-365's Table 2-20, whose formulas have the range in nautical miles. `SC228_TrackedRadarModel.m`
-(with `az_stddev_ft = 125*(10000 - DEGAS.nm2ft) + 250`, and likewise for elevation and both rates)
-and `SC228_TrackedActiveSurveillanceModel.m` put feet in their place: the standard deviation across
-the line of sight comes out as {across_ft:,.0f} ft, where the table's own bound is 250 ft at 1 nmi
-and 1,375 ft at 10 nmi. It is an easy slip to make and easily mended; until then these two are no
-reference, and we leave them out. The untracked sensors are not touched by it.
+**Not compared: its tracked radar and tracked active surveillance.** Both state errors of tracks
+by DO-365's Table 2-20, whose formulas have the range in nautical miles.
+`SC228_TrackedRadarModel.m` (with `az_stddev_ft = 125*(10000 - DEGAS.nm2ft) + 250`, and likewise
+for elevation and both rates) and `SC228_TrackedActiveSurveillanceModel.m` use feet instead: the
+standard deviation across the line of sight comes out as {across_ft:,.0f} ft, where the table's
+own bound is 250 ft at 1 nmi and 1,375 ft at 10 nmi. It is an easy slip and easily corrected;
+until then these two are no reference, and we leave them out. The untracked sensors are not
+affected.
 """
 
 

@@ -22,8 +22,8 @@ _TEXT = """
 **Its bands, cell by cell.** It asks DAIDALUS 2.0.1, and recorded {of_directions:,} directions and
 {of_altitudes:,} altitudes, {seconds} seconds long. With `daidalus_version = 2.0.1`
 {directions:,} and {altitudes:,} of them are equal (a value on an edge has the region of either
-side), given the velocity of the step of 0.1 s before, which is what its logic sees; with that of
-the instant itself {other} cells at edges of a turning ownship's bands differ.
+side), given the velocity of the previous step of 0.1 s, which its logic uses; with that of the
+instant itself {other} cells at edges of a turning ownship's bands differ.
 """
 
 

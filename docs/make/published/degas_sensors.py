@@ -8,7 +8,7 @@ import numpy as np
 import dsa_des
 from components.arguments.units import FOOT_M
 from components.thesis.drawing import GREY, legend_below, panels
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE, RED
+from dsa_des.block.mark import BLUE, GREEN, ORANGE, RED
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
 #: Of the study as it is shipped.
@@ -28,9 +28,9 @@ SEEN = (
 )
 
 _TEXT = """
-**Seen by the sensors of DO-365's appendix Q.** The same encounter, with `sensors/do365_radar`,
-`do365_active`, `do365_ads_b` and `do365_eo_ir` in the place of perfect surveillance, a Kalman
-filter behind each, and all else as above; {seeds} seeds each{of_all}:
+**With the sensors of DO-365's appendix Q.** The same encounter, with `sensors/do365_radar`,
+`do365_active`, `do365_ads_b` and `do365_eo_ir` instead of perfect surveillance, a Kalman filter
+behind each, and all else as above; {seeds} seeds each{of_all}:
 
 (`dsa-des study degas_sensors`, 4,000 runs, some 15 minutes on a core.)
 
@@ -40,22 +40,22 @@ Medians, and in brackets the middle 99 % of the runs:
 
 {table}
 
-Lines in the figure are what perfect surveillance gives. Single draws of DEGAS's own sensors are
-not shown here.
+Lines in the figure are the results of perfect surveillance. Single draws of DEGAS's own sensors
+are not shown here.
 
-**What of it is the same as in DEGAS, and what is not.** The same: standard deviations, biases,
-correlation times, ranges, sectors and probabilities of an answer; an ownship that knows itself
-exactly; guidance asked once a second, with the same filter, pilot and turn behind it. Not the same:
-its sensors are simulated ten times a second, and what they say in the step in which guidance is
-asked is handed to it as it is. Ours look once a second, and a tracker stands between, as in any
-system: it takes noise away, and needs some looks before it has a track. Of EO/IR there is no more
-than 2.5 nmi, and its range rate and the rates of its angles are left out: the tracker's velocities
-are of its places. The radar acquires an intruder this slow and 27 degrees off the nose at 3.8 nmi,
-50 s after the start and well before an alert is due.
+**Comparison with DEGAS.** The same: standard deviations, biases, correlation times, ranges,
+sectors and probabilities of an answer; an ownship with exact navigation; guidance once a second,
+with the same filter, pilot and turn behind it. Different: its sensors are simulated ten times a
+second, and their reports in the step of the guidance are passed to it unchanged. Ours look once a
+second, and a tracker is in between, as in any system: it reduces noise, and needs some looks
+before it has a track. EO/IR reaches no more than 2.5 nmi, and its range rate and the rates of its
+angles are left out: the tracker's velocities follow from its positions. The radar acquires an
+intruder this slow and 27 degrees off the nose at 3.8 nmi, 50 s after the start and well before an
+alert is due.
 
-A manoeuvre comes later than without noise where the height of a track is wrong for a while (at
-2.5 nmi a degree is 265 ft, and half a degree of bias 130 ft): then the level falls below
-corrective, and the pilot's delays begin anew.
+A manoeuvre comes later than without noise if the height of a track is wrong for a while (at 2.5
+nmi a degree is 265 ft, and half a degree of bias 130 ft): then the level falls below corrective,
+and the pilot's delays start again.
 """
 
 

@@ -293,71 +293,71 @@ def needed_s(hit: list[Pairs]) -> tuple[float, float]:
 
 
 _TEXT = """
-**Who sees in time.** C. C. Morris (*Midair collisions: limitations of the see-and-avoid concept
-in civil aviation*, Aviation, Space, and Environmental Medicine 76, 2005; the abstract is open,
-the text is not) gives upper bounds of the probability to see and avoid a converging aircraft of
-40 ft. Its numbers are no Poisson search: two thirds of the time are worth two thirds of the
-*probability*, where a rate would give more, and over closing speed V they fall as a/V - b. That
-is a search that comes round once in T and must meet the aircraft between the range at which it
-shows and t before the collision: P = (R/V - t)/T. The table fixes R/T and t/T alone. We took t =
+**Acquisition in time.** C. C. Morris (*Midair collisions: limitations of the see-and-avoid
+concept in civil aviation*, Aviation, Space, and Environmental Medicine 76, 2005; the abstract is
+open, the text is not) gives upper bounds of the probability to see and avoid a converging
+aircraft of 40 ft. Its numbers are no Poisson search: two thirds of the time are worth two thirds
+of the *probability*, where a rate would give more, and over closing speed V they fall as a/V - b.
+That is a search with period T that must meet the aircraft between the range at which it becomes
+visible and t before the collision: P = (R/V - t)/T. The table fixes only R/T and t/T. We took t =
 12.5 s (FAA AC 90-48, to recognise and act), which leaves T = 36 s and R = 2.51 nmi, where 40 ft
-are 9': 36 looks of a second, as over 180° by 20° in steps of 10°. T and R are read off this
-table, then, not known beforehand; 12 numbers follow from two. `visual.acquisition` with `search =
-"round"`, `looking = "spells"`; the number is the closed form, in brackets 95 % of {runs:,}
-flights each (of twelve such intervals one may well miss its closed form).
+are 9': 36 looks of a second, as over 180° by 20° in steps of 10°. So T and R are read off this
+table, not known beforehand; 12 numbers follow from two. `visual.acquisition` with
+`search = "round"`, `looking = "spells"`; the number is the closed form, in brackets 95 % of
+{runs:,} flights each (of twelve such intervals one may well miss its closed form).
 
 {morris}
 
-Published numbers are of two places, cut off ("less than"). Andrews's rate (β = 17,000 per
+Published numbers have two decimal places, truncated ("less than"). Andrews's rate (β = 17,000 per
 steradian and second, haze of 2.996 over the visual range) does not give this table with any area
 and visual range: the nearest, 420 ft² and 6.2 nmi, has {rates} at 200, 300, 400 and 500 kt.
 
-**What eyes leave of the risk.** Published with an updated model of Andrews: 0.625 of NMAC and 0.746
-of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do. We take them to be of
-N. Underhill, E. Maki, B. Gill and A. Weinert (*Estimating See and Be Seen Performance with an
-Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023), of which the abstract was at hand; it
-has no numbers.
-The model's block is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a
-pilot on the left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual
-range of 20 nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 118 to 145 from the
-sides, 430 from above; ours 110, 142 and 430).
-Ours: encounters of two aircraft of MIT Lincoln Laboratory's uncorrelated model
-(`uncor_1200code_v1`, BSD-2, not part of the project), turns by DAIDALUS 5 s after an alert of whom
-the pilot has seen for 5 s (`configs/published/see_and_avoid.toml`;
-`dsa-des study see_and_avoid_risk` with a made-up airspace). Of {drawn:,} weighted encounters
-all NMACs are flown, one in {lost_every} of the other losses of well clear, and one in
+**Remaining risk with visual acquisition.** Published with an updated model of Andrews: 0.625 of
+NMAC and 0.746 of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do. We take
+them to be of N. Underhill, E. Maki, B. Gill and A. Weinert (*Estimating See and Be Seen
+Performance with an Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023), of which the
+abstract was at hand; it has no numbers. The model's block is open
+(mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a pilot on the left, β =
+17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual range of 20 nmi, 1',
+and a Cessna 172 of its table of areas (110 ft² from ahead, 118 to 145 from the sides, 430 from
+above; ours 110, 142 and 430). Ours: encounters of two aircraft of MIT Lincoln Laboratory's
+uncorrelated model (`uncor_1200code_v1`, BSD-2, not part of the project), turns by DAIDALUS 5 s
+after an alert of an aircraft that the pilot has seen for 5 s
+(`configs/published/see_and_avoid.toml`; `dsa-des study see_and_avoid_risk` with a made-up
+airspace). Of {drawn:,} weighted encounters all NMACs are flown, one in {lost_every} of the other
+losses of well clear, and one in
 {others_every} of the rest, {encounters} in all, each with as many times its weight, and with either
-aircraft as the ownship that is steered. One pilot: both sides together. Both look: what neither
-prevents alone, which leaves out what two manoeuvres at once do.
+aircraft as the ownship that is steered. One pilot: both sides together. Both look: the cases that
+neither prevents alone, which leaves out the effect of two manoeuvres at once.
 
 {risk}
 
-Ours see, and act, in time more often. Is it the eyes or what comes after? Without any flight or
-logic, by the rate along the {hit} encounters that are NMACs (`docs/make/published/seen_in_time.py`,
-flat, in steps of a second): the share whose other aircraft is not yet seen so long before the
-closest approach.
+Our pilots see, and act, in time more often. To separate acquisition from response, without any
+flight or logic, by the rate along the {hit} encounters that are NMACs
+(`docs/make/published/seen_in_time.py`, flat, in steps of a second): the share whose other
+aircraft is not yet seen at these times before the closest approach.
 
 {not_seen}
 
 So with these eyes the published 0.625 is what is not seen {one_s:.0f} s before, and 0.331 what
-neither of two pilots has seen {both_s:.0f} s before: numbers of pilots who need about half a minute
-from sighting to being clear, where ours need 10 s and a turn of 3°/s. What other assumptions come
-to when flown (the same encounters in every row; bold: the published number is inside):
+neither of two pilots has seen {both_s:.0f} s before: numbers of pilots who need about half a
+minute from sighting to being clear, whereas ours need 10 s and a turn of 3°/s. Results of other
+assumptions when flown (the same encounters in every row; bold: the published number is inside):
 
 {otherwise}
 
-**Which assumption makes the difference.** How long a pilot takes to turn, and how much of the time
-is spent looking out; all the haze is worth 0.08 of NMAC. With either of the two, 12.5 s for 5 s or
-half of the time for all of it, three of the four published numbers are inside, and 0.625 lies above
-ours; with both, those of one pilot are inside, and those of two lie below ours. No pilot of ours
-gives all four: 0.331 is less than 0.625 · 0.625 = 0.391, which two would leave who fail
-independently of each other, where ours leave more than that product. Two manoeuvres at once, which
-ours leave out, may help where neither does alone. None of this chose the scene: the text of the
-study was not at hand, and its block has no key for the first of the two, and looks out all the time
-unless it is told otherwise. So the scene keeps that block's defaults and 5 s, and three rows stay
-outside. Not open to us, then: what the published pilots do once they see and how long it takes
-them, how much they look out, their encounters, and their well clear. Ours judge range and speed
-exactly, which pilots do not.
+**The decisive assumptions.** The pilot's time to turn, and the share of time spent looking out;
+the haze in total changes NMAC by 0.08. With either of the two, 12.5 s instead of 5 s or half of
+the time instead of all of it, three of the four published numbers are inside, and 0.625 lies
+above ours; with both, those of one pilot are inside, and those of two lie below ours. No pilot
+model of ours gives all four: 0.331 is less than 0.625 · 0.625 = 0.391, which two would leave if
+they failed independently, whereas ours leave more than that product. Two manoeuvres at once,
+which ours leave out, may help if neither does alone. None of this was used to choose the scene:
+the text of the study was not available, and its block has no key for the first of the two, and
+looks out all the time by default. So the scene keeps that block's defaults and 5 s, and three
+rows stay outside. Not open to us: the published pilots' actions after sighting and their
+duration, their share of time looking out, their encounters, and their well clear. Ours judge
+range and speed exactly, which pilots do not.
 """
 
 

@@ -26,7 +26,7 @@ from docs.make.published.turn_flights import (
 )
 from docs.make.published.turn_geometry import least_range_m
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
@@ -112,53 +112,54 @@ def published_ranges() -> dict[tuple[float, float, int], float]:
 
 _TEXT = """
 NRC's study of detect and avoid for small aircraft (method of nrc-cnrc/daamsim; numbers of
-lucaswarburton/daamsim2 @ 645992c, MIT) asks from which range on a turn still clears a disc of 500
-ft: own speed 60 kt, bank 45°, roll rate 10°/s, no delay, straight collision courses from all
-around. We fly them: a camera that sees all inside its range, `avoidance.turn_away` with
-`bank_deg`, `roll_rate_deg_s` and `direction`, over the ellipsoid at 41° south
-(`configs/published/least_range.toml`; a camera looks 20 times a second, the turn begins 1 ms
-later, and its range is taken from the flights). By regula falsi over the camera's range the least
-one is found at which the nearer of the two aircraft passes at 152.4 m. Any other speed:
+lucaswarburton/daamsim2 @ 645992c, MIT) determines the range from which a turn still clears a disc
+of 500 ft: own speed 60 kt, bank 45°, roll rate 10°/s, no delay, straight collision courses from
+all directions. We fly them: a camera that detects everything inside its range,
+`avoidance.turn_away` with `bank_deg`, `roll_rate_deg_s` and `direction`, over the ellipsoid at
+41° south (`configs/published/least_range.toml`; a camera looks 20 times a second, the turn begins
+1 ms later, and its range is taken from the flights). By regula falsi over the camera's range the
+least one is found at which the nearer of the two aircraft passes at 152.4 m. Any other speed:
 `python -m docs.make.published.least_range SPEED_KT`.
 
-**Whose are the differences?** The same turn in closed form over a flat Earth
-(`docs/make/published/turn_geometry.py`: heading from the logarithm of cos p t, the latest range as
-the largest root over all times) gives our flown ranges to {geometry_m:.2f} m and {geometry_s:.4f} s
-of closing, at all {number} azimuths and courses. So what is left is how theirs is stepped,
-searched and counted. Read in the open code: they begin 190 s before the collision, go by 0.1 s, and
-a turn that they count from t begins with the state two steps before (arrays count from one); the
-bank of a step is that of its end; they take modified tau, that is D²/(190 s · v) less than the
-range. Read off the numbers, as the function that searches is not in what we could read: every
-published range, to 5 digits, is that of an instant to which ten halvings of the 190 s lead, to the
-next tenth of a second, 0.186 s apart; a turn ends before the step that would go beyond it, and from
-there both fly straight, the intruder one step ahead. Counted so (`stepped_least_range_m`,
-`as_searched_m`), geometry alone gives {stepped} of the {every:,} published ranges to the digit, and
-the others to {most_s:.2f} s. So the page shows ours as they would count them: what our
-flights need more than geometry, {geometry_m:.2f} m at most, is added to the stepped turn before the
-search. *Equal* is within one step of it, {step:g} s at closing speed. As flown, ours differ by
+**Origin of the differences.** The same turn in closed form over a flat Earth
+(`docs/make/published/turn_geometry.py`: heading from the logarithm of cos p t, the latest range
+as the largest root over all times) gives our flown ranges to {geometry_m:.2f} m and
+{geometry_s:.4f} s of closing, at all {number} azimuths and courses. So the remaining differences
+are in their stepping, search and counting. From the open code: they begin 190 s before the
+collision, go by 0.1 s, and a turn that they count from t begins with the state two steps before
+(arrays count from one); the bank of a step is that of its end; they take modified tau, that is
+D²/(190 s · v) less than the range. From the numbers, since the search function is not in the code
+open to us: every published range, to 5 digits, is that of an instant to which ten halvings of the
+190 s lead, to the next tenth of a second, 0.186 s apart; a turn ends before the step that would
+go beyond it, and from there both fly straight, the intruder one step ahead. Counted so
+(`stepped_least_range_m`, `as_searched_m`), geometry alone gives {stepped} of the {every:,}
+published ranges to the digit, and the others to {most_s:.2f} s. So the page shows our ranges as
+they would count them: the excess of our flights over geometry, {geometry_m:.2f} m at most, is
+added to the stepped turn before the search. *Equal* is within one step of it, {step:g} s at
+closing speed. As flown, ours differ by
 {longer_low:+.2f} to {longer_high:+.2f} s.
 
-What was chosen: turns by 90° to the better side; from behind 140° also by 60° and 75°, as theirs
-are better there than turns by 90° are. They are not at hand in the project; what stands here of
-them is read where the page is made.
+Choices: turns by 90° to the better side; from behind 140° also by 60° and 75°, since theirs are
+better there than turns by 90°. Their numbers are not part of the project; those shown here are
+read when the page is made.
 
 {table}
 
 {counted} The largest difference is {largest:.2f} s of closing; {same} are the same number.
 
-From it the risk ratio of a camera of 60° by 1000 m, as they count: the share of courses, all
-azimuths of their grid of 0.25° alike, that it does not lead out of; what our flights need more than
-geometry goes between azimuths of 5° along straight lines. In brackets: were all ranges one of their
-steps shorter, or longer.
+From it the risk ratio of a camera of 60° by 1000 m, as they count: the share of courses, with
+equal weight for all azimuths of their grid of 0.25°, that it does not resolve; the excess of our
+flights over geometry is interpolated linearly between azimuths of 5°. In brackets: with all
+ranges one of their steps shorter, or longer.
 
 {ratios}
 
-None of these ratios was used to find how they count. At 175 and 185 kt the needed range is 1000 m
-to within a step of theirs wherever a camera of 60° looks, so their staircase decides: of ranges as
-flown the ratios there are {exactly}. One azimuth of the grid is 0.0014, and of one at each of these
-speeds, 3.25° and 22.25°, it turns on less than 0.2 m whether it is cleared, by which our flights
-need less than geometry does: they roll in through 16 pieces of steady turn. Of geometry alone,
-counted in the same way, the ratios of the table are {alone}.
+None of these ratios was used to infer their counting. At 175 and 185 kt the needed range is 1000
+m to within a step of theirs throughout the field of a camera of 60°, so their steps decide: for
+ranges as flown the ratios there are {exactly}. One azimuth of the grid is 0.0014, and of one at
+each of these speeds, 3.25° and 22.25°, it turns on less than 0.2 m whether it is cleared, by
+which our flights need less than geometry: they roll in through 16 pieces of steady turn. For
+geometry alone, counted in the same way, the ratios of the table are {alone}.
 
 ![Least range by azimuth; risk ratio over field of view and range](images/{figure})
 

@@ -13,9 +13,9 @@ import numpy as np
 import dsa_des
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.thesis.drawing import panels
-from dsa_des.record.drawing import BLUE, GREEN, ORANGE
+from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
-TITLE = "Does an open tracker pass DO-365?"
+TITLE = "Open trackers against DO-365's bounds"
 ORDER = 2
 STUDY = "do365_tracks"
 FIGURE = "published_track_bounds.png"
@@ -139,7 +139,7 @@ def text_of(lines: Lines) -> str:
         if (said := failures(lines, tracker, sensor))
     ]
     where = "\n".join(failed) or "Nowhere."
-    return "\n\n".join([*parts, f"**Where a bound is not met, or not shown.**\n\n{where}", _TAIL])
+    return "\n\n".join([*parts, f"**Bounds not met, or not shown.**\n\n{where}", _TAIL])
 
 
 def failures(lines: Lines, tracker: str, sensor: str) -> str:
@@ -167,27 +167,31 @@ def section(images: Path) -> str:
     return text_of(lines)
 
 
-_HEAD = """Appendix Q of RTCA DO-365 says how sensors err, its Table 2-20 within what 95 % of the errors of a
-track must lie. `dsa-des study do365_tracks` flies encounters of a model (here {runs}), and takes, in each, one sample at every nautical mile, from 30 s after the start on; an
-entry is the 95 % quantile over encounters, with its 95 % interval by order statistics, of the bound (`inf`: of
+_HEAD = """Appendix Q of RTCA DO-365 gives the errors of sensors, its Table 2-20 bounds for 95 % of the
+errors of a track. `dsa-des study do365_tracks` flies encounters of a model (here {runs}), and
+takes, in each, one sample at every nautical mile, from 30 s after the start on; an entry is the
+95 % quantile over encounters, with its 95 % interval by order statistics, of the bound (`inf`: of
 too few tracks there is no upper end).
 
 ![Quantiles of the radar's tracks over range, beside the bounds](images/{figure})"""
 
-_TAIL = """**What was chosen.** The bounds are second hand: quoted in comments and constants of
-[mit-ll/degas-core](https://github.com/mit-ll/degas-core) (`surveillanceLib/SC228_SensorModels`, X11); of the
-radar 125 (R - 1) + 250 ft across, 100 (R - 1) + 150 ft in height, 10 (R - 1) + 50 kt and
-280 (R - 1) + 800 ft/min. "Cross-track" is taken for across the line of sight, in the horizontal. What the
-ownship does not know of its own position moves both aircraft alike and is left out; its attitude errs.
-The encounters are of our made-up airspace (`light_aircraft.txt`), with the default densities. The radar
-acquires slow targets and those off the nose later, so that at 5 and 6 nmi many have no track yet.
+_TAIL = """**Choices.** The bounds are second hand: quoted in comments and constants of
+[mit-ll/degas-core](https://github.com/mit-ll/degas-core) (`surveillanceLib/SC228_SensorModels`,
+X11); of the radar 125 (R - 1) + 250 ft across, 100 (R - 1) + 150 ft in height, 10 (R - 1) + 50 kt
+and 280 (R - 1) + 800 ft/min. "Cross-track" is taken as across the line of sight, in the
+horizontal. The ownship's position error moves both aircraft alike and is left out; its attitude
+has errors. The encounters are of our made-up airspace (`light_aircraft.txt`), with the default
+densities. The radar acquires slow targets and those off the nose later, so that at 5 and 6 nmi
+many have no track yet.
 
-One key of the trackers is set, for all of them: a new track may climb at 10 m/s (1 sigma, 2,000 ft/min:
-`start_climb_m_s`), where it is by default taken to climb as fast as aircraft fly, 70 m/s. That is a fact of
-aircraft, those of the model climb at 900 ft/min at most, and known before any bound; the default stays,
-since trackers are given other things too. It matters at 6 nmi, where a track is some looks old and an elevation
-of 1 degree is 190 m. The shipped case of evidence does not set it: its requirements are of tracks at 3 nmi.
+One key of the trackers is set, for all of them: a new track may climb at 10 m/s (1 sigma, 2,000
+ft/min: `start_climb_m_s`), whereas by default it is assumed to climb as fast as aircraft fly, 70
+m/s. That is a fact of aircraft, those of the model climb at 900 ft/min at most, and known before
+any bound; the default stays, since trackers are used for other targets too. It matters at 6 nmi,
+at which a track is some looks old and an elevation of 1 degree is 190 m. The shipped case of
+evidence does not set it: its requirements are of tracks at 3 nmi.
 
-**What would mend more.** Filters of one model take manoeuvres for noise at all times, and rates pay for it
-near by; interacting models do so in turns only. Of active surveillance the bearing errs by 9 degrees:
-far off, positions are made better by many looks only, and by knowing how long an error lasts."""
+**Possible improvements.** Filters of one model treat manoeuvres as noise at all times, which
+worsens rates at close range; interacting models do so in turns only. The bearing of active
+surveillance errs by 9 degrees: at long range, positions improve only with many looks, and by
+knowing how long an error lasts."""

@@ -19,7 +19,7 @@ from docs.make.published.rows import PublishedRow, table
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.results.ratio import PairedRatio, paired_ratio
 
-TITLE = "Volumes: who loses well clear, and who then comes near"
+TITLE = "Volumes: loss of well clear and near mid-air collisions"
 ORDER = 4
 MODELS = Path(__file__).parents[3] / "configs" / "encounters"
 SHARED = Path(__file__).parents[4] / "shared" / "data" / "encounters" / "models"
@@ -174,42 +174,43 @@ Transportation, 2018) chose 2000 ft by 250 ft so that about one in ten losses is
 collision (NMAC, 500 ft by 100 ft). Ours: an uncrewed ownship that flies straight and level at 30
 to 60 kt, 1200 to 3000 ft above ground (`configs/encounters/small_uncrewed.txt`, made up), meets
 aircraft of MIT Lincoln Laboratory's uncorrelated model (`uncor_1200code_v1`, BSD-2, not part of
-the project); nobody gives way; {count:,} weighted encounters of `dsa-des encounters`' pairing,
-volumes exact between seconds; intervals of 95 % (gamma).
+the project); neither aircraft gives way; {count:,} weighted encounters of `dsa-des encounters`'
+pairing, volumes exact between seconds; intervals of 95 % (gamma).
 
 {losses}
 
-*About* is taken as within 0.005. For the other volumes nothing is published that we know of:
-{others} What it depends on ({fewer:,} encounters
+*About* is taken as within 0.005. For the other volumes we know of no published values:
+{others} Dependence on assumptions ({fewer:,} encounters
 a row):
 
 {variants}
 
-To a gas of level flights the number is geometry alone, (500 · 100) / (2000 · 250) = 0.1; climbs
-add ways in through the lid, the more the flatter the volume is.
+For a gas of level flights the number is geometry alone, (500 · 100) / (2000 · 250) = 0.1; climbs
+add entries through top and bottom, the more the flatter the volume is.
 
 **Cylinders.** The same for cylinders of 1000 ft up and down, of the same {count:,} encounters:
 
 {cylinders}
 
-Published for a gas of aircraft. A gas gives, by the flows into both volumes with the mean relative
-speeds at the closest approach, of {level:.0f} ft/s over ground and {climb:.1f} ft/s up:
+Published for a gas of aircraft. A gas gives, from the flows into both volumes with the mean
+relative speeds at the closest approach, of {level:.0f} ft/s over ground and {climb:.1f} ft/s up:
 
 {gas}
 
-Level flights alone would give r h / (R H): 0.0165, 0.0082, 0.0041, 0.0027. To a gas all differences
-of height are alike, so of those within 1000 ft a tenth are within 100 ft. To aircraft of the model
-that an ownship at 1200 to 3000 ft meets they are not: few fly much higher or lower. Without any
-flight or draw, by the counts of altitudes in the model's file, and times 500 ft over the radius:
+Level flights alone would give r h / (R H): 0.0165, 0.0082, 0.0041, 0.0027. In a gas all
+differences of height are equally likely, so of those within 1000 ft a tenth are within 100 ft.
+For aircraft of the model that an ownship at 1200 to 3000 ft meets they are not: few fly much
+higher or lower. Without any flight or draw, by the counts of altitudes in the model's file, and
+times 500 ft over the radius:
 
 {layers}
 
-Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach: they
-weigh by relative speed, climb until then, and those that begin near each other are rejected, of
-which the counts know nothing. Climbs do the rest, as ways in through the lid. So rows are outside
-because of who flies how high, not of how volumes are counted: where altitudes are spread wide, as
-from 3000 ft up, encounters give the gas's number or less.
-Not open: which model and which ownship gave the published numbers.
+Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach:
+they are weighted by relative speed, climb until then, and those that begin near each other are
+rejected, which the counts do not include. Climbs account for the rest, as entries through top and
+bottom. So rows are outside because of the distribution of altitudes, not of the counting of
+volumes: if altitudes are spread widely, as from 3000 ft up, encounters give the gas's number or
+less. Not open: the model and the ownship of the published numbers.
 """
 VOLUMES = {
     "nmac": PRESETS["nmac"],
