@@ -4,7 +4,6 @@ import crooked
 import numpy as np
 import pytest
 from covering import covers
-from same_runs import replicas_of, same_as_alone
 from wired import chain, measured, rows, run, sensor
 
 import dsa_des
@@ -200,7 +199,6 @@ def test_who_is_gone_has_passed_and_who_is_yet_to_come_has_not(tmp_path):
     assert run(found).info["duration_s"] == 18.0
     for window in (1, 5):  # it remembers who has been there
         assert simulated(found, tmp_path, window=window).run().duration_s == 18.0
-    same_as_alone(replicas_of(load_scene(tmp_path / "scene.toml"), {}, {}), window=5)
 
 
 @pytest.mark.parametrize("window", [None, 1])
