@@ -79,6 +79,15 @@ def test_altimetry_errors_are_laplacian_by_layer(layer):
     assert altimetry_variance_ft2(altitude)[0] == pytest.approx(second)
 
 
+def test_a_layer_s_top_is_of_the_layer_for_errors_as_for_their_variance():
+    tops = np.array(LAYER_TOPS_FT, dtype=float)
+    for kind in (0.0, 0.999):  # altimeters of either sort
+        draws = np.full(len(tops), 1.7), np.full(len(tops), kind)
+        at, below, above = (altimetry_error_ft(tops + by, *draws) for by in (0.0, -1.0, 1.0))
+        assert np.array_equal(at, below) and not np.array_equal(at, above)
+    assert np.array_equal(altimetry_variance_ft2(tops), altimetry_variance_ft2(tops - 1.0))
+
+
 def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     them, count = who(2000), 14
     clocks = SquitterClocks(Stream(9, "a", "b"))
