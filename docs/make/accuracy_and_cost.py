@@ -35,9 +35,9 @@ from dsa_des.terminal.interruption import plain_ending
 #: A pixel of the camera, which errors of direction are compared with.
 PIXEL_DEG = 0.0358
 
-_HEAD = """1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad.
-2. **Radar**: take the exact Pd: for one pulse the table costs {table_times} and Gram-Charlier {gram_times}. A threshold or a range boundary saves up to {boundary_saves} µs and first sees the intruder {threshold_km} to {boundary_km} km nearer{cut_off}.
-3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) sees {exact_km}; a range boundary sees {boundary_eo_km}, a one-dimensional line {line_km}. A mesh costs {mesh_times} times the union and is no better.
+_HEAD = """1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; for the radar alone it suffices. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad.
+2. **Radar**: take the exact Pd: for one pulse the table costs {table_times} and Gram-Charlier {gram_times}. A threshold or a range boundary saves up to {boundary_saves} µs and first detects the intruder {threshold_km} to {boundary_km} km nearer{cut_off}.
+3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) detects {exact_km}; a range boundary detects {boundary_eo_km}, a one-dimensional line {line_km}. A mesh costs {mesh_times} times the union and is no better.
 4. **Fusion**: a window of 0.1 s is worth its {window_extra} µs: it raises the fused share from {share} to {window_share} and adds {window_range} m to the range error (95th percentile)."""
 
 
@@ -112,11 +112,9 @@ def radar_sees_from(scene: Scene) -> str:
 def cut_off(time_s: float, range_m: float, scans_s: Any, reach_m: float) -> str:
     """Return the end of the sentence for a first detection at a time and a range."""
     if time_s <= scans_s[1]:
-        return f", at least: the exact radar sees it where the scene begins, at {range_m / 1000:.1f} km"
+        return f", at least: the exact radar detects it where the scene begins, at {range_m / 1000:.1f} km"
     if range_m > 0.97 * reach_m:
-        return (
-            f", at least: the exact radar sees it at the edge of its reach, {reach_m / 1000:g} km"
-        )
+        return f", at least: the exact radar detects it at the edge of its reach, {reach_m / 1000:g} km"
     return ""
 
 
@@ -217,7 +215,7 @@ includes the sensors' grids.
 
 ## The thesis's scene
 
-`dsa-des cost configs/first_light.toml --all`
+`dsa-des cost first_light --all`
 
 ![Error against cost, one panel per ladder](images/cost_first_light.png)
 
@@ -231,7 +229,7 @@ includes the sensors' grids.
 
 ## A flown encounter
 
-`dsa-des cost configs/replay_daa.toml --set blocks.traffic.file={encounter_name}`: {encounter_says}.
+`dsa-des cost replay_daa --set blocks.traffic.file={encounter_name}`: {encounter_says}.
 
 ![Error against cost, one panel per ladder](images/cost_encounter.png)
 
@@ -239,7 +237,7 @@ includes the sensors' grids.
 
 ## Trackers
 
-`dsa-des cost configs/tracking/architectures.toml --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
+`dsa-des cost tracking/architectures --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
 a radar at 1 Hz and two cameras, one of them delayed; two straight flights. Times are those of a
 tracker alone in a single run, in which a step's fixed cost dominates ([in lock
 step](performance.md#track-updates) an update is far cheaper). Errors are the distance of the

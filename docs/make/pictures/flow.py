@@ -89,8 +89,8 @@ SIZES = ((3, 6), (6, 12), (12, 40), (40, np.inf))
 def flow_table(seeds: Iterable[int] = range(6)) -> str:
     """Return a table of how far flows are off, by size, noise and clutter."""
     text = (
-        "| pixels | noise | clutter | flows | told | 50 % | 95 % | 99 % | largest | off / stated "
-        "| in 2.45 |\n"
+        "| pixels | noise | clutter | flows | reported | 50 % | 95 % | 99 % | largest | "
+        "off / stated | in 2.45 |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|\n"
     )
     for noise, texture in CASES:

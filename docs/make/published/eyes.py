@@ -339,10 +339,11 @@ aircraft is not yet seen at these times before the closest approach.
 
 {not_seen}
 
-So with these eyes the published 0.625 is what is not seen {one_s:.0f} s before, and 0.331 what
-neither of two pilots has seen {both_s:.0f} s before: numbers of pilots who need about half a
-minute from sighting to being clear, whereas ours need 10 s and a turn of 3°/s. Results of other
-assumptions when flown (the same encounters in every row; bold: the published number is inside):
+So with these eyes the published 0.625 is the share not seen {one_s:.0f} s before, and 0.331 the
+share that neither of two pilots has seen {both_s:.0f} s before: numbers of pilots who need about
+half a minute from sighting to being clear, whereas ours need 10 s and a turn of 3°/s. Results of
+other assumptions when flown (the same encounters in every row; bold: the published number is
+inside):
 
 {otherwise}
 
