@@ -1,7 +1,6 @@
 """Scripted traffic: flights written in the scene (``traffic.scripted``)."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, Self
 
@@ -38,10 +37,17 @@ class Flight(Parameters):
         "follows from the wind; for flights without legs, m/s.",
     )
     climb_mps: float = Field(default=0.0, description="Rate of climb, m/s.")
-    yaw_deg: float | None = Field(default=None, description="Fixed yaw; else the track, deg.")
-    pitch_deg: float | None = Field(default=None, description="Fixed pitch; else the path, deg.")
+    yaw_deg: float | None = Field(
+        default=None, ge=-360, le=360, description="Fixed yaw; else the track, deg."
+    )
+    pitch_deg: float | None = Field(
+        default=None, ge=-90, le=90, description="Fixed pitch; else the path, deg."
+    )
     roll_deg: float | None = Field(
-        default=None, description="Fixed roll; else the bank of a coordinated turn, deg."
+        default=None,
+        ge=-360,
+        le=360,
+        description="Fixed roll; else the bank of a coordinated turn, deg.",
     )
     legs: list[AnyLeg] = Field(default=[], description="What it does, one after the other.")
 
@@ -120,9 +126,12 @@ class ScriptedTraffic(TrafficSource):
         own = parameters.ownship
         self.own = flight_of(own, own.start, self.wind)
         crafts = parameters.targets
-        used = Counter(intruder.name for intruder in crafts)
-        for twice in sorted(name for name, count in used.items() if count > 1):
-            raise ValueError(f"intruders: the name {twice!r} is used more than once")
+        used: set[str] = set()
+        for place, craft in enumerate(crafts):
+            if craft.name in used:
+                key = f"intruders[{place}].name" if place < len(parameters.intruders) else "wires"
+                raise ValueError(f"{key}: the name {craft.name!r} is used more than once")
+            used.add(craft.name)
         self.targets = _intruders(crafts, own.start, self.wind)
         self.roster = Roster.of([(craft.name, craft) for craft in crafts])
 

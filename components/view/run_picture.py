@@ -32,6 +32,8 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run; `UsageError` where the folder holds none."""
     info = _json(folder / "run.json")
+    if "duration_s" not in info:
+        raise UsageError(f"{folder}: holds no run: run.json has no duration_s")
     paths = {name: folder / f"{name}.parquet" for name in _TABLES}
     if not all(paths[name].is_file() for name in _TABLES[:2]):
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
@@ -49,7 +51,7 @@ def run_picture(folder: Path) -> RunPicture:
     picture = RunPicture(
         title=str(run.scene.get("title") or folder.name),
         facts=_facts(info, run.scene),
-        duration_s=float(info.get("duration_s", 0.0)),
+        duration_s=float(info["duration_s"]),
         sensors=[_sensor(name, blocks.get(name, {}), marks[name]) for name in sensors],
         targets=names,
     )

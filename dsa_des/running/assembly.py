@@ -130,7 +130,7 @@ class Assembly:
         except (SceneError, BlockFailure, RunRefused):
             raise
         except _REFUSALS as error:
-            problems.append(self._scene.problem(f"blocks.{name}", reason_of(error)))
+            problems.append(self._scene.refused(name, reason_of(error)))
         except BaseException as error:
             if must_pass(error):
                 raise

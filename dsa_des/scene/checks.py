@@ -20,7 +20,7 @@ from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.overrides import drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.wiring import Wire
+from dsa_des.scene.wiring import Wire, why_no_block_name
 from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import MAX_TICK, ClockSpec, parse_rational, resolution
 
@@ -275,6 +275,8 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         key: Key = ("blocks", name)
         table = tables[name]
         classes[name] = None
+        if reason := why_no_block_name(str(name)):
+            scene_file.report(key, reason, str(name))
         if not isinstance(table, dict):
             scene_file.report(key, "must be a table", table)
             continue

@@ -20,7 +20,10 @@ def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
     A name that is neither is returned as a path, for its reader to say what is wrong with it.
     """
     path = Path(asked)
-    if not str(asked) or "\0" in str(asked) or os.path.lexists(path):
+    if not str(asked):
+        message = f"is empty: the name of a {kind or 'scene or study'} is needed"
+        raise SceneError([Problem("''", "", message)])
+    if "\0" in str(asked) or os.path.lexists(path):
         return path
     shipped = find_example(path.as_posix(), kind)
     if shipped is not None:

@@ -1,5 +1,6 @@
 """From a scene file to a scene that can be run, with every problem reported at once."""
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -27,6 +28,7 @@ from dsa_des.scene.checks import (
     read_text,
 )
 from dsa_des.scene.graph import build_graph, check_graph
+from dsa_des.scene.keys import Key, dotted, key_in
 from dsa_des.scene.overrides import (
     SWAP,
     Change,
@@ -89,6 +91,8 @@ class Scene:
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    #: The tables it was made of, changes included.
+    _tables: SceneFile | None = field(default=None, init=False, compare=False)
     _origin: tuple[SceneFile, tuple[Change, ...]] | None = field(
         default=None, init=False, compare=False
     )
@@ -202,6 +206,29 @@ class Scene:
     def problem(self, key: str, message: str) -> Problem:
         """Return what is wrong with a dotted key of this scene."""
         return Problem(str(self.path), key, message)
+
+    def refused(self, name: str, text: str) -> Problem:
+        """Return what a block refuses at its start, at the key that its text begins with, if any.
+
+        Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.
+        """
+        file, parameters = self._tables, self.blocks[name].parameters
+        key: Key = ("blocks", name)
+        if file is None:
+            return self.problem(dotted(key), text)
+        for parameter, path in parameters:
+            if isinstance(path, Path) and text.startswith(f"{path}: "):
+                return file.problem((*key, parameter), text)
+        value: Any = file.data["blocks"][name]
+        while begins := re.match(r"([\w.\[\]]+)(?:: | is \S+: )", text):
+            inner = key_in(value, begins[1])
+            try:
+                for part in inner:
+                    value = value[part]
+            except (LookupError, TypeError):
+                break
+            key, text = (*key, *inner), text[begins.end() :]
+        return file.problem(key, text, *([] if isinstance(value, dict | list) else [value]))
 
     @property
     def queues(self) -> dict[str, list[str]]:
@@ -328,7 +355,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
     if not unsure:
         check_activity(scene_file, blocks, clocks, wires)
     scene_file.refuse()
-    return Scene(
+    scene = Scene(
         Path(scene_file.path),
         title,
         description,
@@ -342,6 +369,8 @@ def check_scene(scene_file: SceneFile) -> Scene:
         processors,
         notes=notes,
     )
+    scene._tables = scene_file
+    return scene
 
 
 def described(scene: Scene) -> str:

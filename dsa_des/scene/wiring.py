@@ -24,7 +24,8 @@ from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.time.clock import parse_rational
 
-_END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
+_NAME = r"[A-Za-z_][\w-]*"
+_END = re.compile(rf"{_NAME}(\.[A-Za-z_]\w*)?")
 _SCANS = re.compile(r"([0-9]+) scans?")
 _MOST_SCANS = 1_000_000
 _KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "holds")
@@ -131,6 +132,16 @@ def read_wires(
         scene.problems += of_wire
     _two_writers(scene, wires, classes)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
+
+
+def why_no_block_name(name: str) -> str | None:
+    """Return why no wire can name a block of this name, if so."""
+    if re.fullmatch(_NAME, name):
+        return None
+    return (
+        "is no name of a block: names are letters, digits, _ and -, and begin with a letter (a to "
+        "z) or _"
+    )
 
 
 class _WireError(Exception):

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
+from dsa_des.errors import nearest
 from dsa_des.scene.keys import flat
 from dsa_des.studies.axes import Axis
 from dsa_des.time.randomness import key_of
@@ -111,7 +112,8 @@ def parse_draw(key: str, table: Any) -> Draw:
         raise ValueError(form)
     ((kind, values),) = table.items()
     if kind not in KINDS or not isinstance(values, list | dict):
-        raise ValueError(form)
+        close = None if kind in KINDS else nearest(str(kind), KINDS)
+        raise ValueError(form + (f"; did you mean {close!r}?" if close else ""))
     if kind == "latin_hypercube" and isinstance(values, dict):
         inner = parse_draw(key, values)
         return Draw(key, inner.kind, inner.values, stratified=True)

@@ -67,6 +67,23 @@ def test_what_is_on_screen_is_what_was_recorded(page, recorded, time_s):
     }
 
 
+def test_the_first_view_holds_an_aircraft(page):
+    def nearest():
+        shown = page.evaluate("App.state()")
+        own, others = shown["own"], shown["truth"]
+        return shown["t"], min(
+            np.hypot(o["east"] - own["east"], o["north"] - own["north"]) for o in others
+        )
+
+    far = page.evaluate("Data.reach.near_m")
+    t, away = nearest()
+    assert 0 < t < 120 and away <= far
+    page.evaluate("App.seek(App.first_s - 1)")
+    assert nearest()[1] > far
+    page.keyboard.press("Home")
+    assert page.evaluate("App.state().t") == 0
+
+
 def test_steps_go_from_scan_to_scan_of_a_sensor(page, recorded):
     page.select_option("#steps", label="ir")
     times = [r["time_s"] for r in rows(recorded, "scans", 50, 53) if r["block"] == "ir"]
@@ -82,6 +99,7 @@ def test_it_plays_at_a_speed_and_pauses(page):
     page.select_option("#speed", "10")
     page.keyboard.press("Escape")
     page.locator("#plan").focus()
+    page.keyboard.press("Home")
     page.keyboard.press(" ")
     for _ in range(100):
         page.wait_for_timeout(50)

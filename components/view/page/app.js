@@ -228,7 +228,9 @@ const App = (() => {
   window.addEventListener("resize", () => { Timeline.forget(); state.dirty = true; });
   page.addEventListener("hashchange", readLink);
   perform("theme", dark.matches ? "dark" : "light");
-  Plan.near(0);
+  const { first_s } = Data.reach;
+  perform("seek", first_s);
+  perform("near");
   readLink();
   requestAnimationFrame(frame);
 
@@ -242,13 +244,14 @@ const App = (() => {
     root.classList.toggle("listens", !keepsTime);
     if (keepsTime) {
       fit("near");
+      seek(Math.min(...[App, ...beside].map((one) => one.first_s)));
       readLink();
     }
   }
 
   // What is on screen, for those who look at it by program.
   return {
-    join, perform, scale: () => Plan.view.perPixel, lasts_s: Data.duration_s,
+    join, perform, scale: () => Plan.view.perPixel, lasts_s: Data.duration_s, first_s,
     state: () => { render(true); return { ...drawn, playing: state.playing }; },
     seek, play, step, options,
     timing: () => ({ ...frames, mean_ms: frames.spent_ms / Math.max(1, frames.count) }),

@@ -191,6 +191,22 @@ const Data = (() => {
     return apart(closest.target, Math.max(closest.t - 120, tables.truth.time_s[span.from]));
   }
 
+  // The first instant at which an aircraft is within a distance of the ownship, or was measured there.
+  function firstWithin(far) {
+    let first = Infinity;
+    const look = (time_s, east_m, north_m, from, to) => {
+      for (let i = from; i < to; i++) {
+        if (time_s[i] >= first) continue;
+        const here = ownship(time_s[i]);
+        if (Math.hypot(east_m[i] - here.east, north_m[i] - here.north) <= far) first = time_s[i];
+      }
+    };
+    const c = tables.truth, d = tables.detections;
+    for (const span of spans) look(c.time_s, c.east_m, c.north_m, span.from, span.to);
+    if (d) look(d.time_s, d.east_m, d.north_m, 0, d.count);
+    return Number.isFinite(first) ? first : 0;
+  }
+
   // Times of detections by sensor and target, with the range at the first.
   const looks = raw.sensors.map(() => new Map());
   if (tables.detections) {
@@ -208,9 +224,10 @@ const Data = (() => {
   }
   const scanTimes = scans.map((rows) => Float64Array.from(rows, (i) => tables.scans.time_s[i]));
 
+  const near_m = nearReach();
   return {
     ...raw, tables, trackers, after, ownship, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
-    looks, scanTimes, reach: { near_m: nearReach() },
+    looks, scanTimes, reach: { near_m, first_s: firstWithin(near_m) },
     scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
   };
 })();

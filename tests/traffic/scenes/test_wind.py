@@ -171,7 +171,7 @@ def test_an_airspeed_gives_the_speed_over_the_ground():
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"airspeed_mps": 15.0, "speed_mps": 0.0}, "ownship: airspeed_mps is 15: .*across"),
+        ({"airspeed_mps": 15.0, "speed_mps": 0.0}, r"ownship\.airspeed_mps = 15\.0: .*across"),
         ({"airspeed_mps": 20.5, "speed_mps": 0.0, "heading_deg": 310.0}, "wind of 21 m/s against"),
         ({"airspeed_mps": 50.0}, "airspeed_mps is 50 and speed_mps is 70: only one"),
         ({"airspeed_mps": 50.0, "speed_mps": 0, "legs": [{"kind": "straight"}]}, "are legs"),
