@@ -1,11 +1,14 @@
 """Bands of many states at once are those of each state by itself."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
 from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many
-from components.guidance.regions import GuidedIntruders
+from components.guidance.intervals import clear_intervals
+from components.guidance.regions import GuidedIntruders, any_interval
 from components.guidance.situation import State
 from tests.alerting.conf_text import CONF
 
@@ -50,3 +53,16 @@ def test_each_state_is_as_alone(kind, tmp_path):
         assert found == alone
     assert 5 < sum(len(found.bands) > 1 for found in together) < COUNT
     assert any(found.recovery is not None for found in together)
+
+
+def test_whether_any_way_is_clear_goes_by_each_ones_own_limits():
+    """As the intervals of each say, of values some of which lie beyond limits of their own."""
+    random = np.random.default_rng(3)
+    values = np.tile(np.arange(8.0), (COUNT, 1))
+    least, most = random.uniform(0.0, 4.0, COUNT), random.uniform(3.0, 7.0, COUNT)
+    clear = random.random((COUNT, 8)) < 0.5
+    kind = SimpleNamespace(values=values, least=least, most=most, cyclic=False)
+    rows = zip(values, clear, least, most, strict=True)
+    alone = [bool(clear_intervals(*row, cyclic=False)) for row in rows]
+    assert any_interval(kind, clear).tolist() == alone
+    assert 5 < sum(alone) < COUNT - 5

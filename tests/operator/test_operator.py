@@ -120,6 +120,10 @@ def test_as_long_as_an_alert_lasts_the_next_decisions_follow_after_the_mean_paus
     assert len(begins) == 2 and begins[1] - begins[0] > 100.0
     answers = [[t - begin for t in told if begin <= t <= begin + 60.0] for begin in begins]
     assert answers[0][:3] == [23.0, 41.0, 53.0] and answers[1][0] == 23.0
+    # Who chooses before executing pauses from 20 s on: 9 s have passed at 30 s, and 6 + 3 s more.
+    loop["blocks"]["avoidance"]["chooses"], loop["duration_s"] = "before_executing", 120
+    early = [row["time_s"] - begins[0] for row in rows(run(loop), "manoeuvres")]
+    assert early[:2] == [23.0, 39.0]
 
 
 def uniforms(count):

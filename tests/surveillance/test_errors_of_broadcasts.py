@@ -1,6 +1,7 @@
 """What aircraft say of themselves errs as it is stated, and sends when it is stated."""
 
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from components.surveillance.altimetry import (
 from components.surveillance.broadcast import CORRELATION_TIME_S, Broadcasts, Transponders
 from components.surveillance.reception import DO_365_IN_1_S, LAWS, do_365, fitted
 from components.surveillance.squitter_clock import SquitterClocks
+from components.surveillance.stated_errors import StatedByAircraft
 from dsa_des.time.randomness import Stream, Streams
 
 N = 100_000
@@ -77,6 +79,15 @@ def test_altimetry_errors_are_laplacian_by_layer(layer):
     assert altimetry_variance_ft2(altitude)[0] == pytest.approx(second)
 
 
+def test_a_layer_s_top_is_of_the_layer_for_errors_as_for_their_variance():
+    tops = np.array(LAYER_TOPS_FT, dtype=float)
+    for kind in (0.0, 0.999):  # altimeters of either sort
+        draws = np.full(len(tops), 1.7), np.full(len(tops), kind)
+        at, below, above = (altimetry_error_ft(tops + by, *draws) for by in (0.0, -1.0, 1.0))
+        assert np.array_equal(at, below) and not np.array_equal(at, above)
+    assert np.array_equal(altimetry_variance_ft2(tops), altimetry_variance_ft2(tops - 1.0))
+
+
 def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     them, count = who(2000), 14
     clocks = SquitterClocks(Stream(9, "a", "b"))
@@ -110,6 +121,29 @@ def test_a_clock_says_the_same_whatever_was_asked_before():
     # Days later it is still a matter of the clock's own messages.
     number, sent, _ = other.latest(keys[:1], runs[:1], np.array([86_400 * NS]), 1)
     assert abs(number[0, 0] / 172_800 - 1.0) < 1e-3 and 0 <= 86_400 * NS - sent[0, 0] < 0.6 * NS
+
+
+def test_what_is_sent_at_an_instant_is_sent_by_then_and_no_nanosecond_before():
+    them, clocks = who(50), SquitterClocks(Stream(2, "a", "b"))
+    _, sent, _ = clocks.latest(them.keys, them.run, np.full(50, 90 * NS), 2)
+    _, then, _ = clocks.latest(them.keys, them.run, sent[:, 0], 2)
+    assert np.array_equal(then, sent)
+    _, before, _ = clocks.latest(them.keys, them.run, sent[:, 0] - 1, 1)
+    assert np.array_equal(before[:, 0], sent[:, 1])
+
+
+def test_positions_carried_on_err_by_the_error_of_the_velocity_times_their_age():
+    """The same velocity errs all the way: after 3 s its variance counts nine times, not three."""
+    deviations = {
+        "position_deviation_m": np.array([20.0]),
+        "velocity_deviation_m_s": np.array([2.0]),
+    }
+    said = {name: np.full(3, 1000.0) for name in ("reported_alt_m", "reported_north_m_s")}
+    stated = StatedByAircraft(
+        SimpleNamespace(**deviations), np.zeros(3, dtype=int), said, errs=True, rounds=False
+    )
+    north, east, _ = stated.position_m2(np.array([0.0, 0.5, 3.0]))
+    assert north.tolist() == east.tolist() == [400.0, 401.0, 436.0]
 
 
 def test_laws_of_reception():

@@ -141,10 +141,11 @@ def test_looks_of_the_future_wait_and_are_counted():
     assert (table["state_s"].to_numpy() <= table["time_s"].to_numpy()).all()
 
 
-def test_one_step_finds_its_tracks_whoever_else_is_there():
+@pytest.mark.parametrize("late", ["one_step", "rerun"])
+def test_late_looks_find_their_tracks_whoever_else_is_there(late):
     """Detections miss their tracks, others start and end, and a late look corrects some of them."""
     case = Case(
-        "", {"type": "tracking.ekf", "late": "one_step", "lag_s": 2, "false_alarms_per_scan": 1.2},
+        "", {"type": "tracking.ekf", "late": late, "lag_s": 2, "false_alarms_per_scan": 1.2},
         NEARLY, sensors={**SENSORS, "radar": NOISY}, wire={"delay_s": 0.3, "jitter_s": 0.2},
     )  # fmt: skip
     traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": NEARLY}

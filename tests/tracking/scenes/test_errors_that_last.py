@@ -1,5 +1,7 @@
 """Errors that are the same again at the next look, and what a filter makes of them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import dsa_des
 from components.estimation.kalman import variance_of_what_is_new
 from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.optical.sensors import OpticalRangeBoundary
+from components.tracking.gating import common_errors
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
 from dsa_des.running.reports import notes_of_scene
@@ -125,3 +128,22 @@ def test_a_filter_that_is_told_nothing_of_it_warns():
     scene["blocks"]["slow"]["type"] = f"{__name__}:Silent"
     (text,) = said()
     assert "blocks.tracker: slow does not say" in text
+
+
+def test_looks_have_in_common_what_lies_between_them_whichever_was_first():
+    """2 s apart, 0.02 rad across the line on which azimuths jump, in either order: 3 s is other."""
+    told = []
+    lasting = SimpleNamespace(lasts=np.array([True]), common=lambda *given: told.append(given))
+    rules = SimpleNamespace(lasting=lasting, ticks_per_s=10)
+    part = SimpleNamespace(
+        tick=np.array([40, 60, 30]), seen_tick=np.array([[60, 40, 60]]),
+        seen=np.array([np.pi - 0.01, 0.2, 900.0])[:, np.newaxis, np.newaxis] * np.ones((3, 1, 3)),
+    )  # fmt: skip
+    scans = SimpleNamespace(source=np.zeros((3, 3), dtype=int))
+    foreseen = np.array([0.01 - np.pi, 0.5, 950.0])[:, np.newaxis] * np.ones((3, 3))
+    common_errors(
+        rules, part, np.arange(3), scans, [0, 1, 2], np.arange(3), foreseen, np.ones((3, 3))
+    )
+    ((_, _, _, moved, since_s, _),) = told
+    assert np.allclose(moved, np.array([[0.02], [0.3], [50.0]]))
+    assert (since_s == [2.0, 2.0, 3.0]).all()

@@ -95,7 +95,10 @@ def test_what_a_policy_drops_is_said_with_its_share():
     assert shares("0.25") == shares("0.5", late="rerun") == []
     (said,) = shares("0.25", late="drop")
     assert "100% of the looks of a_pulse" in said and "late is 'drop'" in said
-    assert shares("0.025", late="drop") == []  # the camera looks 0.03 s after it
+    # The camera looks 0.03 s after it: what comes at that instant, with its look, is not late.
+    assert shares("0.03", late="drop") == [] != shares("0.031", late="drop")
+    simulation = Simulation(dsa_des.load_scene(scene("0.03", late="drop", duration_s=1)))
+    assert simulation.run().report["late_looks"] == {"tracker": {}}
     (half,) = shares("0.02", late="drop", eye={"offset_s": "0.01", "scan_rate_hz": "2.5"})
     assert "50% of the looks of a_pulse" in half
     (lag,) = shares("0.5", lag_s=0.2)
