@@ -84,7 +84,7 @@ class Declarations:
 
     def __init__(self, m: int, n: int) -> None:
         self.m, self.n = m, n
-        self._names: tuple[str, ...] = ()
+        self.names: tuple[str, ...] = ()
         #: Of all targets of the first run, of the second, and so on.
         self._memory: BoolArray = no_looks_yet(n, 0)
         self._first_tick: IntArray = np.empty(0, dtype=np.int64)
@@ -92,11 +92,11 @@ class Declarations:
 
     def __call__(self, cells: Cells, look: Look) -> Look:
         """Return the look with a column ``declared``."""
-        self._names = cells.roster.names
-        targets = cells.run * len(self._names) + cells.target
+        self.names = cells.roster.names
+        targets = cells.run * len(self.names) + cells.target
         runs = int(cells.run.max(initial=0)) + 1
-        if len(self._memory) < runs * len(self._names):
-            self._remember(runs * len(self._names))
+        if len(self._memory) < runs * len(self.names):
+            self._remember(runs * len(self.names))
         declared, self._memory = declare_looks(targets, look.detected, self.m, self.n, self._memory)
         self._note_first(cells, targets, np.flatnonzero(declared))
         if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
@@ -117,14 +117,10 @@ class Declarations:
         self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]
         self._first_range_m[target[new]] = cells.range_m[first]
 
-    def first(self, ticks_per_s: int) -> dict[str, dict[str, float] | None]:
-        """Return by target when it was first declared and its true range then, or None."""
-        return {
-            name: None if tick < 0 else {"time_s": tick / ticks_per_s, "range_m": range_m}
-            for name, tick, range_m in zip(
-                self._names, self._first_tick.tolist(), self._first_range_m.tolist(), strict=True
-            )
-        }
+    def first(self) -> dict[str, tuple[int, float]]:
+        """Return by target at which tick it was first declared, and its true range then."""
+        firsts = zip(self._first_tick.tolist(), self._first_range_m.tolist(), strict=True)
+        return {name: one for name, one in zip(self.names, firsts, strict=True) if one[0] >= 0}
 
 
 #: How far apart two measurements of one position are taken to lie, in standard deviations.
@@ -221,7 +217,7 @@ class DeclaredPlaces:
         self._ticks_per_s = block.context.ticks_per_s
         self._memory: SeenPlaces | None = None
         self._first: dict[str, tuple[int, float]] = {}
-        self._names: tuple[str, ...] = ()
+        self.names: tuple[str, ...] = ()
 
     def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
         """Return the report with a column ``declared``."""
@@ -269,21 +265,16 @@ class DeclaredPlaces:
         )
 
     def _note_first(self, detections: Detections, declared: IntArray) -> None:
-        self._names = detections.roster.names
+        self.names = detections.roster.names
         row = detections.row_of_entries
         target, place = np.unique(detections.target[declared], return_index=True)
         for index, entry in zip(target.tolist(), declared[place].tolist(), strict=True):
             tick = int(detections.tick[row[entry]])
-            self._first.setdefault(
-                self._names[index], (tick, float(detections.true_range_m[entry]))
-            )
+            self._first.setdefault(self.names[index], (tick, float(detections.true_range_m[entry])))
 
-    def first(self, ticks_per_s: int) -> dict[str, dict[str, float] | None]:
-        """Return by target when it was first declared and its true range then, or None."""
-        found: dict[str, dict[str, float] | None] = dict.fromkeys(self._names)
-        for name, (tick, range_m) in self._first.items():
-            found[name] = {"time_s": tick / ticks_per_s, "range_m": range_m}
-        return found
+    def first(self) -> dict[str, tuple[int, float]]:
+        """Return by target at which tick it was first declared, and its true range then."""
+        return self._first
 
 
 class DeclarationByPlace(Effect[Reporting]):

@@ -332,7 +332,14 @@ class Sensor(Measuring):
         declarations = self.context.effects.get(rule)
         if declarations is None or self.p.declare_m is None:
             return {}
-        return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
+        ticks_per_s = self.context.ticks_per_s
+        # A window may have looked beyond an early end of the run.
+        end_tick = self.context.duration_s * ticks_per_s
+        first: dict[str, dict[str, float] | None] = dict.fromkeys(declarations.names)
+        for target, (tick, range_m) in declarations.first().items():
+            if tick < end_tick:
+                first[target] = {"time_s": tick / ticks_per_s, "range_m": range_m}
+        return {"declarations": {self.name: first}}
 
     def _decide(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
         """Return the reasons of each scan, from the gate's decision if it has one."""

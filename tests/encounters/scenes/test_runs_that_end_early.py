@@ -57,6 +57,29 @@ def expected_s(times_s, after_s=20.0, beyond_m=0.0, targets=crooked.TARGETS):
     return MEANT_S
 
 
+@pytest.mark.parametrize("by", ["target", "place"])
+@pytest.mark.parametrize("m", [1, 2])
+def test_a_declaration_beyond_the_end_is_none(m, by, tmp_path):
+    end_s = float(expected_s(looks_s()))
+    late = scene()
+    # What ends the run lies behind the radar, which has run to the window's end by then.
+    late["blocks"]["away"] = {"type": "avoidance.turn_away", "range_km": 0.001}
+    late["blocks"]["others"] = late["blocks"]["traffic"]
+    late["wires"][-1:] = ["tracker -> away -> others", "others -> over"]
+    late["blocks"]["radar"] |= {
+        "offset_s": end_s - 1.0, "scan_rate_hz": 0.5, "declare_m": m, "declare_n": m,
+        "declare_by": by,
+    }  # fmt: skip
+    path = tmp_path / "late.toml"
+    path.write_text(to_toml(late))
+    for window in (None, 1):
+        done = Simulation(load_scene(path), window=window).run()
+        assert done.duration_s == pytest.approx(end_s)
+        first = done.report["declarations"]["radar"]
+        assert first.keys() == {"rolling", "diving"}
+        assert any(first.values()) == (m == 1)
+
+
 @covers("scan_rate_hz", "offset_s", "rate_error_ppm", "after_s", "beyond_m", of=KIND)
 @pytest.mark.parametrize(
     "clock, rule",
