@@ -16,7 +16,8 @@ from components.formats.asterix_records import (
     AsterixRecord,
     read_records,
 )
-from components.formats.sample_table import SampleColumn, SampleTable, enu_velocity
+from components.formats.sample_columns import SampleColumn, enu_velocity
+from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
 from components.geometry import radii_of_curvature, wrap_pi
 from dsa_des.arrays.types import FloatArray, IntArray
