@@ -9,12 +9,12 @@ from datetime import UTC, datetime
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from components.formats.sample_columns import (
     VELOCITIES,
+    Altitude,
     ColumnSpec,
     SampleColumn,
     complete_velocity,
@@ -34,8 +34,6 @@ from components.formats.text_rows import (
 )
 from dsa_des.arrays.types import FloatArray
 
-#: Which altitude is read where there is more than one.
-Altitude = Literal["geometric", "barometric"]
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
 _BAROMETRIC = ("baroaltitude", "altbaro", "barometricaltitude", "pressurealtitude")
 _ANY_HEIGHT = ("alt", "altitude", "height")
@@ -232,8 +230,6 @@ def _find_columns(
     if taken:
         why = f"as {family} writes it" if family else "no unit is given"
         notes.append(f"{', '.join(taken)}: {why}")
-    if "alt instead" in columns:
-        notes.append(f"of two altitudes, {columns['alt'].header} is read")
     if "trk" not in columns and not complete_velocity(columns) and "yaw" in columns:
         # Receivers that log velocity call the track "heading".
         columns["trk"] = columns["yaw"]

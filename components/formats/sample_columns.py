@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from components.formats.text_rows import MOST_OF_A_CELL, NO_UNIT, UNIT_KINDS, Pr
 from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import shortened
 
+#: Which altitude is read where there is more than one.
+Altitude = Literal["geometric", "barometric"]
 VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.sample_columns import SampleColumn, is_missing
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
@@ -28,9 +29,8 @@ _LIMITS = {
 # simulate the years in between.
 _LONGEST_SILENCE_S = 86400.0
 
-#: Notes on single aircraft that change nothing, or that `suspicions` tell of.
-_HARMLESS = frozenset({"order", "velocity", "single"})
-
+#: A pressure altitude differs by less from a height in the weather of most days.
+_FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
 # No aircraft, and no spacecraft, flies so far from one sample to the next, m/s.
@@ -68,7 +68,9 @@ class SampleTable:
         *,
         gaps: bool = False,
         instead: Mapping[str, str] | None = None,
+        rows: str = "rows",
     ) -> None:
+        self._kind_of_rows = rows
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
@@ -77,7 +79,9 @@ class SampleTable:
         #: Harmless ones; what was left out or taken for something else is in `warnings`.
         self.notes: list[str] = []
         self.warnings: list[str] = []
-        self._of_aircraft: dict[str, list[str]] = {}
+        self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
+        self._apart: dict[str, list[tuple[float, str]]] = {}
+        self._second: dict[str, list[str]] = {}
         self._width = len(headers)
         self._plan = [
             (quantity, column.index, column.factor, *_limits(quantity)[:2])
@@ -126,9 +130,9 @@ class SampleTable:
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
 
-    def note_of(self, name: str, kind: str, text: str) -> None:
+    def note_of(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
         """Note what holds of one aircraft; of those of a kind the first is told, and how many."""
-        cases = self._of_aircraft.setdefault(kind, [])
+        cases = self._of_aircraft.setdefault((kind, harmless), [])
         if f"{name}: {text}" not in cases[-1:]:
             cases.append(f"{name}: {text}")
 
@@ -149,9 +153,9 @@ class SampleTable:
                 )
         self._problems.raise_if_any()
         intruders = [trajectory for name, trajectory in made.items() if name != own]
-        for kind, cases in self._of_aircraft.items():
+        for (_, harmless), cases in self._of_aircraft.items():
             more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
-            (self.notes if kind in _HARMLESS else self.warnings).append(cases[0] + more)
+            (self.notes if harmless else self.warnings).append(cases[0] + more)
         notes = [*self.notes, *self.warnings]
         return TrafficFile(made[own], intruders, start, notes, self.warnings)
 
@@ -186,15 +190,7 @@ class SampleTable:
             lines = np.array(rows.lines)
             columns = {key: np.array(values) for key, values in rows.values.items()}
             for key, other in self._instead.items():
-                if (
-                    len(lines)
-                    and np.isnan(columns[key]).all()
-                    and not np.isnan(columns[other]).all()
-                ):
-                    headers = self._columns[other].header, self._columns[key].header
-                    columns[key] = columns[other]
-                    self.note_of(name, "instead", "{} is taken: it has no {}".format(*headers))
-                del columns[other]
+                columns[key] = self._one_of_two(name, key, columns[key], columns.pop(other))
             there = np.ones(len(lines), dtype=bool)
             for key in columns.keys() - self._optional:
                 there &= ~np.isnan(columns[key])
@@ -210,14 +206,46 @@ class SampleTable:
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "
                         f"{len(columns[key])} samples and is ignored",
+                        harmless=missing == len(columns[key]),
                     )  # fmt: skip
                     del columns[key]
             kept[name] = lines, columns
+        self._note_second_columns()
         if left_out:
-            rows_were = "row was" if left_out == 1 else "rows were"
-            what = f"{left_out} {rows_were} left out that had no time or no position"
+            of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
+            what = f"{left_out} {of} left out that had no time or no position"
             self.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
         return kept
+
+    def _one_of_two(self, name: str, key: str, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Return an aircraft's first column, or its second where it has nothing in the first."""
+        both = ~np.isnan(first) & ~np.isnan(second)
+        if both.any():
+            apart = float(np.abs(first - second)[both].max())
+            self._apart.setdefault(key, []).append((apart, name))
+        if np.isnan(first).all() and not np.isnan(second).all():
+            self._second.setdefault(key, []).append(name)
+            return second
+        return first
+
+    def _note_second_columns(self) -> None:
+        """Say which of two columns is read, for whom the other, and how far they are apart."""
+        for key, other in self._instead.items():
+            first, second = self._columns[key].header, self._columns[other].header
+            if whom := self._second.get(key, []):
+                if len(whom) == len(self._aircraft):
+                    self.notes.append(f"{second} is read: there is no {first}")
+                else:
+                    more = f" (and {len(whom) - 1} more aircraft)" if len(whom) > 1 else ""
+                    said = f"{second} is read beside {first} of others: it has no {first}"
+                    self.warnings.append(f"{whom[0]}{more}: {said}")
+            if apart := self._apart.get(key):
+                most, name = max(apart)
+                said = (
+                    f"{first} is read, {second} differs by up to {most:,.0f} m "
+                    f"({most / FOOT_M:,.0f} ft, {name})"
+                )
+                (self.warnings if most > _FAR_APART_M else self.notes).append(said)
 
     def _number(self, line: int, quantity: str, column: SampleColumn, cell: str) -> float | None:
         try:
@@ -262,7 +290,12 @@ class SampleTable:
             return {}
         order = np.argsort(columns["time"], kind="stable")
         if np.any(order[1:] < order[:-1]):
-            self.note_of(name, "order", "rows were not in the order of time and have been sorted")
+            self.note_of(
+                name,
+                "order",
+                "rows were not in the order of time and have been sorted",
+                harmless=True,
+            )
         lines = lines[order]
         columns = {key: values[order] for key, values in columns.items()}
         where = [values for key, values in columns.items() if key not in self._optional]
@@ -323,10 +356,15 @@ class SampleTable:
             self.note_of(
                 name, "velocity",
                 "its velocities do not fit its positions (another unit, or airspeed?) and were "
-                "ignored",
+                "ignored", harmless=True,
             )  # fmt: skip
         if len(columns["time"]) == 1:
-            self.note_of(name, "single", "has one sample only and is there at that instant only")
+            self.note_of(
+                name,
+                "single",
+                "has one sample only and is there at that instant only",
+                harmless=True,
+            )
         else:
             gaps = np.diff(columns["time"])
             if gaps.max() > max(30.0, 10.0 * float(np.median(gaps))):

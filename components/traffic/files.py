@@ -15,8 +15,9 @@ from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
-from components.formats.csv_file import Altitude, read_csv
+from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
+from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
 from components.geometry import line_of_sight_ned
 from components.traffic.source import SourceParameters, TrafficSource, roster_of
@@ -177,8 +178,9 @@ class CsvParameters(FileParameters):
     )
     altitude: Altitude | None = Field(
         default=None,
-        description="Which altitude is read of a file with both; by default the one that the "
-        "file's reader takes first, as its notes say.",
+        description="Which altitude is read, of a file with both. By default of CSV the column "
+        "that the list of names has first, of ASTERIX the barometric one; aircraft that report "
+        "none of that kind fly at the other, as a note says.",
     )
 
 
@@ -287,4 +289,4 @@ class AsterixFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return _read(self.p.file, read_asterix, self.p.ownship)
+        return _read(self.p.file, read_asterix, self.p.ownship, self.p.altitude)

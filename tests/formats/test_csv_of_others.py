@@ -57,9 +57,12 @@ def test_rows_with_gaps_are_left_out_and_columns_with_gaps_are_not_used(tmp_path
     }
     assert file.ownship.velocity_enu_mps is not None  # its one gap is in a row left out
     assert file.warnings[0] == "3 rows were left out that had no time or no position"
-    roll = "a00001: column roll has no number in 2 of its 2 samples and is ignored"
-    assert file.warnings[1] == f"{roll} (and 1 more aircraft)"
+    assert file.warnings[1] == (
+        "a00002: column roll has no number in 1 of its 2 samples and is ignored"
+    )
     assert len(file.warnings) == 2
+    roll = "a00001: column roll has no number in 2 of its 2 samples and is ignored"
+    assert roll in file.notes  # all of it is missing: nothing is lost
 
 
 def test_a_gap_in_the_velocity_of_a_used_row_costs_the_velocity_alone(tmp_path):
@@ -69,7 +72,7 @@ def test_a_gap_in_the_velocity_of_a_used_row_costs_the_velocity_alone(tmp_path):
     assert own.alt_m.tolist() == [1000, 1000, 1000]
     assert not own.velocity_was_ignored
     assert [w.partition(":")[2].split()[1] for w in file.warnings[1:]] == [
-        "velocity", "roll", "heading", "vertrate",
+        "velocity", "heading", "vertrate", "roll",
     ]  # fmt: skip
     assert "has no number in 1 of its 3 samples" in file.warnings[1]
 
@@ -81,10 +84,10 @@ def test_an_aircraft_without_the_altitude_read_has_its_other_one(tmp_path):
         "a": [(0, 47, 8, 1050)], "b": [(0, 47, 8.1, 900), (5, 47, 8.09, 900)],
     }  # fmt: skip
     assert file.warnings == [
+        "b: baroaltitude is read beside geoaltitude of others: it has no geoaltitude",
         "2 rows were left out that had no time or no position, 1 aircraft wholly",
-        "b: baroaltitude is taken: it has no geoaltitude",
     ]
-    assert "of two altitudes, geoaltitude is read" in file.notes
+    assert "geoaltitude is read, baroaltitude differs by up to 50 m (164 ft, a)" in file.notes
 
 
 def test_rows_on_the_ground_are_left_out(tmp_path):
