@@ -40,8 +40,9 @@ class DaidalusParameters(ConfParameters, ClockedParameters):
     conf: ScenePath = Field(description="Alerters, times and memory: a .conf file of DAIDALUS.")
     hysteresis: bool = Field(default=True, description="Whether levels are remembered at all.")
     fit_s: float = Field(
-        default=3.0, gt=0, le=60, description="Positions of so long give a target's flight, at least the last two, s."
-    )
+        default=3.0, gt=0, le=60,
+        description="Positions of so long give a target's flight, at least the last two, s.",
+    )  # fmt: skip
 
     @field_validator("conf", mode="after")
     @classmethod
