@@ -14,17 +14,35 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.losses import nearest_of, ways_of
+from components.metrics.losses import FlightsTogether, nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, EVENT, KEY, NUMBER, RATIO, Group, Metric, RatioOf, Result
+from dsa_des.studies.metric import (
+    CLASS,
+    EVENT,
+    KEY,
+    NUMBER,
+    RATIO,
+    Group,
+    Metric,
+    RatioOf,
+    Result,
+    expected_column,
+)
 
 
 def has_weights(scene: Scene) -> bool:
     """Return whether the traffic of a scene is one encounter of many, each with its weight."""
     return hasattr(traffic_block(scene).parameters, "encounter")
+
+
+def make_together(scenes: Sequence[Scene]) -> None:
+    """Make the encounters of many scenes at once: each will be asked for several times."""
+    blocks = [traffic_block(scene) for scene in scenes]
+    if blocks and hasattr(blocks[0].cls, "prepare"):
+        blocks[0].cls.prepare([block.parameters for block in blocks])
 
 
 class EncounterWeight(Metric):
@@ -59,6 +77,11 @@ class EncounterWeight(Metric):
             "encounter": numbers, "encounter_weight": weights, "encounter_family": families,
         }  # fmt: skip
 
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all three, which no flight changes."""
+        make_together(group.scenes)
+        return self.measure(group)
+
 
 #: Sides from which an intruder closes in, by bearing from the ownship's course.
 BEARINGS = ("ahead", "right", "behind", "left")
@@ -66,6 +89,11 @@ _CLASSES = {"geometry": GEOMETRIES, "bearing": BEARINGS}
 _EVENTS = ("nmac", "well_clear_lost")
 # Of needless manoeuvres.
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
+# What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
+# which was just missed, and that one is flown where well clear is just kept; falling with the miss
+# distance. Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
+_STAYS, _INDUCED, _NEEDS = 0.2, 0.02, 0.1
+_LEAST_SIZES = 0.01
 # Courses are taken over this time to both sides of the closest approach.
 _BASE_S = 0.5
 
@@ -90,6 +118,12 @@ class RiskRatios(Mitigated):
     """Risk ratios of NMAC and of loss of well clear, with the flags that they are made of."""
 
     Parameters = RiskRatioParameters
+    geometry = (
+        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps",
+        "course_along", "course_across", "bearing_ahead", "bearing_right",
+        "log_miss_in_nmac_sizes", "log_miss_in_well_clear_sizes",
+        *(expected_column(name) for name in (*(f"{e}_mitigated" for e in _EVENTS), _NEEDLESS)),
+    )  # fmt: skip
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -130,11 +164,41 @@ class RiskRatios(Mitigated):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all but the ratios for every replica."""
         result = dict(super().measure(group))
+        result |= self._unsteered(group, result)
         if self.p.needless:
             commanded = np.zeros(len(group))
             commanded[list(self.manoeuvres(group))] = 1.0
-            kept = 1.0 - result["well_clear_lost_nominal"]
-            result |= {_KEPT: kept, _COMMANDED: commanded, _NEEDLESS: kept * commanded}
+            result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
+        return result
+
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return what no manoeuvre changes, and the geometry of the closest approach."""
+        make_together(group.scenes)
+        result = dict(self.losses(group, steered=False))
+        result |= self._unsteered(group, result)
+        values = self.of_flights(group, nominal_geometry, steered=False)
+        result |= dict(zip(self.geometry, values, strict=False))
+        clear, nmac = (
+            np.maximum(values[1] / radius_m, values[2] / half_m)
+            for radius_m, half_m in self.p.sizes_m
+        )
+        for name, sizes in (("well_clear", clear), ("nmac", nmac)):
+            result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
+        for event, sizes in zip(_EVENTS, (nmac, clear), strict=True):
+            there = result[f"{event}_nominal"] > 0.0
+            result[expected_column(f"{event}_mitigated")] = np.where(
+                there, _STAYS, _INDUCED * np.maximum(np.nan_to_num(sizes, nan=np.inf), 1.0) ** -8.0
+            )
+        kept = 1.0 - result["well_clear_lost_nominal"]
+        alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
+        result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
+        return result
+
+    def _unsteered(self, group: Group, known: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+        """Return weight and classes, and whether well clear is kept, as without manoeuvres."""
+        result: dict[str, AnyArray] = {}
+        if self.p.needless:
+            result[_KEPT] = 1.0 - known["well_clear_lost_nominal"]
         if self._weight is not None:
             result |= self._weight.measure(group)
         if self.p.by:
@@ -154,16 +218,32 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return result
 
 
-def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
+def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return the numbers of `RiskRatios.geometry`, (8, runs), of the nearest intruder.
 
-    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
-    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
-    never meet.
+    Time, miss distances and relative speed in the level plane at the closest approach; cosine and
+    sine of course and bearing (`meeting_deg`). NaN where they never meet.
     """
+    course, bearing = np.radians(meeting_deg(runs))
+    numbers = np.full((4, len(runs)), np.nan)
+    met, flights, time_s = _met(runs)
+    if met:
+        together = FlightsTogether(flights)
+        own, other = ways_of(flights, time_s, _BASE_S)
+        numbers[0, met] = time_s
+        numbers[1:3, met] = together.level_distances_m(np.arange(len(flights)), time_s)
+        numbers[3, met] = np.hypot(*(other - own)) / (2.0 * _BASE_S)
+    angles = np.cos(course), np.sin(course), np.cos(bearing), np.sin(bearing)
+    result: FloatArray = np.concatenate([numbers, angles])
+    return result
+
+
+def _met(
+    runs: Sequence[list[RelativeFlight]],
+) -> tuple[list[int], list[RelativeFlight], FloatArray]:
+    """Return the runs in which somebody is met, whose flight is nearest, and when, s."""
     flights = [flight for run in runs for flight in run]
     distance_m, time_s = nearest_of(flights)
-    angles = np.full((2, len(runs)), np.nan)
     met: list[int] = []
     nearest: list[int] = []
     start = 0
@@ -173,7 +253,19 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
             met.append(number)
             nearest.append(index)
         start += len(run)
-    ways = ways_of([flights[index] for index in nearest], time_s[nearest], _BASE_S)
+    return met, [flights[index] for index in nearest], time_s[nearest]
+
+
+def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
+
+    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
+    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
+    never meet.
+    """
+    angles = np.full((2, len(runs)), np.nan)
+    met, flights, time_s = _met(runs)
+    ways = ways_of(flights, time_s, _BASE_S)
     for number, own, other in zip(met, *(way.T.tolist() for way in ways), strict=True):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
         closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))

@@ -109,7 +109,7 @@ class Tables:
         names = (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
-            "mitigated_probability", "few", "reason",
+            "mitigated_probability", "few", "reason", "flown", "gain",
         )  # fmt: skip
         columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):
