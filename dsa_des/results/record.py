@@ -259,6 +259,8 @@ class StudyRecord(StudyHead):
     compare_weight: str | None = None
     #: The numbers by which runs are told apart before they are flown; none where all are flown.
     geometry: list[str] = []
+    #: The command line that runs the study again; empty in folders of versions that kept none.
+    repeat: str = ""
 
     @model_validator(mode="after")
     def _consistent(self) -> "StudyRecord":
