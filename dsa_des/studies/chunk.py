@@ -17,6 +17,7 @@ from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import SceneError
+from dsa_des.files.sealed_files import parquet
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
 from dsa_des.results.record import (
@@ -27,7 +28,6 @@ from dsa_des.results.record import (
     columns_of,
     draw_column,
 )
-from dsa_des.results.sealed_files import parquet
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Plan
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
