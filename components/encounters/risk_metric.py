@@ -177,7 +177,9 @@ class RiskRatios(Mitigated):
         make_together(group.scenes)
         result = dict(self.losses(group, steered=False))
         result |= self._unsteered(group, result)
-        values = self.of_flights(group, nominal_geometry, steered=False)
+        *values, course_deg, bearing_deg = self._meeting(group)
+        angles = np.radians([course_deg, bearing_deg])
+        values += [part for angle in angles for part in (np.cos(angle), np.sin(angle))]
         result |= dict(zip(self.geometry, values, strict=False))
         clear, nmac = (
             np.maximum(values[1] / radius_m, values[2] / half_m)
@@ -203,13 +205,19 @@ class RiskRatios(Mitigated):
         if self._weight is not None:
             result |= self._weight.measure(group)
         if self.p.by:
-            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
+            *_, course_deg, bearing_deg = self._meeting(group)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)
                 column[np.isnan(course_deg)] = None
                 result[f"encounter_{by}"] = column
         return result
+
+    def _meeting(self, group: Group) -> FloatArray:
+        def make() -> FloatArray:
+            return self.of_flights(group, meeting, steered=False)
+
+        return group.once(("meeting", self.p.step_s), make)
 
 
 def side_of(bearing_deg: FloatArray) -> AnyArray:
@@ -219,30 +227,15 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return result
 
 
-def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return the numbers of `RiskRatios.geometry`, (8, runs), of the nearest intruder.
+def meeting(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return how the nearest intruder of each run is met, (6, runs); NaN where they never meet.
 
-    Time, miss distances and relative speed in the level plane at the closest approach; cosine and
-    sine of course and bearing (`meeting_deg`). NaN where they never meet.
+    Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
+    the closest approach, and two angles in degrees. Course: the intruder's less the ownship's.
+    Bearing from where the intruder closes in, clockwise from the ownship's course: opposite to its
+    velocity relative to the ownship.
     """
-    course, bearing = np.radians(meeting_deg(runs))
-    numbers = np.full((4, len(runs)), np.nan)
-    met, flights, time_s = _met(runs)
-    if met:
-        together = FlightsTogether(flights)
-        own, other = ways_of(flights, time_s, _BASE_S)
-        numbers[0, met] = time_s
-        numbers[1:3, met] = together.level_distances_m(np.arange(len(flights)), time_s)
-        numbers[3, met] = np.hypot(*(other - own)) / (2.0 * _BASE_S)
-    angles = np.cos(course), np.sin(course), np.cos(bearing), np.sin(bearing)
-    result: FloatArray = np.concatenate([numbers, angles])
-    return result
-
-
-def _met(
-    runs: Sequence[list[RelativeFlight]],
-) -> tuple[list[int], list[RelativeFlight], FloatArray]:
-    """Return the runs in which somebody is met, whose flight is nearest, and when, s."""
+    result = np.full((6, len(runs)), np.nan)
     flights = [flight for run in runs for flight in run]
     distance_m, time_s = nearest_of(flights)
     met: list[int] = []
@@ -254,21 +247,15 @@ def _met(
             met.append(number)
             nearest.append(index)
         start += len(run)
-    return met, [flights[index] for index in nearest], time_s[nearest]
-
-
-def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
-
-    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
-    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
-    never meet.
-    """
-    angles = np.full((2, len(runs)), np.nan)
-    met, flights, time_s = _met(runs)
-    ways = ways_of(flights, time_s, _BASE_S)
-    for number, own, other in zip(met, *(way.T.tolist() for way in ways), strict=True):
+    if not met:
+        return result
+    some, at_s = [flights[index] for index in nearest], time_s[nearest]
+    own_m, other_m = ways_of(some, at_s, _BASE_S)
+    result[0, met] = at_s
+    result[1:3, met] = FlightsTogether(some).level_distances_m(np.arange(len(some)), at_s)
+    result[3, met] = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
+    for number, own, other in zip(met, own_m.T.tolist(), other_m.T.tolist(), strict=True):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
         closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
-    return angles
+        result[4:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    return result

@@ -20,7 +20,7 @@ Pure functions of arrays; which columns they are is said by `dsa_des.studies.for
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,6 +71,8 @@ class Plan:
     precision: FloatArray
     #: How much π is for each w √(Σ p/V); infinite where all are flown.
     size: float
+    #: Of the runs it was learnt from, so many would be flown.
+    share: float = 1.0
 
     def probabilities(self, runs: Known) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
@@ -137,7 +139,8 @@ def learn(runs: Known, happened: FloatArray, stands_for: FloatArray) -> Plan:
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
             fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
     precision, size = best_size(runs, chances(terms, runs, fitted))
-    return Plan(middle, spread, fitted, precision, size)
+    plan = Plan(middle, spread, fitted, precision, size)
+    return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
 def best_size(runs: Known, chance: FloatArray) -> tuple[FloatArray, float]:

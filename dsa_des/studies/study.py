@@ -182,21 +182,25 @@ class Study:
     def chunks(
         self, round_number: int, cells: Sequence[int], plans: Mapping[int, Plan] | None = None
     ) -> Iterator[Chunk]:
-        """Return the chunks of one round: a batch of replicas of each of the given cells."""
+        """Return the chunks of one round: a batch of replicas of each of the given cells.
+
+        Of each chunk `runs_per_chunk` are flown, as many as a plan leads to expect.
+        """
         start, end = [0, *self.round_ends][round_number : round_number + 2]
         plans = plans or {}
         runs: list[tuple[int, int, int]] = []
-        room, number = self.runs_per_chunk, 0
+        room, number = float(self.runs_per_chunk), 0
         for cell in cells:
+            share = plans[cell].share if cell in plans else 1.0
             first = start
             while first < end:
-                last = min(end, first + room)
+                last = min(end, first + math.ceil(room / share))
                 runs.append((cell, first, last))
-                room -= last - first
+                room -= (last - first) * share
                 first = last
-                if room == 0:
+                if room <= 0.0:
                     yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs), plans)
-                    runs, room, number = [], self.runs_per_chunk, number + 1
+                    runs, room, number = [], float(self.runs_per_chunk), number + 1
         if runs:
             yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs), plans)
 
