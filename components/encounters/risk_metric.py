@@ -7,7 +7,7 @@ class of its geometry. The ratios themselves are taken over all runs of a cell.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,7 @@ from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
 from components.metrics.losses import FlightsTogether, nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, prepare_traffic, traffic_block
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     CLASS,
@@ -95,6 +95,8 @@ _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needles
 # distance. Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
 _STAYS, _INDUCED, _NEEDS = 0.2, 0.02, 0.1
 _LEAST_SIZES = 0.01
+# How far apart distances are looked at to choose runs by.
+_COARSE_S = 1.0
 # Courses are taken over this time to both sides of the closest approach.
 _BASE_S = 0.5
 
@@ -177,7 +179,7 @@ class RiskRatios(Mitigated):
         make_together(group.scenes)
         result = dict(self.losses(group, steered=False))
         result |= self._unsteered(group, result)
-        *values, course_deg, bearing_deg = self._meeting(group)
+        *values, course_deg, bearing_deg = self.of_flights(group, nominal_geometry, steered=False)
         angles = np.radians([course_deg, bearing_deg])
         values += [part for angle in angles for part in (np.cos(angle), np.sin(angle))]
         result |= dict(zip(self.geometry, values, strict=False))
@@ -205,19 +207,13 @@ class RiskRatios(Mitigated):
         if self._weight is not None:
             result |= self._weight.measure(group)
         if self.p.by:
-            *_, course_deg, bearing_deg = self._meeting(group)
+            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)
                 column[np.isnan(course_deg)] = None
                 result[f"encounter_{by}"] = column
         return result
-
-    def _meeting(self, group: Group) -> FloatArray:
-        def make() -> FloatArray:
-            return self.of_flights(group, meeting, steered=False)
-
-        return group.once(("meeting", self.p.step_s), make)
 
 
 def side_of(bearing_deg: FloatArray) -> AnyArray:
@@ -227,17 +223,67 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return result
 
 
-def meeting(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return how the nearest intruder of each run is met, (6, runs); NaN where they never meet.
+def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
+
+    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
+    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
+    never meet.
+    """
+    flights = [flight for run in runs for flight in run]
+    nearest = _nearest_of_each(runs, *nearest_of(flights))
+    angles = np.full((2, len(runs)), np.nan)
+    angles[:, nearest.runs] = _angles_deg(
+        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
+    )
+    return angles
+
+
+def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
 
     Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
-    the closest approach, and two angles in degrees. Course: the intruder's less the ownship's.
-    Bearing from where the intruder closes in, clockwise from the ownship's course: opposite to its
-    velocity relative to the ownship.
+    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
+    every `_COARSE_S`: enough to choose runs by.
     """
-    result = np.full((6, len(runs)), np.nan)
     flights = [flight for run in runs for flight in run]
-    distance_m, time_s = nearest_of(flights)
+    result = np.full((6, len(runs)), np.nan)
+    if not flights:
+        return result
+    together = FlightsTogether(flights)
+    many = 1 + int(max(flight.end_s for flight in flights) / _COARSE_S)
+    times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
+    level_m, up_m = (
+        part.reshape(len(flights), many)
+        for part in together.level_distances_m(
+            np.repeat(every, many), np.tile(times_s, len(flights))
+        )
+    )
+    range_m = np.hypot(level_m, up_m)
+    index = np.argmin(range_m, axis=1)
+    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
+    some, time_s = nearest.flights, nearest.time_s
+    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
+    speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
+    result[0, nearest.runs] = time_s
+    result[1, nearest.runs] = level_m[some, index[some]]
+    result[2, nearest.runs] = up_m[some, index[some]]
+    result[3, nearest.runs] = speed_mps
+    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
+    return result
+
+
+class _Nearest(NamedTuple):
+    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
+
+    runs: list[int]
+    flights: IntArray
+    time_s: FloatArray
+
+
+def _nearest_of_each(
+    runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
+) -> _Nearest:
     met: list[int] = []
     nearest: list[int] = []
     start = 0
@@ -247,15 +293,15 @@ def meeting(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
             met.append(number)
             nearest.append(index)
         start += len(run)
-    if not met:
-        return result
-    some, at_s = [flights[index] for index in nearest], time_s[nearest]
-    own_m, other_m = ways_of(some, at_s, _BASE_S)
-    result[0, met] = at_s
-    result[1:3, met] = FlightsTogether(some).level_distances_m(np.arange(len(some)), at_s)
-    result[3, met] = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
-    for number, own, other in zip(met, own_m.T.tolist(), other_m.T.tolist(), strict=True):
+    chosen = np.array(nearest, dtype=np.int64)
+    return _Nearest(met, chosen, time_s[chosen])
+
+
+def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
+    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
+    angles = np.empty((2, own_m.shape[1]))
+    for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
         closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-        result[4:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
-    return result
+        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    return angles

@@ -20,8 +20,8 @@ from dsa_des.studies.draws import uniform
 from dsa_des.studies.metric import Group, Metric, expected_column
 from dsa_des.studies.study import AUTO, Study
 
-#: Runs that are foreseen at a time.
-_AT_ONCE = 512
+#: Runs that are foreseen at a time: what is made of their encounters is kept until they are flown.
+_AT_ONCE = 4096
 
 
 def geometry_of(metrics: Sequence[Metric]) -> list[str]:
