@@ -172,8 +172,9 @@ def test_keys_like_no_other_are_named_in_one_line(tmp_path):
     last = CONF.count("\n") + 50
     assert problem.startswith("50 keys are unknown: Geofence0Radius (line ")
     assert problem.endswith(f", Geofence49Radius (line {last})")
-    (alone,) = said_of(tmp_path, CONF + "Geofence = 1\n")
-    assert alone.endswith("the key 'Geofence' is unknown")
+    # Nothing is meant that is there already.
+    (alone,) = said_of(tmp_path, CONF + "One_Two_far_WCV_TTHH = 1 [s]\n")
+    assert alone.endswith("the key 'One_Two_far_WCV_TTHH' is unknown")
 
 
 def test_a_file_of_release_1_is_called_that(tmp_path):
@@ -228,6 +229,10 @@ def test_tables_of_tcas_that_are_written_out_are_held_against_ours(tmp_path):
     assert problem == (
         "line 2: TCASII_d_TCAS_ZTHR_8 and 1 more are not as in the table of resolution advisories "
         "of TCAS II version 7.1, the only one that is used"
+    )
+    (problem,) = said_of(tmp_path, TCAS.format(**{**RESOLUTION, "filter": "false"}))
+    assert problem.startswith(
+        "line 2: TCASII_d_TCAS_HMDFilter is not as in the table of resolution"
     )
     (problem,) = said_of(tmp_path, TCAS.format(**TRAFFIC).replace("TAU_2 = 20 [s]", "TAU_2 = 20"))
     assert problem.startswith("line 9: TCASII_d_TCAS_TAU_2 has no unit")
