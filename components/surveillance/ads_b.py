@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from components.aircraft.known_targets import known_targets
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer
@@ -32,7 +33,12 @@ from components.surveillance.cooperative import (
 from components.surveillance.reception import LAWS
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
-from components.surveillance.stated_errors import StatedByAircraft, lasting_errors, told_errors
+from components.surveillance.stated_errors import (
+    LATE,
+    StatedByAircraft,
+    lasting_errors,
+    told_errors,
+)
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
@@ -165,11 +171,15 @@ class AdsB(CooperativeSensor):
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact
+        told = told_errors(self.p.position_errors) if errs else ()
+        # Of targets that may be anything some may be late.
+        late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
+        told = (*told, LATE) if any(late or [True]) else told
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
-            tells=True, told_errors=told_errors(self.p.position_errors) if errs else (),
+            tells=True, told_errors=told,
         )  # fmt: skip
 
     @property
@@ -321,7 +331,8 @@ class AdsB(CooperativeSensor):
             cells.roster.equipage, cells.craft[detected], said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
         )  # fmt: skip
-        variances = variances_in_body(own, ned, stated.position_m2(age_s))
+        late_m = stated.late_s * np.nan_to_num(moving)
+        variances = variances_in_body(own, ned, stated.position_m2(age_s), late_m)
         moves = np.stack(
             [look.signal[f"own_{axis}"][detected] for axis in ("north", "east", "down")]
         )

@@ -107,7 +107,7 @@ def run_watched(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
     """Run a scene once, recording what it records and the wakes of some blocks."""
     sink = MemorySink()
     simulation = Simulation(scene, recorder=Recorder([sink]))
-    watches = {name: _Watch(simulation.components[name]) for name in blocks}
+    watches = {name: _WatchedBlock(simulation.components[name]) for name in blocks}
     outcome = simulation.run()
     tables = sink.tables()
     return {
@@ -116,7 +116,7 @@ def run_watched(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
     }
 
 
-class _Watch:
+class _WatchedBlock:
     """Keeps what a block is given, and how long it works on it."""
 
     def __init__(self, component: Component) -> None:
