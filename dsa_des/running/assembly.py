@@ -29,9 +29,11 @@ class Assembly:
         recorder: Recorder | None,
         simulate_everything: bool,
         wrap_effect: WrapEffect | None,
+        rewinds: bool,
     ) -> None:
         self._scene = scene
         self._everything = simulate_everything
+        self._rewinds = rewinds
         self._place = telling_order(scene.graph, scene.classes)
         self.components = self._build(timeline, recorder)
         self.duration_s = self._duration()
@@ -52,6 +54,7 @@ class Assembly:
                 simulate_everything=self._everything,
                 recorded_runs=runs,
                 recorded_tables=tables,
+                rewinds=self._rewinds,
             )
             with self._preparing(name, problems):
                 components[name] = block.cls(name, timeline.parameters(name), context)
