@@ -33,6 +33,7 @@ import numpy.typing as npt
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import shown_value
 from dsa_des.results.gamma_interval import gamma_interval, unseen_event
+from dsa_des.results.statistics import scaled
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
@@ -135,10 +136,10 @@ def paired_ratio(
     ValueError
         Naming the first encounter (counted from 0) whose value cannot be used.
     """
-    n, w, s = _flags("nominal", nominal), _weights(weight, np.size(nominal)), None
-    if stands_for is not None:
-        s = _expansions(stands_for, len(n))
+    n = _flags("nominal", nominal)
+    s = None if stands_for is None else _expansions(stands_for, len(n))
     m = _flown(mitigated, s)
+    w, _ = scaled(_weights(weight, len(n)))  # all that follows is of weights relative to each other
     if len(m) != len(n):
         raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
     if method not in METHODS:
@@ -255,7 +256,7 @@ def influences(
     """
     n = _flags("nominal", nominal)
     s = None if stands_for is None else _expansions(stands_for, len(n))
-    m, w = _flown(mitigated, s), _weights(weight, len(n))
+    m, (w, _) = _flown(mitigated, s), scaled(_weights(weight, len(n)))
     expanded = m if s is None else s * m
     result: FloatArray = w * (expanded - ratio * n) / math.fsum(w * n)
     return result
@@ -267,7 +268,8 @@ def unseen_variance(nominal: FloatArray) -> float:
     `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
     proportion to their weights.
     """
-    return unseen_event(nominal)[1] / math.fsum(nominal) ** 2
+    part, _ = scaled(nominal)
+    return unseen_event(part)[1] / math.fsum(part) ** 2
 
 
 def _terms(
