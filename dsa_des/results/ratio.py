@@ -34,6 +34,7 @@ import numpy.typing as npt
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import shown_value
+from dsa_des.results.statistics import scaled
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
@@ -124,7 +125,7 @@ def paired_ratio(
         Naming the first encounter (counted from 0) whose value cannot be used.
     """
     n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
-    w = _weights(weight, len(n))
+    w, _ = scaled(_weights(weight, len(n)))  # all that follows is of weights relative to each other
     if len(m) != len(n):
         raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
     if method not in METHODS:
@@ -221,7 +222,7 @@ def influences(
     Values are those of `paired_ratio`.
     """
     n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
-    w = _weights(weight, len(n))
+    w, _ = scaled(_weights(weight, len(n)))
     result: FloatArray = w * (m - ratio * n) / math.fsum(w * n)
     return result
 
@@ -232,7 +233,8 @@ def unseen_variance(nominal: FloatArray) -> float:
     `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
     proportion to their weights.
     """
-    return _unseen(nominal)[1] / math.fsum(nominal) ** 2
+    part, _ = scaled(nominal)
+    return _unseen(part)[1] / math.fsum(part) ** 2
 
 
 def _unseen(terms: FloatArray) -> tuple[float, float]:

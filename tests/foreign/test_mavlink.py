@@ -196,11 +196,11 @@ def test_over_the_loopback_it_is_the_same_flight(monkeypatch):
     autopilot.start()
     try:
         address = f"127.0.0.1:{port}"
-        far = dsa_des.run(scene(address=address, local_port=local, answer_s=20, lost_s=60))
+        far = dsa_des.run(scene(address=address, local_port=local, answer_s=60, lost_s=600))
     finally:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
             end.sendto(b"", ("127.0.0.1", port))
-        autopilot.join(20.0)
+        autopilot.join(300.0)
     assert not autopilot.is_alive() and ("127.0.0.1", local) in senders
     for table in ("truth", "autopilot", "manoeuvres"):
         assert far[table].to_pylist() == near[table].to_pylist()
