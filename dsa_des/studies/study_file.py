@@ -156,7 +156,7 @@ class _StudyReader:
             figures=self.figures(axes, cells),
             compare_weight=weight,
             requirements=self.requirements(axes),
-            runs_per_chunk=keys.runs_per_chunk or max(1, min(512, -(-runs // 32))),
+            runs_per_chunk=keys.runs_per_chunk or max(1, min(1024, -(-runs // 16))),
             base=base,
             tables=resolved(self.data, swaps),
         )
