@@ -23,7 +23,12 @@ from components.surveillance.believed_line import (
     towards,
     variances_in_body,
 )
-from components.surveillance.broadcast import Broadcasts, Sent, Transponders
+from components.surveillance.broadcast import (
+    Broadcasts,
+    Sent,
+    Transponders,
+    turned_by_meridians,
+)
 from components.surveillance.cooperative import (
     STEP_S,
     CooperativeParameters,
@@ -133,6 +138,21 @@ ERRORS = Ladder(
 )  # fmt: skip
 
 
+def _in_axes_at(
+    position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
+) -> FloatArray:
+    """Return velocities in the axes of positions that are later than they are, (3, n).
+
+    North turns with the meridians, within a mile of a pole by degrees from message to message.
+    """
+    turned = north_east_down
+    for _ in range(3):
+        back = np.nan_to_num(turned * -later_s)
+        lat, lon, _ = displaced_position(*position, *back)
+        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+    return turned
+
+
 class AdsB(CooperativeSensor):
     """Reports equipped aircraft by the last position and velocity messages received of each.
 
@@ -203,6 +223,9 @@ class AdsB(CooperativeSensor):
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
+            # An altitude that no code has is not available, and there is no place without one.
+            placed = np.isfinite(extras["reported_alt_m"][reported])
+            detected[reported], reported = placed, reported[placed]
             own_velocity[:, reported] = self._own_velocity(cells, reported)
         moves = {f"own_{axis}": own_velocity[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, own_velocity
@@ -321,6 +344,7 @@ class AdsB(CooperativeSensor):
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
         position = [said[f"reported_{name}"] for name in POSITION_FIELDS]
+        velocity = _in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
         carried = np.nan_to_num(velocity)
         ned = towards(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.
