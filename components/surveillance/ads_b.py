@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -35,7 +36,12 @@ from components.surveillance.cooperative import (
     CooperativeSensor,
     velocity_of,
 )
-from components.surveillance.reception import LAWS
+from components.surveillance.reception import (
+    AIRCRAFT_AROUND,
+    AIRPORTS_AROUND,
+    LAWS,
+    fitted,
+)
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import (
@@ -60,6 +66,20 @@ class AdsBParameters(CooperativeParameters):
         default="fitted",
         description="Probability over range that a squitter is received: 1; the steps of DO-365 to "
         "20 nmi; the law fitted to 23 receivers, to 290 nmi.",
+    )
+    aircraft_around: float = Field(
+        default=AIRCRAFT_AROUND,
+        ge=0,
+        le=300,
+        description="Aircraft that a receiver of the fitted law hears besides, whose messages "
+        "garble each other; the median of the 23 receivers is 95.",
+    )
+    airports_around: float = Field(
+        default=AIRPORTS_AROUND,
+        ge=20,
+        le=100,
+        description="Airports around a receiver of the fitted law, which stand for the aircraft "
+        "that are low.",
     )
     position_errors: Literal["none", "white", "gauss_markov"] = Field(
         default="gauss_markov",
@@ -87,6 +107,14 @@ class AdsBParameters(CooperativeParameters):
                 f"reception '{self.reception}'; it must be at most that"
             )
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a law of reception that is not taken."""
+        said = super().without_effect()
+        if self.reception != "fitted":
+            around = "aircraft_around", "airports_around"
+            said += self.idle(*around, because=f"reception is {self.reception!r}")
+        return said
 
     def reach(self) -> Reach:
         """Return the reach: that of the law of reception, where none is given."""
@@ -175,6 +203,10 @@ class AdsB(CooperativeSensor):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.law = LAWS[parameters.reception][0]
+        if parameters.reception == "fitted":
+            self.law = partial(
+                fitted, aircraft=parameters.aircraft_around, airports=parameters.airports_around
+            )
         #: Scan of each cell of the last look, and the ownship's velocity then.
         self._rows: tuple[IntArray, FloatArray] | None = None
         #: When the scan before each of the last look was, in ns of its run.
