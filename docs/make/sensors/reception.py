@@ -1,4 +1,4 @@
-"""``python -m docs.make.sensors.reception FILE [FIGURE]``: the law of reception beside 23 receivers.
+"""``python -m docs.make.sensors.reception FILE [FIGURE]``: reception, beside 23 receivers.
 
 FILE is regression_models.csv of fazlurnu/adsb_reception_model_opensky, which is not part of the
 project.
