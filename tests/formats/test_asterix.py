@@ -199,11 +199,12 @@ def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
     assert [(t["last"], t["coasted"]) for t in tracks[-2:]] == [(1, 0), (0, 1)]
     assert all(t["simulated"] for t in tracks)
     said = [tracks[0][f"{name}_error_m"] for name in ("north", "east", "alt")]
-    # The track's own vertical leans by 800 m of the Earth's radius: 31.6 km of error up are 4 north.
+    # The track's vertical leans by 800 m of the Earth's radius: 31.6 km of error up are 4 north.
     assert math.hypot(4.5, math.sqrt(1e9) * 800 / 6.37e6) == pytest.approx(6.0, abs=0.05)
     assert said == [6.0, 2500.0, 255 * 6.25 * FOOT_M]  # the largest stands for all that are larger
     moves = [tracks[0][f"velocity_{name}_error_m_s"] for name in ("north", "east", "up")]
-    assert moves == [1.0, 63.75, pytest.approx(0.2, abs=6.25 * FOOT_M / 120)]
+    climb = math.hypot(0.2, 1e3 * 1500 / 6.37e6)  # 1,500 m east of the origin
+    assert moves == [1.0, 63.75, pytest.approx(climb, abs=6.25 * FOOT_M / 120)]
     assert "north_error_m" not in tracks[1]
 
 
