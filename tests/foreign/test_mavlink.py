@@ -219,7 +219,9 @@ def test_tracks_are_carried_on_to_the_instant():
         down_m=zero - 30, north_m_s=zero - 50, east_m_s=zero + 20, down_m_s=zero + 2,
         origin_lat_deg=zero - 33.9, origin_lon_deg=zero - 179.999, origin_alt_m=zero + 100,
     )  # fmt: skip
+    assert mavlink._tracks(message, np.array([0]), 30.5) == []  # of half a minute ago
     (track,) = mavlink._tracks(message, np.array([0]), 9.5)
+    assert track.age_s == 9.5
     where = pymap3d.ned2geodetic(900 - 125, -400 + 50, -30 + 5, -33.9, -179.999, 100)
     assert (track.number, track.name) == (4, "T4")
     assert (track.lat_deg, track.alt_m) == pytest.approx((where[0], where[2]), abs=1e-6)
