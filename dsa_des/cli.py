@@ -181,8 +181,7 @@ _json_option = click.option(
 _measure_option = click.option(
     "--measure",
     is_flag=True,
-    help="Measure how wrong the models of the first run are, for the report; by itself from 100 "
-    "runs on.",
+    help="Measure how wrong the models of the first run are, for the report: a run for each model.",
 )
 
 

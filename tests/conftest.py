@@ -67,20 +67,40 @@ def listed(name: str) -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
+#: The lists of tests that take long, by their marker; what is exhaustive is slow too.
+TIERS = {"exhaustive": "exhaustive.txt", "slow": "slow.txt"}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Leave the exhaustive tests out where neither tests nor a tier are named."""
+    options = config.option
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if whole and not (options.markexpr or options.keyword):
+        options.markexpr = "not exhaustive"
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Do not import files that are slow as a whole where slow tests are left out."""
-    if config.getoption("markexpr") != "not slow" or not collection_path.is_file():
+    """Do not import files of which no test is wanted."""
+    wanted = config.getoption("markexpr")
+    if not collection_path.is_file() or wanted not in ("not slow", "not exhaustive", "exhaustive"):
         return None
-    return collection_path.relative_to(ROOT).as_posix() in listed("slow.txt") or None
+    file = collection_path.relative_to(ROOT).as_posix()
+    if wanted == "exhaustive":
+        named = {line.partition("::")[0] for line in listed("exhaustive.txt")}
+        return (collection_path.name.startswith("test_") and file not in named) or None
+    left_out = listed("exhaustive.txt") + (listed("slow.txt") if wanted == "not slow" else [])
+    return file in left_out or None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what tests/slow.txt lists."""
-    slow = set(listed("slow.txt"))
+    """Mark what tests/slow.txt and tests/exhaustive.txt list."""
+    tiers = {tier: set(listed(name)) for tier, name in TIERS.items()}
     for item in items:
         file, _, rest = item.nodeid.partition("::")
-        if file in slow or f"{file}::{rest.split('[')[0]}" in slow:
-            item.add_marker(pytest.mark.slow)
+        for tier, lines in tiers.items():
+            if file in lines or f"{file}::{rest.split('[')[0]}" in lines:
+                item.add_marker(tier)
+                item.add_marker("slow")
 
 
 def pytest_collection_finish() -> None:

@@ -34,7 +34,12 @@ class BelievedFlights(NamedTuple):
 
 
 class BelievedPositions:
-    """Positions of the last seconds, true or measured, and straight flights fitted to them."""
+    """Positions of the last seconds, true or measured, and straight flights fitted to them.
+
+    Where they are fewer than two instants of a target, its last two count, as long as the later of
+    them is not older than `keep_s` or than the time between them: however slowly a sensor looks,
+    it lets a flight be known.
+    """
 
     def __init__(self, keep_s: float, targets: int) -> None:
         self._keep_s, self._targets = keep_s, targets
@@ -72,8 +77,12 @@ class BelievedPositions:
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what no scan after some asks for."""
-        young = self._seen.time_s >= float(times_s.max()) - self._keep_s  # the next come later
-        self._seen = self._seen.take(young & (self._seen.replica >= wake.first_run))
+        kept = self._seen.time_s >= float(times_s.max()) - self._keep_s  # the next come later
+        ends = self._seen.instants
+        ends = ends.take(ends.last_of_each)
+        for last in self._last_two(ends):
+            kept[last[last >= 0]] = True
+        self._seen = self._seen.take(kept & (self._seen.replica >= wake.first_run))
 
     def flights(
         self,
@@ -90,7 +99,7 @@ class BelievedPositions:
     def _states(self, now: RunTicks, now_s: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Return whose flight is known (n, targets), and its state (6, n, targets), else 0.
 
-        It is known from positions at two instants, not older than `keep_s`.
+        It is known from positions at two instants, not older than `keep_s`, else the last two.
         """
         came, time_s = self._seen.instants, self._seen.time_s
         first = first_of_run(came, now.run)
@@ -114,7 +123,52 @@ class BelievedPositions:
             known[alike], state[:, alike] = _fitted(
                 time_s[lines], np.ascontiguousarray(position), now_s[alike]
             )
+        if not known.all() and len(time_s):
+            self._add_slow(now, now_s, known, state)
         return known, state
+
+    def _add_slow(
+        self, now: RunTicks, now_s: FloatArray, known: BoolArray, state: FloatArray
+    ) -> None:
+        """Fill in flights through the last two positions of those that are not known yet."""
+        scans = np.flatnonzero(~known.all(axis=1))
+        time_s = self._seen.time_s
+        last, before = self._last_two(now.take(scans))
+        apart_s = np.abs(time_s[last] - time_s[before])
+        age_s = now_s[scans, np.newaxis] - np.maximum(time_s[last], time_s[before])
+        slow = ~known[scans] & (before >= 0) & (age_s <= np.maximum(apart_s, self._keep_s))
+        of, target = slow.nonzero()
+        lines = np.array([before[of, target], last[of, target]])
+        position = self._seen.position_m[target, :, lines][:, :, np.newaxis]
+        found = _fitted(time_s[lines], position, now_s[scans[of]])
+        known[scans[of], target] = found[0][:, 0]
+        state[:, scans[of], target] = found[1][:, :, 0]
+
+    def _last_two(self, now: RunTicks) -> tuple[IntArray, IntArray]:
+        """Return the last rows with a position of each target, of two instants, by some instants.
+
+        Both are (n, targets), -1 where there is none.
+        """
+        came, time_s = self._seen.instants, self._seen.time_s
+        seen = np.isfinite(self._seen.position_m[:, 0].T)
+        # The last row up to each that has a position.
+        up_to = np.maximum.accumulate(np.where(seen, np.arange(len(seen))[:, np.newaxis], -1))
+        first = first_of_run(came, now.run)[:, np.newaxis]
+        target = np.arange(self._targets)
+
+        def earlier(row: IntArray) -> IntArray:
+            found = np.where(row >= first, up_to[np.maximum(row, 0), target], -1)
+            return np.where(found >= first, found, -1)
+
+        last = earlier(
+            np.broadcast_to(last_of_run(came, now)[:, np.newaxis], (len(now), len(target)))
+        )
+        before = earlier(last - 1)
+        while True:  # what several sensors see at one instant gives no velocity
+            alike = (before >= 0) & (np.abs(time_s[last] - time_s[before]) <= _SHORTEST_S)
+            if not alike.any():
+                return last, before
+            before = np.where(alike, earlier(before - 1), before)
 
 
 def true_positions_m(states: TrafficStates) -> FloatArray:

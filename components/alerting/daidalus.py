@@ -44,8 +44,9 @@ class DaidalusParameters(ConfParameters, ClockedParameters):
     conf: ScenePath = Field(description="Alerters, times and memory: a .conf file of DAIDALUS.")
     hysteresis: bool = Field(default=True, description="Whether levels are remembered at all.")
     fit_s: float = Field(
-        default=3.0, gt=0, le=60, description="Positions of so long give a target's flight, s."
-    )
+        default=3.0, gt=0, le=60,
+        description="Positions of so long give a target's flight, at least the last two, s.",
+    )  # fmt: skip
 
     @field_validator("conf", mode="after")
     @classmethod
@@ -65,8 +66,8 @@ class DaidalusAlerting(Component):
     It believes tracks if it gets them, else fused lines of sight, else the truth: where the
     aircraft are. Tracks with states (`StateTracks`) are carried on straight from their last
     estimate; their covariances count for levels that heed uncertainty. Otherwise a target's flight
-    is a straight line through its positions of the last seconds, in the ownship's east, north and
-    up; positions at two instants are needed. What has no range is left out.
+    is a straight line through its positions of the last seconds (at least the last two, however
+    slowly they come), in the ownship's east, north and up. What has no range is left out.
     """
 
     inputs = {

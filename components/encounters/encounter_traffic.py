@@ -4,7 +4,6 @@ Which one it is is a parameter, so that a study has one encounter per replica. A
 function of its number: the same in every scene and condition.
 """
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -38,26 +37,36 @@ _Craft = tuple[EncounterSet, int, str]
 
 
 class MadeTogether:
-    """What is made of many keys at once and then asked for one by one; the last `most` are kept.
+    """What is made of many keys at once and then asked for one by one, several times each.
 
-    A study asks for each encounter of a chunk several times.
+    The last batch is kept whole, however many it holds, until the next one takes its place: what a
+    batch needs is never made twice. Of keys that no batch named the last few are kept.
     """
 
-    def __init__(self, make: Callable[[list[Any]], Iterable[Any]], most: int) -> None:
-        self._make, self.most = make, most
-        self._kept: OrderedDict[Any, Any] = OrderedDict()
+    def __init__(self, make: Callable[[list[Any]], Iterable[Any]]) -> None:
+        self._make = make
+        self._batch: dict[Any, Any] = {}
+        self._single: dict[Any, Any] = {}
 
     def prepare(self, keys: Iterable[Any]) -> None:
-        """Make what is not known of some keys, as many as are kept."""
-        new = [key for key in dict.fromkeys(keys) if key not in self._kept][: self.most]
-        self._kept.update(zip(new, self._make(new), strict=True))
-        while len(self._kept) > self.most:
-            self._kept.popitem(last=False)
+        """Begin a batch: make what is not known of its keys, and forget what it does not name."""
+        wanted = dict.fromkeys(keys)
+        known = self._single | self._batch
+        self._batch = {key: known[key] for key in wanted if key in known}
+        new = [key for key in wanted if key not in self._batch]
+        self._batch.update(zip(new, self._make(new), strict=True))
 
     def __getitem__(self, key: Any) -> Any:
-        if key not in self._kept:
-            self.prepare([key])
-        return self._kept[key]
+        if key in self._batch:
+            return self._batch[key]
+        if key not in self._single:
+            if len(self._single) >= _SINGLE:
+                del self._single[next(iter(self._single))]
+            (self._single[key],) = self._make([key])
+        return self._single[key]
+
+
+_SINGLE = 16
 
 
 def encounter_flights(
@@ -89,7 +98,7 @@ def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[Samp
     return [[made[next(each)] for _ in mine] for mine in rows]
 
 
-_FLIGHTS = MadeTogether(_flights_of, 600)
+_FLIGHTS = MadeTogether(_flights_of)
 
 
 def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
@@ -228,8 +237,7 @@ class _EncounterTraffic(RecordedTraffic):
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Make the flights that many blocks will ask for, all at once."""
         with suppress(ValueError):  # what is wrong is said by the block that asks for it
-            _FLIGHTS.prepare([(*_encounter_of(cls, p), p.dynamics)
-                              for p in parameters[: _FLIGHTS.most]])  # fmt: skip
+            _FLIGHTS.prepare([(*_encounter_of(cls, p), p.dynamics) for p in parameters])
 
     def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
         at = self.encounter_set.reference_deg
@@ -291,22 +299,27 @@ def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter where the scene puts it, and its index there."""
     encounter_set, index = chosen_encounter(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
-    return (encounter_set if None in at else _moved(encounter_set, at)), index
+    made_there = None in at or at == encounter_set.reference_deg
+    return (encounter_set if made_there else _moved(encounter_set, at)), index
 
 
-@lru_cache(maxsize=1200)
+@lru_cache(maxsize=16)
 def _moved(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
     """Return a set elsewhere, the same object each time: flights are kept by it."""
     return replace(encounter_set, reference_deg=reference_deg)
 
 
-#: What makes encounters of a model: both files, the seed, and how miss distances are drawn.
-_ModelKey = tuple[Path, Path, int, MissDistances | None, MissDistances | None]
+#: What makes encounters of a model: both files, the seed, and how miss distances are drawn; and
+#: where their origin is put.
+_ModelKey = tuple[
+    Path, Path, int, MissDistances | None, MissDistances | None, float | None, float | None
+]
 
 
 def _model_key(parameters: Any) -> _ModelKey:
     p = parameters
-    return p.file, p.intruder_file or p.file, p.model_seed, p.horizontal, p.vertical
+    made_by = p.file, p.intruder_file or p.file, p.model_seed, p.horizontal, p.vertical
+    return *made_by, p.lat_deg, p.lon_deg
 
 
 def _pairs_of(keys: Sequence[tuple[_ModelKey, int]]) -> list[EncounterSet]:
@@ -314,21 +327,28 @@ def _pairs_of(keys: Sequence[tuple[_ModelKey, int]]) -> list[EncounterSet]:
     made: dict[Any, EncounterSet] = {}
     for model in dict.fromkeys(model for model, _ in keys):
         numbers = np.array(sorted(n for of, n in keys if of == model), dtype=np.int64)
-        sampler = _sampler(model)
+        *made_by, lat_deg, lon_deg = model
+        sampler = _sampler(*made_by)
+        at = (0.0, 0.0) if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)
         for some in np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1):
             pairs = sampler.pairs(range(int(some[0]), int(some[-1]) + 1), paths=False)
             for index, number in enumerate(some.tolist()):
                 one = pairs if len(some) == 1 else pairs.take(np.array([index]))
                 source = str(model[0])
-                made[model, number] = set_of_pairs(one, sampler.rules.closest_s, (0.0, 0.0), source)
+                made[model, number] = set_of_pairs(one, sampler.rules.closest_s, at, source)
     return [made[key] for key in keys]
 
 
-_PAIRS = MadeTogether(_pairs_of, 1200)
+_PAIRS = MadeTogether(_pairs_of)
 
 
 @lru_cache(maxsize=4)
-def _sampler(key: _ModelKey) -> PairSampler:
-    file, intruder, seed, horizontal, vertical = key
+def _sampler(
+    file: Path,
+    intruder: Path,
+    seed: int,
+    horizontal: MissDistances | None,
+    vertical: MissDistances | None,
+) -> PairSampler:
     drawn = ModelParameters(file=file, horizontal=horizontal, vertical=vertical)
     return PairSampler(read_model(file), read_model(intruder), seed, drawn.pairing_rules())

@@ -16,7 +16,7 @@ from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
 from components.metrics.losses import nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight, traffic_block
+from components.metrics.separation import RelativeFlight, prepare_traffic, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import CLASS, EVENT, KEY, NUMBER, RATIO, Group, Metric, RatioOf, Result
@@ -50,6 +50,7 @@ class EncounterWeight(Metric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all three for every replica."""
         numbers, weights, families = np.empty((3, len(group)))
+        prepare_traffic(group.scenes)
         for row, scene in enumerate(group.scenes):
             block = traffic_block(scene)
             encounter_set, index = chosen_encounter(block.cls, block.parameters)

@@ -48,6 +48,11 @@ class MotionWithErrors:
         """Components of the state."""
         return self.model.size + len(self.lasts_s)
 
+    @property
+    def errors(self) -> slice:
+        """Where they are in the state."""
+        return slice(_MOVING, _MOVING + len(self.lasts_s))
+
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
         """Return states (d, n) after the time (n,)."""
         errors, end = self._kept(dt_s), _MOVING + len(self.lasts_s)

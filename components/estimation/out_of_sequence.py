@@ -23,6 +23,7 @@ from components.estimation.batched import (
     symmetric,
     times,
 )
+from components.estimation.carried_errors import MotionWithErrors
 from components.estimation.motion import Motion, predict
 from dsa_des.arrays.types import FloatArray
 
@@ -78,10 +79,17 @@ def retrodiction(
 def retrodiction_by_motion(
     model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray
 ) -> Retrodiction:
-    """Return the state at an instant before anything was known of it, by what it is now."""
+    """Return the state at an instant before anything was known of it, by what it is now.
+
+    Errors that are forgotten were as large then as they are now: backwards they are forgotten as
+    they are forwards, and of one that is new at every instant nothing is known.
+    """
     state, spread = now
-    step = model.jacobian(state, -since_s)
-    covariance = symmetric(product_transposed(product(step, spread + model.noise(since_s)), step))
+    step, noise = model.jacobian(state, -since_s), model.noise(since_s)
+    since = product_transposed(product(step, noise), step)
+    if isinstance(model, MotionWithErrors):
+        since[model.errors, model.errors] = noise[model.errors, model.errors]
+    covariance = symmetric(product_transposed(product(step, spread), step) + since)
     return Retrodiction(
         model.move(state, -since_s), covariance, _divided(product(step, spread), covariance)
     )

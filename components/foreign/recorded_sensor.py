@@ -6,10 +6,10 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
@@ -27,7 +27,7 @@ from dsa_des.block.component import (
     PositiveRational,
     ScenePath,
 )
-from dsa_des.errors import did_you_mean
+from dsa_des.errors import Disagreements, did_you_mean
 from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import ClockSpec
 
@@ -62,11 +62,38 @@ class RecordedSensorParameters(Parameters):
     )
     elevation_error_deg: float | None = Field(None, gt=0, description="The same of elevations.")
     range_error_m: float | None = Field(None, gt=0, description="The same of ranges.")
+    radar_lat_deg: float | None = Field(
+        None, ge=-90, le=90,
+        description="Where a radar of ASTERIX is that does not say it: latitude, WGS-84.",
+    )  # fmt: skip
+    radar_lon_deg: float | None = Field(None, ge=-180, le=360, description="Its longitude.")
+    radar_alt_m: float | None = Field(None, description="Its altitude above the ellipsoid.")
     scan_rate_hz: PositiveRational | None = Field(
         None,
         description="Nominal rate at which blocks upstream are asked for rows, where the traffic "
         "is to fly beside the recording. Looks are at their own instants in any case.",
     )
+
+    @property
+    def place(self) -> tuple[float, float, float] | None:
+        """Where the radar is, as the scene says it: latitude, longitude (deg), altitude (m)."""
+        lat, lon, alt = self.radar_lat_deg, self.radar_lon_deg, self.radar_alt_m
+        return None if lat is None or lon is None or alt is None else (lat, lon, alt)
+
+    @model_validator(mode="after")
+    def _whole_place(self) -> Self:
+        keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
+        missing = [key for key in keys if getattr(self, key) is None]
+        if 0 < len(missing) < len(keys):
+            raise Disagreements([f"{missing[0]}: needed with the other two of {', '.join(keys)}"])
+        return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys change nothing."""
+        if self.place is None or self.file.suffix == ".ast":
+            return []
+        keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
+        return self.idle(*keys, because="the file is no ASTERIX")
 
 
 class RecordedSensor(Component):
@@ -91,7 +118,7 @@ class RecordedSensor(Component):
 
     @cached_property
     def _measured(self) -> Measurements:
-        measured = read_measurements(self.p.file, self.p.block)
+        measured = read_measurements(self.p.file, self.p.block, self.p.place)
         p, entries = self.p, measured.entries
         stated = (p.azimuth_error_deg, p.elevation_error_deg, p.range_error_m)
         for name, error, unit in zip(_VARIANCES[:3], stated, (_DEG, _DEG, 1.0), strict=True):
@@ -224,7 +251,8 @@ class RecordedSensor(Component):
         )  # fmt: skip
 
     def warnings(self) -> list[str]:
-        """Say how many looks come after the end."""
+        """Say what was left out, and how many looks come after the end."""
         late = int(np.count_nonzero(self._measured.arrival_s >= float(self.context.duration_s)))
         total = len(self._tick)
-        return [f"file: {late} of {total} looks come after the end"] if late else []
+        lines = [f"file: {note}" for note in self._measured.notes]
+        return lines + ([f"file: {late} of {total} looks come after the end"] if late else [])

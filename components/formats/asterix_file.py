@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -16,15 +17,18 @@ from components.formats.asterix_records import (
     AsterixRecord,
     read_records,
 )
-from components.formats.sample_table import SampleColumn, SampleTable, enu_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
+from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
 from components.geometry import radii_of_curvature, wrap_pi
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.files.input_files import InputFileError, read_input_bytes
 
-_PLACE = ("lat", "lon", "alt")
 _MOVES = ("vx", "vy", "vz")
-_NUMBERS = ("time", *_PLACE, *_MOVES)
+#: Where a record's altitude stands: the measured flight level before the calculated one.
+_HEIGHTS: Mapping[Altitude, tuple[str, ...]] = {
+    "barometric": ("flight_level_m", "barometric_m"), "geometric": ("alt_m",),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -66,39 +70,49 @@ class RadarPlots:
     notes: list[str]
 
 
-def read_asterix(path: str | PathLike[str], ownship: str | None = None) -> TrafficFile:
+def read_asterix(
+    path: str | PathLike[str], ownship: str | None = None, altitude: Altitude | None = None
+) -> TrafficFile:
     """Read the aircraft of an ASTERIX file: system tracks (062) and ADS-B reports (021).
 
     The ownship is said by its identification, or as ``"SAC/SIC/number"`` where it has none; left
     out, it is the aircraft called ``OWNSHIP``, or else the first one. Times count from the earliest
-    record and go on over midnight. Heights are geometric ones where a record has one, else flight
-    levels. All that is wrong is one `TrafficFileError`, by records.
+    record and go on over midnight. Heights are flight levels, of an aircraft that reports none its
+    geometric height; with `altitude`, those of that kind alone. All that is wrong is one
+    `TrafficFileError`, by records.
     """
-    records, notes = _records(path)
+    records, warnings = _records(path)
     problems = Problems(str(path), of="record")
     names = _names(records)
-    cells = {name: SampleColumn(k + 1, name, 1.0) for k, name in enumerate(_NUMBERS)}
-    table = SampleTable(problems, ("name", *_NUMBERS), 0, cells, optional=_MOVES)
-    table.notes = notes
+    kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
+    heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
+    headers = ("time", "lat", "lon", *(f"{kind} altitude" for kind in kinds), *_MOVES)
+    keys = ("time", "lat", "lon", *heights, *_MOVES)
+    cells = {
+        key: SampleColumn(k + 1, header, 1.0)
+        for k, (key, header) in enumerate(zip(keys, headers, strict=True))
+    }
+    table = SampleTable(
+        problems, ("name", *headers), 0, cells, optional=_MOVES, gaps=True,
+        instead={} if altitude else {"alt": "alt instead"}, rows="records",
+    )  # fmt: skip
+    table.warnings += warnings
     rows: dict[tuple[object, ...], dict[float, int]] = {}
     samples: dict[int, list[str]] = {}
-    left_out = 0
     for k, record in enumerate(records):
         if record.category not in _AIRCRAFT:
             continue
-        sample = _sample(record)
-        if sample is None:
-            left_out += 1
-            continue
         mine = rows.setdefault(_key(record), {})
+        sample = _sample(record, kinds)
+        before = mine.get(record.time_s)
+        if before is not None and np.isnan(sample[1:4]).any():
+            continue
         # Two records of one quantum of time are one instant: the later one counts.
-        samples.pop(mine.get(record.time_s, -1), None)
+        samples.pop(-1 if before is None else before, None)
         mine[record.time_s] = k
         samples[k] = [names[_key(record)], *(repr(float(value)) for value in sample)]
     for k, row in samples.items():
         table.add_row(k + 1, row)
-    if left_out:
-        notes.append(f"{left_out} records without a position or a height were left out")
     if not names:
         problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
     if ownship is None and _OWNSHIP in names.values():
@@ -110,15 +124,21 @@ _AIRCRAFT = (SYSTEM_TRACKS, ADS_B)
 _OWNSHIP = "OWNSHIP"
 
 
-def read_asterix_plots(path: str | PathLike[str]) -> RadarPlots:
+def read_asterix_plots(
+    path: str | PathLike[str], place: tuple[float, float, float] | None = None
+) -> RadarPlots:
     """Read the plots of radars (048) in an ASTERIX file, with their north markers (034).
 
     A plot belongs to its radar's last north marker; where a radar has none, plots of one time are
-    a scan. The elevation is that at which a height is met at the slant range, on the ellipsoid.
+    a scan. Where a marker says no place, and before the first one, the radar is where its marker
+    before, or its first, says. The elevation is that at which a height is met at the slant range,
+    on the ellipsoid.
 
     Parameters
     ----------
     path : path-like
+    place : (latitude, longitude, altitude), optional
+        Where radars are of which the file does not say it: degrees, m above the ellipsoid.
 
     Returns
     -------
@@ -141,7 +161,8 @@ def read_asterix_plots(path: str | PathLike[str]) -> RadarPlots:
     scans: list[tuple[int, float, float, float, float]] = []
     current: dict[str, int] = {}
     plots: list[tuple[float, ...]] = []
-    for record in records:
+    # Out of order within a turn, as they are sent sector by sector.
+    for record in sorted(records, key=lambda one: one.time_s):
         radar = _source(record)
         if radar not in code or record.category not in (SERVICE, PLOTS):
             continue
@@ -160,12 +181,29 @@ def read_asterix_plots(path: str | PathLike[str]) -> RadarPlots:
             rate_m_s = values.get("range_rate_m_s", np.nan)
             plots.append((current[radar], now_s, turned, alt_m, values["range_m"], rate_m_s))
     scan, time_s, azimuth, height, far_m, rate = np.array(plots).reshape(-1, 6).T
-    radar_of, scan_s, lat, lon, alt = np.array(scans).T
+    radar_of, scan_s, *here = np.array(scans).T
+    lat, lon, alt = _places(radar_of, np.array(here), place)
     of = scan.astype(np.int64)
     return RadarPlots(
         radars, start_s, radar_of.astype(np.int64), scan_s, lat, lon, alt, of, time_s,
         wrap_pi(azimuth), _elevations(azimuth, far_m, height, lat[of], alt[of]), far_m, rate, notes,
     )  # fmt: skip
+
+
+def _places(
+    radar_of: FloatArray, said: FloatArray, place: tuple[float, float, float] | None
+) -> FloatArray:
+    """Return where each scan's radar is, (3, scans), from what its markers say of it."""
+    filled = said.copy()
+    for radar in np.unique(radar_of):
+        mine = np.flatnonzero(radar_of == radar)
+        known = mine[~np.isnan(said[:, mine]).any(axis=0)]
+        if len(known):
+            last = np.maximum(np.searchsorted(known, mine, side="right") - 1, 0)
+            filled[:, mine] = said[:, known[last]]
+        elif place is not None:
+            filled[:, mine] = np.array(place)[:, np.newaxis]
+    return filled
 
 
 def _elevations(
@@ -186,11 +224,17 @@ def _elevations(
 
 
 def _records(path: str | PathLike[str]) -> tuple[list[AsterixRecord], list[str]]:
+    """Return the records, each once, and what was left out."""
     try:
         data = read_input_bytes(Path(path))
     except InputFileError as error:
         raise TrafficFileError(str(path), [str(error)]) from None
-    return read_records(Path(path), data)
+    records, notes = read_records(Path(path), data)
+    # What is sent on two addresses is recorded twice.
+    once = {(r.category, r.time_s, tuple(r.values.items())): r for r in records}
+    if again := len(records) - len(once):
+        notes.append(f"{again} records stand there again and count once")
+    return list(once.values()), notes
 
 
 def _source(record: AsterixRecord) -> str:
@@ -223,18 +267,14 @@ def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
     return result
 
 
-def _sample(record: AsterixRecord) -> tuple[float, ...] | None:
-    """Return time, position and velocity of a record, NaN for no velocity."""
+def _sample(record: AsterixRecord, kinds: Sequence[Altitude]) -> tuple[float, ...]:
+    """Return time, position and velocity of a record, NaN for what it does not say."""
     values = record.values
+    items = [("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg")]
     position = [
-        next((values[name] for name in names if name in values), None)
-        for names in (
-            ("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg"),
-            ("alt_m", "barometric_m", "flight_level_m"),
-        )
-    ]  # fmt: skip
-    if None in position:
-        return None
+        next((values[name] for name in names if name in values), np.nan)
+        for names in (*items, *(_HEIGHTS[kind] for kind in kinds))
+    ]
     east, north = values.get("velocity_east_m_s"), values.get("velocity_north_m_s")
     if "speed_m_s" in values and "track_deg" in values:
         track = np.radians(values["track_deg"])

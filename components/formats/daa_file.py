@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from components.formats.sample_table import (
+from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
-    SampleTable,
     complete_velocity,
     enu_velocity,
     indices_of,
     unit_factor,
 )
+from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
     ALL_TOKENS,
     Problems,

@@ -49,7 +49,8 @@ class Measurements:
 
     Entries ``offsets[i]:offsets[i + 1]`` belong to look i, NaN where a cell is empty; ``declared``
     and ``cued`` are 0 or 1. `looks` holds the ownship's pose and velocity, as far as the file says
-    them, `target` the names of targets, and `where` the line or row of each entry, for messages.
+    them, `target` the names of targets, and `where` the line or row of each entry, for messages;
+    `notes` say what was left out.
     """
 
     time_s: FloatArray
@@ -60,6 +61,7 @@ class Measurements:
     looks: dict[str, FloatArray]
     target: tuple[str | None, ...]
     where: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)
@@ -85,15 +87,18 @@ class _Table:
         self.line = self.line[rows]
 
 
-def read_measurements(path: Path, block: str | None = None) -> Measurements:
+def read_measurements(
+    path: Path, block: str | None = None, place: tuple[float, float, float] | None = None
+) -> Measurements:
     """Return the looks of a sensor; ValueError says all that is wrong, with its line or row.
 
     The file is ``.parquet`` or CSV; the folder of a run, whose ``scans.parquet`` then says empty
     looks and the ownship's pose; or ASTERIX (``.ast``), whose angles are from north and level.
-    `block` says whose rows are read, where there are several.
+    `block` says whose rows are read, where there are several, and `place` where a radar of ASTERIX
+    is (degrees, m) that does not say it.
     """
     if path.suffix == ".ast":
-        return _of_asterix(path, block)
+        return _of_asterix(path, block, place)
     if not is_folder(path):
         table = _read(path, _NEEDED, block)
         _check(table)
@@ -105,11 +110,13 @@ def read_measurements(path: Path, block: str | None = None) -> Measurements:
     return _looks(table, scans)
 
 
-def _of_asterix(path: Path, radar: str | None) -> Measurements:
+def _of_asterix(
+    path: Path, radar: str | None, place: tuple[float, float, float] | None
+) -> Measurements:
     """Return the plots of one radar, which stands level and looks north."""
     from components.formats.asterix_file import read_asterix_plots
 
-    problems, plots = Problems(str(path)), read_asterix_plots(path)
+    problems, plots = Problems(str(path)), read_asterix_plots(path, place)
     if radar is None and len(plots.radars) > 1:
         problems.fail(f"holds plots of {', '.join(plots.radars)}: the key block must name one")
     if radar is not None and radar not in plots.radars:
@@ -118,10 +125,20 @@ def _of_asterix(path: Path, radar: str | None) -> Measurements:
     number = np.cumsum(mine) - 1
     of = np.flatnonzero(mine[plots.scan])
     of = of[np.argsort(plots.scan[of], kind="stable")]
+    notes = list(plots.notes)
+    if np.isnan(plots.own_lat_deg[mine]).any():
+        name = plots.radars[0] if radar is None else radar
+        problems.fail(
+            f"radar {name} does not say where it is (034, item 120): the keys radar_lat_deg, "
+            "radar_lon_deg and radar_alt_m must"
+        )
+    flat = np.isnan(plots.elevation_rad[of])
+    if flat.all():
+        problems.fail(f"none of {len(of)} plots has a height: their elevations are not known")
+    if flat.any():
+        notes.append(f"{np.count_nonzero(flat)} of {len(of)} plots have no height and are left out")
+        of = of[~flat]
     scan = number[plots.scan[of]]
-    without = int(np.isnan(plots.elevation_rad[of]).sum())
-    if without:
-        problems.fail(f"{without} of {len(of)} plots have no height, or the radar has no place")
     entries = {
         "azimuth_rad": plots.azimuth_rad[of], "elevation_rad": plots.elevation_rad[of],
         "range_m": plots.range_m[of], "range_rate_m_s": plots.range_rate_m_s[of],
@@ -138,7 +155,7 @@ def _of_asterix(path: Path, radar: str | None) -> Measurements:
         time_s, arrival_s, np.arange(len(time_s)),
         np.searchsorted(scan, np.arange(len(time_s) + 1)).astype(np.int64), entries,
         dict(zip(_OWN, pose, strict=True)), (None,) * len(of),
-        tuple(f"plot {k + 1}" for k in of.tolist()),
+        tuple(f"plot {k + 1}" for k in of.tolist()), tuple(notes),
     )  # fmt: skip
 
 

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.flights.sampled_flight import SampledTrajectory
-from components.formats.text_rows import (
-    MOST_OF_A_CELL,
-    MOST_PROBLEMS,
-    NO_UNIT,
-    UNIT_KINDS,
-    Problems,
-    TrafficFile,
-    clean_token,
-)
-from dsa_des.arrays.types import FloatArray
+from components.formats.sample_columns import SampleColumn, is_missing
+from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.text.safe_text import shortened
 
 _LIMITS = {
@@ -35,6 +29,8 @@ _LIMITS = {
 # simulate the years in between.
 _LONGEST_SILENCE_S = 86400.0
 
+#: A pressure altitude differs by less from a height in the weather of most days.
+_FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
 # No aircraft, and no spacecraft, flies so far from one sample to the next, m/s.
@@ -43,73 +39,22 @@ _FASTEST_MPS = 1e6
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
 
-VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
-
-
-@dataclass(frozen=True)
-class ColumnSpec:
-    """A quantity: the names its column may have, earlier ones first, and its unit by default."""
-
-    names: tuple[str, ...]
-    unit: str = ""
-    required: bool = False
-
-    @property
-    def units(self) -> Mapping[str, float]:
-        """What the units are worth that its column may have: those of the kind of its own."""
-        return next(kind for kind in UNIT_KINDS if self.unit in kind)
-
-
-def indices_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
-    """Return in which column of a file each quantity stands that is there."""
-    name_of = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
-    return {quantity: names.index(name) for quantity, name in name_of.items() if name is not None}
-
-
-def complete_velocity(there: Collection[str]) -> tuple[str, ...]:
-    """Return the quantities of the first velocity that is complete: half of one is no use."""
-    return next((parts for parts in VELOCITIES if all(q in there for q in parts)), ())
-
-
-@dataclass(frozen=True)
-class SampleColumn:
-    """A column that is read: its index in the row, its header and its factor to s, m, m/s, deg."""
-
-    index: int
-    header: str
-    factor: float
-
-
-@dataclass
 class _Rows:
     """The samples of one aircraft as they come."""
 
-    lines: list[int] = field(default_factory=list)
-    values: dict[str, list[float]] = field(default_factory=dict)
-
-
-def unit_factor(
-    problems: Problems, spec: ColumnSpec, token: str, *, line: int | None, header: str
-) -> float:
-    """Look up what a unit token is worth; an unknown one is noted and taken as 1."""
-    known = spec.units
-    plain = clean_token(token)
-    if plain in known:
-        return known[plain]
-    what = (
-        "has no unit"
-        if plain in NO_UNIT
-        else f"unit {shortened(token, MOST_OF_A_CELL)!r} is unknown here"
-    )
-    problems.add(f"{what}: it must be one of {', '.join(known)}", line=line, column=header)
-    return 1.0
+    def __init__(self, quantities: Collection[str]) -> None:
+        self.lines = array("q")
+        self.values = {quantity: array("d") for quantity in quantities}
 
 
 class SampleTable:
     """Collects samples row by row and turns them into trajectories.
 
     A bad cell of an `optional` quantity is no error: the aircraft goes without the whole column,
-    and a note says so. `parse_time` reads a time cell where a plain number will not do.
+    and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
+    and counted; an aircraft that has no number at all in one column takes those of the column that
+    `instead` names for it. Rows of one aircraft that say the same of one instant are one sample.
+    `parse_time` reads a time cell where a plain number will not do.
     """
 
     def __init__(
@@ -120,13 +65,28 @@ class SampleTable:
         columns: dict[str, SampleColumn],
         parse_time: Callable[[str], float] | None = None,
         optional: Collection[str] = (),
+        *,
+        gaps: bool = False,
+        instead: Mapping[str, str] | None = None,
+        rows: str = "rows",
     ) -> None:
-        self._optional = frozenset(optional)
+        self._kind_of_rows = rows
+        self._instead = dict(instead or {})
+        self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
-        self._parse_time = parse_time
+        self._parse_time, self._gaps = parse_time, gaps
         self._aircraft: dict[str, _Rows] = {}
+        #: Harmless ones; what was left out or taken for something else is in `warnings`.
         self.notes: list[str] = []
+        self.warnings: list[str] = []
+        self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
+        self._apart: dict[str, list[tuple[float, str]]] = {}
+        self._second: dict[str, list[str]] = {}
         self._width = len(headers)
+        self._plan = [
+            (quantity, column.index, column.factor, *_limits(quantity)[:2])
+            for quantity, column in columns.items()
+        ]
         used = {name_column, *(column.index for column in columns.values())}
         if ignored := [header for i, header in enumerate(headers) if i not in used]:
             self.notes.append(f"columns ignored: {', '.join(ignored)}")
@@ -143,19 +103,38 @@ class SampleTable:
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
-        numbers = {
-            quantity: _number_or_nan(column, row[column.index])
-            if quantity in self._optional
-            else self._number(line, quantity, column, row[column.index])
-            for quantity, column in self._columns.items()
-        }
         # An aircraft counts as named even if its row is bad: it is there, only not usable.
-        rows = self._aircraft.setdefault(name, _Rows())
-        if any(value is None for value in numbers.values()):
-            return
-        rows.lines.append(line)
-        for quantity, value in numbers.items():
-            rows.values.setdefault(quantity, []).append(value or 0.0)
+        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+        numbers: list[float] = []
+        whole = True
+        for quantity, index, factor, low, high in self._plan:
+            cell = row[index]
+            try:
+                value = float(cell) * factor
+            except ValueError:
+                value = math.nan
+            if not low <= value <= high or "_" in cell:
+                found = self._unusual(line, quantity, cell)
+                whole, value = whole and found is not None, found or 0.0
+            numbers.append(value)
+        if whole:
+            rows.lines.append(line)
+            for column, value in zip(rows.values.values(), numbers, strict=True):
+                column.append(value)
+
+    def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
+        """Return what a cell means that is no plain number: NaN for none, None for a problem."""
+        if quantity in self._optional:
+            return math.nan
+        if self._gaps and is_missing(cell):
+            return math.nan
+        return self._number(line, quantity, self._columns[quantity], cell)
+
+    def note_of(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
+        """Note what holds of one aircraft; of those of a kind the first is told, and how many."""
+        cases = self._of_aircraft.setdefault((kind, harmless), [])
+        if f"{name}: {text}" not in cases[-1:]:
+            cases.append(f"{name}: {text}")
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
         """Check each aircraft's samples and make the trajectories."""
@@ -174,11 +153,16 @@ class SampleTable:
                 )
         self._problems.raise_if_any()
         intruders = [trajectory for name, trajectory in made.items() if name != own]
-        return TrafficFile(made[own], intruders, start, self.notes)
+        for (_, harmless), cases in self._of_aircraft.items():
+            more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
+            (self.notes if harmless else self.warnings).append(cases[0] + more)
+        notes = [*self.notes, *self.warnings]
+        return TrafficFile(made[own], intruders, start, notes, self.warnings)
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
         """Check each aircraft's samples and return them as columns, in the order of time."""
-        names = list(self._aircraft)
+        kept = self._without_gaps()
+        names = list(kept)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
         if len(names) == 1:
@@ -187,16 +171,81 @@ class SampleTable:
                 "one intruder are needed"
             )
         own = names[0] if ownship is None else ownship
-        if own not in self._aircraft:
+        if own not in kept:
             self._problems.add(
                 f"there is no aircraft {own!r}: it must be one of "
                 f"{', '.join(shortened(name) for name in names[:MOST_PROBLEMS])}"
                 f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
-        samples = {name: self._sorted(name, rows) for name, rows in self._aircraft.items()}
-        self._refuse_long_silence()
+        samples = {name: self._sorted(name, *rows) for name, rows in kept.items()}
+        self._refuse_long_silence(kept)
         self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
+
+    def _without_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
+        """Return the lines and columns of each aircraft; rows and columns with gaps are gone."""
+        kept = {}
+        left_out, absent = 0, 0
+        for name, rows in self._aircraft.items():
+            lines = np.array(rows.lines)
+            columns = {key: np.array(values) for key, values in rows.values.items()}
+            for key, other in self._instead.items():
+                columns[key] = self._one_of_two(name, key, columns[key], columns.pop(other))
+            there = np.ones(len(lines), dtype=bool)
+            for key in columns.keys() - self._optional:
+                there &= ~np.isnan(columns[key])
+            left_out += int(np.count_nonzero(~there))
+            lines = lines[there]
+            columns = {key: values[there] for key, values in columns.items()}
+            if len(lines) == 0 and not there.all():
+                absent += 1
+                continue
+            for key in sorted(self._optional & columns.keys()):
+                if missing := int(np.count_nonzero(np.isnan(columns[key]))):
+                    self.note_of(
+                        name, f"gaps in {self._columns[key].header}",
+                        f"column {self._columns[key].header} has no number in {missing} of its "
+                        f"{len(columns[key])} samples and is ignored",
+                        harmless=missing == len(columns[key]),
+                    )  # fmt: skip
+                    del columns[key]
+            kept[name] = lines, columns
+        self._note_second_columns()
+        if left_out:
+            of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
+            what = f"{left_out} {of} left out that had no time or no position"
+            self.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
+        return kept
+
+    def _one_of_two(self, name: str, key: str, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Return an aircraft's first column, or its second where it has nothing in the first."""
+        both = ~np.isnan(first) & ~np.isnan(second)
+        if both.any():
+            apart = float(np.abs(first - second)[both].max())
+            self._apart.setdefault(key, []).append((apart, name))
+        if np.isnan(first).all() and not np.isnan(second).all():
+            self._second.setdefault(key, []).append(name)
+            return second
+        return first
+
+    def _note_second_columns(self) -> None:
+        """Say which of two columns is read, for whom the other, and how far they are apart."""
+        for key, other in self._instead.items():
+            first, second = self._columns[key].header, self._columns[other].header
+            if whom := self._second.get(key, []):
+                if len(whom) == len(self._aircraft):
+                    self.notes.append(f"{second} is read: there is no {first}")
+                else:
+                    more = f" (and {len(whom) - 1} more aircraft)" if len(whom) > 1 else ""
+                    said = f"{second} is read beside {first} of others: it has no {first}"
+                    self.warnings.append(f"{whom[0]}{more}: {said}")
+            if apart := self._apart.get(key):
+                most, name = max(apart)
+                said = (
+                    f"{first} is read, {second} differs by up to {most:,.0f} m "
+                    f"({most / FOOT_M:,.0f} ft, {name})"
+                )
+                (self.warnings if most > _FAR_APART_M else self.notes).append(said)
 
     def _number(self, line: int, quantity: str, column: SampleColumn, cell: str) -> float | None:
         try:
@@ -222,7 +271,7 @@ class SampleTable:
                 column=column.header,
             )
             return None
-        low, high, allowed = _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
+        low, high, allowed = _limits(quantity)
         if not low <= value <= high:
             self._problems.add(
                 f"{shortened(cell, MOST_OF_A_CELL)} is out of range: it must {allowed}",
@@ -232,54 +281,56 @@ class SampleTable:
             return None
         return value
 
-    def _sorted(self, name: str, rows: _Rows) -> dict[str, FloatArray]:
-        """Put an aircraft's samples in the order of time; two at one time are a problem."""
-        columns = {key: np.array(values) for key, values in rows.values.items()}
-        for key in sorted(self._optional & columns.keys()):
-            if missing := int(np.count_nonzero(np.isnan(columns[key]))):
-                header = self._columns[key].header
-                self.notes.append(
-                    f"{name}: column {header} has no number in {missing} of its "
-                    f"{len(columns[key])} samples and is ignored"
-                )
-                del columns[key]
-        if not columns:
+    def _sorted(
+        self, name: str, lines: IntArray, columns: dict[str, FloatArray]
+    ) -> dict[str, FloatArray]:
+        """Put an aircraft's samples in the order of time; two places at one time are a problem."""
+        if not len(lines):
             # All its rows were bad, which has been noted row by row.
-            return columns
-        times = columns["time"]
-        order = np.argsort(times, kind="stable")
+            return {}
+        order = np.argsort(columns["time"], kind="stable")
         if np.any(order[1:] < order[:-1]):
-            self.notes.append(f"{name}: rows were not in the order of time and have been sorted")
-        header = self._columns["time"].header
-        gaps = np.diff(times[order])
-        for i in np.flatnonzero(gaps < _SHORTEST_STEP_S):
-            first, second = rows.lines[order[i]], rows.lines[order[i + 1]]
-            what = f"{name} already has a sample at {times[order[i]]:.15g} s, in line {first}: "
-            if gaps[i] == 0.0:
+            self.note_of(
+                name,
+                "order",
+                "rows were not in the order of time and have been sorted",
+                harmless=True,
+            )
+        lines = lines[order]
+        columns = {key: values[order] for key, values in columns.items()}
+        where = [values for key, values in columns.items() if key not in self._optional]
+        again = np.all([values[1:] == values[:-1] for values in where], axis=0)
+        if again.any():
+            count = int(np.count_nonzero(again))
+            self.note_of(name, "again", f"{count} of its samples stand there again and count once")
+            once = np.concatenate([[True], ~again])
+            lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
+        times, header = columns["time"], self._columns["time"].header
+        for i in np.flatnonzero(np.diff(times) < _SHORTEST_STEP_S):
+            what = f"{name} already has a sample at {times[i]:.15g} s, in line {lines[i]}: "
+            if times[i] == times[i + 1]:
                 what += "an aircraft may have only one at a time"
             else:
                 what += f"the next one must be at least {_SHORTEST_STEP_S:g} s later"
-            self._problems.add(what, line=second, column=header)
-        return {key: values[order] for key, values in columns.items()}
+            self._problems.add(what, line=int(lines[i + 1]), column=header)
+        return columns
 
-    def _refuse_long_silence(self) -> None:
+    def _refuse_long_silence(
+        self, kept: Mapping[str, tuple[IntArray, dict[str, FloatArray]]]
+    ) -> None:
         """Note times after which the whole file falls silent for more than a day."""
-        seen = [
-            (time_s, line)
-            for rows in self._aircraft.values()
-            for time_s, line in zip(rows.values.get("time", ()), rows.lines, strict=True)
-        ]
-        if not seen:
+        if not any(len(lines) for lines, _ in kept.values()):
             return
-        seen.sort()
-        times = np.array([time_s for time_s, _ in seen])
+        times = np.concatenate([columns["time"] for lines, columns in kept.values() if len(lines)])
+        lines = np.concatenate([lines for lines, _ in kept.values() if len(lines)])
+        order = np.lexsort((lines, times))
+        times, lines = times[order], lines[order]
         for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):
-            (before_s, line_before), (after_s, line) = seen[i], seen[i + 1]
             self._problems.add(
-                f"the time is {after_s:.15g} s, and the one before it, in line {line_before}, is "
-                f"{before_s:.15g} s: the file may not be without a sample for more than "
+                f"the time is {times[i + 1]:.15g} s, and the one before it, in line {lines[i]}, is "
+                f"{times[i]:.15g} s: the file may not be without a sample for more than "
                 f"{_LONGEST_SILENCE_S:g} s",
-                line=line,
+                line=int(lines[i + 1]),
                 column=self._columns["time"].header,
             )
 
@@ -302,30 +353,32 @@ class SampleTable:
             **angles,
         )
         if trajectory.velocity_was_ignored:
-            self.notes.append(
-                f"{name}: its velocities do not fit its positions (another unit, or airspeed?) "
-                "and were ignored"
-            )
+            self.note_of(
+                name, "velocity",
+                "its velocities do not fit its positions (another unit, or airspeed?) and were "
+                "ignored", harmless=True,
+            )  # fmt: skip
         if len(columns["time"]) == 1:
-            self.notes.append(f"{name}: has one sample only and is there at that instant only")
+            self.note_of(
+                name,
+                "single",
+                "has one sample only and is there at that instant only",
+                harmless=True,
+            )
         else:
             gaps = np.diff(columns["time"])
             if gaps.max() > max(30.0, 10.0 * float(np.median(gaps))):
                 at = float(columns["time"][int(np.argmax(gaps))])
-                self.notes.append(
-                    f"{name}: no sample for {gaps.max():.0f} s after {at:.1f} s; positions there "
-                    "are interpolated"
-                )
+                self.note_of(
+                    name, "silence",
+                    f"no sample for {gaps.max():.0f} s after {at:.1f} s; positions there are "
+                    "interpolated",
+                )  # fmt: skip
         return trajectory
 
 
-def _number_or_nan(column: SampleColumn, cell: str) -> float:
-    """Read a cell of an optional column; what is no finite number of sense is NaN."""
-    try:
-        value = math.nan if "_" in cell else float(cell) * column.factor
-    except ValueError:
-        return math.nan
-    return value if abs(value) <= 1e12 else math.nan
+def _limits(quantity: str) -> tuple[float, float, str]:
+    return _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
 
 
 def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
@@ -340,17 +393,3 @@ def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
     decimals = min(9, math.floor(-math.log10(4.0 * resolution)))
     rounded = np.round(elapsed, decimals)
     return rounded if np.all(np.diff(rounded) > 0.0) else elapsed
-
-
-def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Give east, north, up velocity from vx vy vz or trk gs vs; nothing if neither is complete."""
-    if {"vx", "vy", "vz"} <= columns.keys():
-        return {"ve": columns["vx"], "vn": columns["vy"], "vu": columns["vz"]}
-    if {"trk", "gs", "vs"} <= columns.keys():
-        track = np.radians(columns["trk"])
-        return {
-            "ve": columns["gs"] * np.sin(track),
-            "vn": columns["gs"] * np.cos(track),
-            "vu": columns["vs"],
-        }
-    return {}

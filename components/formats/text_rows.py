@@ -23,6 +23,8 @@ LENGTH_M = {
     "meter": 1.0,
     "meters": 1.0,
     "km": 1000.0,
+    "cm": 0.01,
+    "mm": 0.001,
     "ft": FOOT_M,
     "foot": FOOT_M,
     "feet": FOOT_M,
@@ -40,6 +42,9 @@ SPEED_MPS = {
     "kn": NAUTICAL_MILE_M / 3600.0,
     "kt": NAUTICAL_MILE_M / 3600.0,
     "kts": NAUTICAL_MILE_M / 3600.0,
+    "mph": 1609.344 / 3600.0,
+    "mi/h": 1609.344 / 3600.0,
+    "cm/s": 0.01,
     "nmi/h": NAUTICAL_MILE_M / 3600.0,
     "nmi/s": NAUTICAL_MILE_M,
     "fpm": FOOT_M / 60.0,
@@ -54,6 +59,8 @@ ANGLE_DEG = {
     "rad": 180.0 / math.pi,
     "radian": 180.0 / math.pi,
     "radians": 180.0 / math.pi,
+    "1e-7deg": 1e-7,
+    "dege7": 1e-7,
 }
 TIME_S = {
     "s": 1.0,
@@ -61,6 +68,9 @@ TIME_S = {
     "second": 1.0,
     "seconds": 1.0,
     "ms": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "ns": 1e-9,
     "min": 60.0,
     "h": 3600.0,
     "hr": 3600.0,
@@ -106,13 +116,14 @@ class TrafficFile:
     """The aircraft of a file: the ownship, and all others in the order in which it names them.
 
     Times count from the file's earliest sample, `start_time_s` of its own; `notes` says what was
-    assumed, reordered or ignored.
+    assumed, reordered or ignored, `warnings` those of them that change what is flown.
     """
 
     ownship: SampledTrajectory
     intruders: list[SampledTrajectory]
     start_time_s: float
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     @property
     def aircraft(self) -> list[SampledTrajectory]:
@@ -181,9 +192,10 @@ _ROWS = "a row of column names and rows of samples"
 
 
 def read_lines(
-    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
-) -> list[tuple[int, str]]:
-    """Return a file's lines that hold something but comments, with their numbers from 1.
+    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS, *,
+    comments: bool = False,
+) -> list[tuple[int, str]]:  # fmt: skip
+    """Return a file's lines that hold something, but `comments` on request, numbered from 1.
 
     It may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end in
     LF, CR LF or CR. `needed` and `holds` are for the messages of a binary and of an empty file.
@@ -205,10 +217,11 @@ def read_lines(
         (number, line.strip(" "))
         for number, line in enumerate(re.split(r"\r\n|\r|\n", text or ""), start=1)
     ]
-    kept = [(n, line) for n, line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if not kept:
+    kept = [(n, line) for n, line in lines if line.strip()]
+    rows = [(n, line) for n, line in kept if not line.lstrip().startswith("#")]
+    if not rows:
         problems.fail(f"the file is empty: {holds} are needed")
-    return kept
+    return kept if comments else rows
 
 
 def _decoded(data: bytes) -> str | None:

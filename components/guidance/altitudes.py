@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.guidance.intervals import limits_of
-from components.guidance.situation import Detector, State, meets
+from components.guidance.situation import Detector, State, meets, meets_at
 from components.well_clear.relative_motion import Span, nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -130,21 +130,24 @@ class AltitudeConflicts:
         self._seconds: list[tuple[FloatArray, BoolArray]] = []
         t1, t2, t3 = altitudes.phases_s
         self._level_s = np.zeros(t1.shape) if altitudes.instantaneous else t3 + 1.0
-        # Inside recovery, who is level beyond the horizon keeps clear of the cylinder all the time.
-        self._late = (self._level_s > self._lookahead_s) & self._from_now
-        self._level = self._over(self._level_s, self._late)
+        # Who is level beyond a horizon from now keeps clear of a cylinder all the time before it.
+        self._level = self._over(self._level_s, self._from_now and detector.volume is None)
         if altitudes.instantaneous:
             return
         self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, self._lookahead_s)
-        self._held = self._over(self._held_s, np.zeros(t1.shape, dtype=bool))
+        self._held = self._over(self._held_s, False)
         self._at_seconds(np.zeros(t1.shape), t1)
         self._at_seconds(np.ceil(t2), t3 + 1.0)
 
-    def _over(self, begin_s: FloatArray, late: BoolArray) -> Span:
-        before_s = np.minimum(begin_s, self._lookahead_s)
-        flight = self._altitudes.flight_at(np.where(late, begin_s, before_s))
-        begin_s = np.where(late, 0.0, before_s)
-        return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s)
+    def _over(self, begin_s: FloatArray, whole: bool) -> Span:
+        """Return when flights that are straight from some times on meet it, or would all along."""
+        if whole:
+            flight, begin_s = self._altitudes.flight_at(begin_s), np.zeros(begin_s.shape)
+        else:
+            begin_s = np.minimum(begin_s, self._lookahead_s)
+            flight = self._altitudes.flight_at(begin_s)
+        # Beyond the lookahead, at whose end the volume may be asked for.
+        return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s + 1.0)
 
     def _at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
         """Find which flights are inside at the whole seconds of an interval."""
@@ -161,10 +164,12 @@ class AltitudeConflicts:
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which flights meet it."""
         end_s = np.minimum(self._after(horizon_s, self._level_s), self._lookahead_s)
-        met = meets(self._level, np.maximum(from_s, self._level_s), end_s)
+        begin_s = np.maximum(from_s, self._level_s)
+        met = meets(self._level, begin_s, end_s) | meets_at(self._level, from_s, begin_s, end_s)
         if not self._altitudes.instantaneous:
             end_s = np.minimum(self._after(horizon_s, self._held_s), self._held_until_s)
-            met |= meets(self._held, np.maximum(from_s, self._held_s), end_s)
+            begin_s = np.maximum(from_s, self._held_s)
+            met |= meets(self._held, begin_s, end_s) | meets_at(self._held, from_s, begin_s, end_s)
         last_s = horizon_s if self._from_now else np.inf
         for time_s, inside in self._seconds:
             met |= inside & (time_s >= from_s) & (time_s <= last_s)
@@ -175,13 +180,15 @@ class AltitudeConflicts:
 
     soon = unsafe
 
-    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
+    def unsafe_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Tell which flights meet it until a time (n, 1)."""
-        end_s = np.minimum(until_s, self._lookahead_s)
-        begin_s = np.where(self._late, 0.0, self._level_s)
-        met = meets(self._level, begin_s, np.where(self._late, self._lookahead_s, end_s))
+        horizon_s = np.minimum(horizon_s, self._lookahead_s)
+        until_s = np.minimum(until_s, horizon_s)
+        late = (self._level_s > horizon_s) & self._from_now
+        begin_s = np.where(late, 0.0, self._level_s)
+        met = meets(self._level, begin_s, np.where(late, horizon_s, until_s))
         if not self._altitudes.instantaneous:
-            met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, end_s))
+            met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, until_s))
         for time_s, inside in self._seconds:
             met |= inside & (time_s <= until_s)
         return self._altitudes.of_all(met)

@@ -56,22 +56,18 @@ def resolution(
     least = REGIONS.index(corrective_region)
     red = [is_red(one, least) for one in bands]
     turns = (-FULL_TURN, 0.0, FULL_TURN) if cyclic else (0.0,)
-    stretches: list[list[float]] = []
-    for turn in turns:
-        for band, counts in zip(bands, red, strict=True):
-            if not counts:
-                continue
-            low, high = band.low + turn, band.high + turn
-            if stretches and same_place(stretches[-1][1], low):
-                stretches[-1][1] = high
-            else:
-                stretches.append([low, high])
-    for low, high in stretches:
-        on_edge = same_place(low, own_value) or same_place(high, own_value)
-        if low < own_value < high and not on_edge:
-            break
+    if cyclic and same_place(own_value, FULL_TURN):
+        # As near to north it lies in the first band, and no way to the left is found.
+        if not red[0]:
+            return None
+        low, high = -math.inf, _stretches(bands, red, (FULL_TURN,))[0][1]
     else:
-        return None
+        for low, high in _stretches(bands, red, turns):
+            on_edge = same_place(low, own_value) or same_place(high, own_value)
+            if low < own_value < high and not on_edge:
+                break
+        else:
+            return None
     first, last = bands[0].low + turns[0], bands[-1].high + turns[-1]
     low_end = -math.inf if same_place(low, first) else low
     high_end = math.inf if same_place(high, last) else high
@@ -81,6 +77,30 @@ def resolution(
     down, up = away(own_value, low_end, cyclic), away(own_value, high_end, cyclic)
     nearer = up <= down or same_place(up, down)
     return Resolution(low_end, high_end, bool(math.isfinite(high_end) and nearer))
+
+
+def _stretches(
+    bands: list[Band], red: list[bool], turns: tuple[float, ...]
+) -> list[tuple[float, float]]:
+    """Return from where to where bands are red without a gap, over some turns of a circle.
+
+    Beyond north, places of a stretch are compared with a full turn added to them, where more
+    doubles lie in the same distance.
+    """
+    result: list[tuple[float, float]] = []
+    for turn in turns:
+        for band, counts in zip(bands, red, strict=True):
+            if not counts:
+                continue
+            low, high = band.low + turn, band.high + turn
+            if result:
+                start, end = result[-1]
+                added = FULL_TURN if start < turn and len(turns) > 1 else 0.0
+                if same_place(end - turn + added, band.low + added):
+                    result[-1] = start, high
+                    continue
+            result.append((low, high))
+    return result
 
 
 def is_red(band: Band, least: int) -> bool:

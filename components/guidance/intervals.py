@@ -11,9 +11,9 @@ import numpy as np
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: Guidance values that are fewer doubles apart are one place, and so are a zero and one below
-#: `_TINY`.
-_DOUBLES_APART = 2**40
-_TINY = 1e-5
+#: `TINY`.
+DOUBLES_APART = 2**40
+TINY = 1e-5
 FULL_TURN = 2.0 * math.pi
 # Doubles of one sign are in the order of their bits read as whole numbers.
 _DOUBLES, _AS_WHOLE_NUMBERS = struct.Struct("=2d"), struct.Struct("=2q")
@@ -33,11 +33,11 @@ def same_place(one: float, other: float) -> bool:
     are ten times as slow.
     """
     if one == 0.0 or other == 0.0:
-        return abs(one) < _TINY and abs(other) < _TINY
+        return abs(one) < TINY and abs(other) < TINY
     if (one > 0.0) != (other > 0.0):
         return False
     first, second = _AS_WHOLE_NUMBERS.unpack(_DOUBLES.pack(abs(one), abs(other)))
-    return abs(int(first) - int(second)) <= _DOUBLES_APART
+    return abs(int(first) - int(second)) <= DOUBLES_APART
 
 
 def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
@@ -63,7 +63,7 @@ def clear_intervals(
             result.append(Interval(float(values[first]), float(values[end - 1])))
     if not cyclic:
         clipped = [Interval(max(low, least), min(high, most)) for low, high in result]
-        return [one for one in clipped if one.low < one.high]
+        return [one for one in clipped if one.low < one.high and not same_place(*one)]
     return [part for one in result for part in _wrapped(one)]
 
 

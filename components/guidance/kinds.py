@@ -12,7 +12,7 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
 from components.guidance.intervals import FULL_TURN, limits_of
-from components.guidance.situation import Detector, State, meets
+from components.guidance.situation import Detector, State, meets, meets_at
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
@@ -134,11 +134,11 @@ class StepConflicts:
         self._after_s = np.zeros((1, 1)) if steps.from_now else steps.time_s
         self._steps, self._lookahead_s = steps, steps.lookahead_s
         self._count = np.abs(steps.number)
-        # In recovery, one that ends beyond its horizon keeps clear of the cylinder all the time.
-        self._late = (steps.time_s > self._lookahead_s) & steps.from_now
-        # Others that end later are not asked for.
-        begin_s = np.where(self._late, 0.0, np.minimum(steps.time_s, self._lookahead_s))
-        end_s = self._lookahead_s + steps.step_time_s
+        # What ends beyond a horizon from now keeps clear of a cylinder all the time before it.
+        whole = steps.from_now and detector.volume is None
+        begin_s = np.where(whole, 0.0, np.minimum(steps.time_s, self._lookahead_s))
+        # Beyond the lookahead, at whose end the volume may be asked for.
+        end_s = self._lookahead_s + np.where(steps.step_time_s > 0.0, steps.step_time_s, 1.0)
         self._span = detector.span(steps.flight, intruder, begin_s, end_s)
         if not steps.instantaneous:
             lasts_s = steps.time_s + steps.step_time_s
@@ -148,7 +148,8 @@ class StepConflicts:
         """Tell which steps meet it after the manoeuvre."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
-        met = meets(self._span, begin_s, np.minimum(self._lookahead_s, horizon_s + self._after_s))
+        end_s = np.minimum(self._lookahead_s, horizon_s + self._after_s)
+        met = meets(self._span, begin_s, end_s) | meets_at(self._span, from_s, begin_s, end_s)
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
@@ -165,14 +166,15 @@ class StepConflicts:
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
         return met | self._beyond(self._while_flown & due)
 
-    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
+    def unsafe_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
-        begin_s = np.where(self._late, 0.0, self._steps.time_s)
-        end_s = np.where(self._late, self._lookahead_s, np.minimum(self._lookahead_s, until_s))
-        met = meets(self._span, begin_s, end_s)
+        horizon_s = np.minimum(horizon_s, self._lookahead_s)
+        until_s = np.minimum(until_s, horizon_s)
+        late = (self._steps.time_s > horizon_s) & self._steps.from_now
+        begin_s = np.where(late, 0.0, self._steps.time_s)
+        met = meets(self._span, begin_s, np.where(late, horizon_s, until_s))
         met &= self._steps.there
         if not self._steps.instantaneous:
-            until_s = np.minimum(until_s, self._lookahead_s)
             early = self._count <= np.floor(until_s / self._steps.step_time_s)
             met |= self._beyond(self._while_flown & early)
         return met

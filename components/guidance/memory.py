@@ -47,7 +47,8 @@ class BandMemory:
             line = self._persisting(now_s, line, own_value)
         # Ways out that are remembered count as long as one is needed, also where none is left now.
         if recovery is None:
-            line = joined(b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line)
+            line = [b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line]
+        line = joined(line)
         recovers = recovery is not None and recovery.time_s >= 0.0
         bands = named_recovery(line) if recovers else line
         if self._persists:
@@ -55,7 +56,10 @@ class BandMemory:
         return bands
 
     def _counted(self, line: list[Band]) -> list[Band]:
-        """Return the line in which each colour is the m-th largest of its place's last n."""
+        """Return the line in which each colour is the m-th largest of its place's last n.
+
+        Each place of the line and of the memory stays one, also where the colour does not change.
+        """
         places = [line[0].low, *(band.high for band in line)]
         colours = [REGIONS.index(band.region) for band in line]
         # Colours to the left and to the right of each place.
@@ -74,10 +78,10 @@ class BandMemory:
                 queue.append(colour)
                 del queue[0]
             result.append(sorted(queues[1])[-self._m])
-        made = joined(
+        made = [
             Band(low, high, REGIONS[max(colour, 0)])
             for low, high, colour in zip(places[:-1], places[1:], result[:-1], strict=True)
-        )
+        ]
         last = len(self._places) - 1
         kept = [
             i for i in range(last + 1) if i in (0, last) or self._queues[i][0] != self._queues[i][1]
@@ -175,7 +179,7 @@ def _painted_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
         if inside and REGIONS.index(region) < remembered:
             region = held.region
         made.append(Band(low, high, region))
-    return joined(made)
+    return made
 
 
 _LOW, _HIGH = 0, 1
@@ -243,9 +247,9 @@ class ResolutionMemory:
         if not (math.isfinite(old) and math.isfinite(raw)):
             return False
         beyond = self._outwards(side, own_value, old)
-        if not (beyond <= math.pi if self._cyclic else beyond >= 0.0):
+        if not (_surely_below(beyond, math.pi) if self._cyclic else beyond >= 0.0):
             return False
-        if not holds and self._outwards(side, raw, old) >= self._near:
+        if not holds and not _surely_below(self._outwards(side, raw, old), self._near):
             return False
         return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
 
@@ -303,6 +307,10 @@ class ResolutionMemory:
         for side in (_LOW, _HIGH):
             if self._shrinks[side] >= shrinks:
                 self._shown[side] = raw[side]
+
+
+def _surely_below(one: float, other: float) -> bool:
+    return one < other and not same_place(one, other)
 
 
 class Remembered(NamedTuple):

@@ -135,16 +135,23 @@ class _Search:
         """Tell which values keep clear of the cylinder alone."""
         clear = self._kind.there.copy()
         for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
-            unsafe = cylinder.unsafe(0.0, self._lookahead_s)
+            unsafe = cylinder.unsafe(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
     def _clear_at(self, time_s: FloatArray) -> BoolArray:
-        """Tell which values keep clear of the cylinder until a time (r, 1), and of all then."""
+        """Tell which values keep clear of the cylinder until a time (r, 1), and of all then.
+
+        Beyond the horizon of an intruder only the cylinder counts, as far as that horizon.
+        """
         clear = self._kind.there.copy()
         of_all = zip(self._concerned, self._volumes, self._cylinders, strict=True)
         for one, volume, cylinder in of_all:
-            unsafe = volume.unsafe(time_s, self._lookahead_s) | cylinder.unsafe_before(time_s)
+            unsafe = volume.unsafe(time_s, one.horizon_s)
+            unsafe |= cylinder.unsafe_before(time_s, one.horizon_s)
+            beyond = time_s > one.horizon_s
+            if beyond.any():
+                unsafe |= cylinder.unsafe(0.0, one.horizon_s) & beyond
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
-from components.guidance.intervals import Interval, clear_intervals
+from components.guidance.intervals import DOUBLES_APART, TINY, Interval, clear_intervals
 from components.guidance.kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
 from components.well_clear.detection import Bounds, some_bounds
-from components.well_clear.relative_motion import surely_less
+from components.well_clear.relative_motion import nearly_equal, surely_less
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
@@ -153,7 +153,8 @@ def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
         low = np.maximum(kind.values[:, :-1], kind.least[:, np.newaxis])
-        both &= low < np.minimum(kind.values[:, 1:], kind.most[:, np.newaxis])
+        high = np.minimum(kind.values[:, 1:], kind.most[:, np.newaxis])
+        both &= (low < high) & ~nearly_equal(low, high, DOUBLES_APART, TINY)
     return np.asarray(both.any(axis=1))
 
 

@@ -10,7 +10,12 @@ import numpy as np
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
 from components.metrics.rows import TargetMetric
-from components.metrics.separation import RelativeFlight, separations, traffic_block
+from components.metrics.separation import (
+    RelativeFlight,
+    prepare_traffic,
+    separations,
+    traffic_block,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
@@ -111,6 +116,8 @@ def read_flights(
     """
     steering = steering or {}
     block = f"blocks.{traffic_block(group.scene).name}."
+    if any(key.startswith(block) for replica in group.replicas for key in replica.changes):
+        prepare_traffic(group.scenes)
     runs: list[list[RelativeFlight]] = []
     known: dict[Any, int] = {}
     run_of, steered = np.empty(len(group), dtype=np.int64), []

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.results.statistics import chi_square_bounds
 
 _AXES = ("north", "east", "down")
@@ -68,16 +68,21 @@ def assigned(cost: FloatArray) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class ReportedTracks:
-    """Confirmed tracks that have a range, as reported at one instant.
+    """Confirmed tracks that have a range, as they stand at one instant; there may be none.
 
-    State (6, tracks) is position and velocity north, east, down, with its covariance
-    (tracks, 6, 6); ``confirmed_s`` is when each was first reported as confirmed.
+    Errors (targets, 6, tracks) are position and velocity north, east, down less those of each
+    target: ``error`` of tracks that went on at their velocities since they were reported,
+    ``error_as_reported`` of what was reported, to which the covariance (tracks, 6, 6) belongs.
+    ``is_new`` says whose report is compared for the first time, ``confirmed_s`` when each was first
+    reported as confirmed.
     """
 
     time_s: float
     number: IntArray
-    state: FloatArray
+    error: FloatArray
+    error_as_reported: FloatArray
     covariance: FloatArray
+    is_new: BoolArray
     confirmed_s: FloatArray
 
 
@@ -88,7 +93,8 @@ class TrackTally:
     At every instant tracks and targets are assigned one to one so that the sum of distances is
     least. A track that is left over belongs to the nearest target, as one too many, if that is
     within `within_m`, the cut-off of OSPA and GOSPA of an order; otherwise it is spurious. Instants
-    are `step_s` apart.
+    are `step_s` apart, and those without any track count like all others. What rests on covariances
+    counts once for each report.
     """
 
     within_m: float
@@ -110,15 +116,10 @@ class TrackTally:
     steps_present: dict[int, int] = field(default_factory=dict)
     before_s: float = 0.0
 
-    def add(self, tracks: ReportedTracks, true: FloatArray, present: IntArray) -> None:
-        """Compare the tracks of an instant with the targets that are present.
-
-        True states (targets, 6, tracks) are at the instant that each track's state speaks of.
-        """
+    def add(self, tracks: ReportedTracks, present: IntArray) -> None:
+        """Compare the tracks of an instant with the targets that are present."""
         count = len(tracks.number)
-        apart = np.empty((count, len(present)))
-        for k, target in enumerate(present.tolist()):
-            apart[:, k] = np.sqrt(((tracks.state[:3] - true[target, :3]) ** 2).sum(axis=0))
+        apart = np.sqrt((tracks.error[present, :3] ** 2).sum(axis=1)).T
         result = set_distance(apart, self.within_m, self.order)
         self.sets.append(result)
         self.present += len(present)
@@ -131,23 +132,24 @@ class TrackTally:
             if apart[track, k] >= self.within_m:
                 continue
             left.discard(int(track))
-            self._pair(tracks, true, int(track), int(present[k]))
+            self._pair(tracks, int(track), int(present[k]))
         for track in left:
             near = int(np.argmin(apart[track])) if len(present) else -1
             if near < 0 or apart[track, near] >= self.within_m:
                 self.spurious += 1
                 continue
             self.owned.add(int(tracks.number[track]))
-            self._accuracy(tracks.state[:, track] - true[present[near], :, track])
+            self._accuracy(tracks.error[present[near], :, track])
         self.before_s = tracks.time_s
 
-    def _pair(self, tracks: ReportedTracks, true: FloatArray, track: int, target: int) -> None:
-        error = tracks.state[:, track] - true[target, :, track]
+    def _pair(self, tracks: ReportedTracks, track: int, target: int) -> None:
         self.tracked += 1
-        self.nees.append(float(error @ np.linalg.solve(tracks.covariance[track], error)))
-        self.error.append(error)
-        self.paired_s.append(tracks.time_s)
-        self._accuracy(error)
+        if tracks.is_new[track]:
+            error = tracks.error_as_reported[target, :, track]
+            self.nees.append(float(error @ np.linalg.solve(tracks.covariance[track], error)))
+            self.error.append(error)
+            self.paired_s.append(tracks.time_s)
+        self._accuracy(tracks.error[target, :, track])
         number = int(tracks.number[track])
         self.numbers.setdefault(target, []).append(number)
         # Between two instants it was confirmed when that was reported, not at the next instant.

@@ -97,9 +97,9 @@ class TrackingParameters(Parameters):
 class Tracking(Metric):
     """Compares confirmed tracks that have a range with all targets, instant by instant.
 
-    At every instant of the grid the last tracks reported before it count, each at the instant its
-    state speaks of. How tracks and targets belong together, and what is counted: `TrackTally`; what
-    covers a target: `Coverage`.
+    At every instant of the grid the last tracks that each block reported count, gone on at their
+    velocities since, each against the truth of the instant its state then speaks of. How tracks and
+    targets belong together, and what is counted: `TrackTally`; what covers a target: `Coverage`.
     """
 
     Parameters = TrackingParameters
@@ -168,27 +168,38 @@ class Tracking(Metric):
     ) -> tuple[TrackTally, list[str]]:
         targets = traffic_of(scene)[0].targets
         tally = TrackTally(self.p.within_m, self.p.order, self.p.step_s)
-        time_s = columns["time_s"][rows]
-        instants, start = np.unique(time_s, return_index=True)
-        ends = np.append(start[1:], len(rows))
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
-        last = np.searchsorted(instants, grid, side="right") - 1
-        used = np.unique(last[(last >= 0) & (grid >= self.p.from_s)])
+        grid = grid[grid >= self.p.from_s]
         kept = confirmed & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
-        confirmed_s = _first_of_each(columns, rows[kept[rows]])
-        messages = [rows[start[i] : ends[i]] for i in used.tolist()]
-        messages = [m[kept[m]] for m in messages]
-        every = np.concatenate([rows[:0], *messages])
-        origin = np.stack([columns[name][every] for name in ORIGIN])
-        state, _ = states_in_frame(targets, columns["state_s"][every], origin)
-        there = [np.broadcast_to(t.at(instants[used]).present, used.shape) for t in targets]
-        present = np.array(there, dtype=bool).reshape(len(targets), len(used))
-        first_row = 0
-        for k, message in enumerate(messages):
-            last_row = first_row + len(message)
-            reported = _reported(columns, message, float(instants[used[k]]), confirmed_s)
-            tally.add(reported, state[:, :, first_row:last_row], np.flatnonzero(present[:, k]))
-            first_row = last_row
+        key = _keys(columns)
+        first, confirmed_row = np.unique(key[rows[kept[rows]]], return_index=True)
+        confirmed_s = columns["time_s"][rows[kept[rows]][confirmed_row]]
+        instant, row = _standing(columns, rows, grid)
+        instant, row = instant[kept[row]], row[kept[row]]
+        order = np.lexsort((row, instant))
+        instant, row = instant[order], row[order]
+        is_new = np.zeros(len(row), dtype=bool)
+        is_new[np.unique(row, return_index=True)[1]] = True
+        state = np.stack([columns[name][row] for name in STATE])
+        origin = np.stack([columns[name][row] for name in ORIGIN])
+        since_s, state_s = grid[instant] - columns["time_s"][row], columns["state_s"][row]
+        as_reported = np.full((len(targets), *state.shape), np.nan)
+        true, _ = states_in_frame(targets, state_s[is_new], origin[:, is_new])
+        as_reported[:, :, is_new] = state[:, is_new] - true
+        state[:3] += state[3:] * since_s
+        error = state - states_in_frame(targets, state_s + since_s, origin)[0]
+        covariance = np.moveaxis(full_covariance(columns, row), -1, 0)
+        there = [np.broadcast_to(t.at(grid).present, grid.shape) for t in targets]
+        present = np.array(there, dtype=bool).reshape(len(targets), len(grid))
+        number, since = key[row], confirmed_s[np.searchsorted(first, key[row])]
+        ends = np.searchsorted(instant, np.arange(len(grid) + 1))
+        for k, time_s in enumerate(grid.tolist()):
+            mine = slice(ends[k], ends[k + 1])
+            tracks = ReportedTracks(
+                time_s, number[mine], error[:, :, mine], as_reported[:, :, mine],
+                covariance[mine], is_new[mine], since[mine],
+            )  # fmt: skip
+            tally.add(tracks, np.flatnonzero(present[:, k]))
         return tally, [target.name for target in targets]
 
     def _innovations(self, columns: Any, rows: IntArray) -> tuple[FloatArray, IntArray]:
@@ -196,7 +207,7 @@ class Tracking(Metric):
         kept = (columns["nis_freedom"][rows] > 0) & (columns["state_s"][rows] >= self.p.from_s)
         rows = rows[kept]
         # A look that is worked on again, after an out-of-sequence one, is reported again.
-        track, when = columns["track"][rows], columns["state_s"][rows]
+        track, when = _keys(columns)[rows], columns["state_s"][rows]
         order = np.lexsort((when, track))
         same = (np.diff(track[order]) == 0) & (np.diff(when[order]) == 0)
         rows = rows[order[np.append(~same, np.ones(min(len(rows), 1), dtype=bool))]]
@@ -220,25 +231,31 @@ def _is_asked_for(column: Any, scene: Scene, block: str | None) -> Any:
     return np.isin(column.codes, wanted)
 
 
-def _reported(
-    columns: Any, rows: IntArray, time_s: float, confirmed_s: Mapping[int, float]
-) -> ReportedTracks:
-    covariance = np.moveaxis(full_covariance(columns, rows), -1, 0).copy()
-    number = columns["track"][rows]
-    return ReportedTracks(
-        time_s,
-        number,
-        np.stack([columns[name][rows] for name in STATE]),
-        covariance,
-        np.array([confirmed_s[n] for n in number.tolist()]),
-    )
+def _keys(columns: Any) -> IntArray:
+    """Return a number for each row's block and track: trackers number their own."""
+    track = np.asarray(columns["track"], dtype=np.int64)
+    return columns["block"].codes * (track.max(initial=0) + 1) + track
 
 
-def _first_of_each(columns: Any, rows: IntArray) -> dict[int, float]:
-    """Return when each track was first reported in some rows, by number."""
-    number, first = np.unique(columns["track"][rows], return_index=True)
-    time_s = columns["time_s"][rows[first]]
-    return dict(zip(number.tolist(), time_s.tolist(), strict=True))
+def _standing(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return instants of a grid (indices) and the rows that stand then, block by block.
+
+    A report stands from its own instant until its block's next one. A block reports all of its
+    tracks at once, and the end of each, so that one without rows was left without tracks before.
+    """
+    instants, standing = [], []
+    for code in np.unique(columns["block"].codes[rows]).tolist():
+        mine = rows[columns["block"].codes[rows] == code]
+        told_s, start = np.unique(columns["time_s"][mine], return_index=True)
+        end = np.append(start[1:], len(mine))
+        last = np.searchsorted(told_s, grid + 1e-9, side="right") - 1
+        at = np.flatnonzero(last >= 0)
+        count = (end - start)[last[at]]
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        instants.append(np.repeat(at, count))
+        standing.append(mine[np.repeat(start[last[at]], count) + within])
+    none = rows[:0]
+    return np.concatenate([none, *instants]), np.concatenate([none, *standing])
 
 
 def _first_detections(columns: Any, replica: int) -> dict[str, float]:

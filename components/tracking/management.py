@@ -285,20 +285,32 @@ def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray
     return new
 
 
-def position_variance(part: TrackStore) -> FloatArray:
-    """Return the variance of each track's position, summed over its axes."""
+def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
+    """Return the variance of each track's position, summed over its axes.
+
+    `late` says that the tracks were taken back to a late look, for what an error advises.
+    """
     total = np.zeros(len(part))
     for weight, spread in zip(part.weights, part.covariances(), strict=True):
         total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
     good = np.isfinite(total) & (total >= 0.0)
     if not bool(good.all()):
         number = int(part.number[~good][0])
-        raise ValueError(
-            f"the covariance of track {number} has become singular: the stated variances are "
-            "smaller than what the filter's arithmetic resolves at this range, or the noise of the "
-            "motion is too large beside them; state larger ones, or less noise"
-        )
+        raise ValueError(f"the covariance of track {number} has become singular{_advice(late)}")
     return total
+
+
+def _advice(late: bool) -> str:
+    if late:
+        return (
+            " as it was taken back to a late look: late = 'rerun' works on looks in their own "
+            "order, and takes no track back by what is known of it now"
+        )
+    return (
+        ": the stated variances are smaller than what the filter's arithmetic resolves at this "
+        "range, or the noise of the motion is too large beside them; state larger ones, or less "
+        "noise"
+    )
 
 
 def now_seen(

@@ -122,6 +122,8 @@ def late_step(
         back = [
             (one, *_retrodicted(rules, now.take(one), old, tick[of][one])) for one, old in groups
         ]
+        for _, was, _, _ in back:
+            position_variance(was, late=True)
         then = [predicted(rules, now.take(~ahead), tick[of][~ahead]), *(one[1] for one in back)]
         seen, held = associated(rules, association, _ordered(then), of, batch)
         changed = [seen.take(~ahead)]
@@ -132,7 +134,7 @@ def late_step(
             newer = now.updated_tick > tick[of]
             left_out[of[newer & (seen.updated_tick == tick[of])]] = True
             whole = _ordered([whole.take(~newer), now.take(newer)])
-        position_variance(whole)
+        position_variance(whole, late=True)
         parts.append(whole)
     if not held.all():
         new, next_number = initiated(rules, batch, ~held, next_number)

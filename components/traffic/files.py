@@ -1,6 +1,7 @@
 """Recorded traffic: flights read from files of DAIDALUS, CSV tables and ASTERIX."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.asterix_file import read_asterix
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
+from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
 from components.geometry import line_of_sight_ned
 from components.traffic.source import SourceParameters, TrafficSource, roster_of
@@ -174,6 +176,12 @@ class CsvParameters(FileParameters):
     ownship: str | None = Field(
         default=None, description="Name of the ownship; by default the first aircraft named."
     )
+    altitude: Altitude | None = Field(
+        default=None,
+        description="Which altitude is read, of a file with both. By default of CSV the column "
+        "that the list of names has first, of ASTERIX the barometric one; aircraft that report "
+        "none of that kind fly at the other, as a note says.",
+    )
 
 
 class RecordedTraffic(TrafficSource):
@@ -209,7 +217,7 @@ class RecordedTraffic(TrafficSource):
         own, *intruders = (
             craft.in_wind(wind.east_mps, wind.north_mps) for craft in content.aircraft
         )
-        return TrafficFile(own, intruders, content.start_time_s, content.notes)
+        return replace(content, ownship=own, intruders=intruders)
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
@@ -229,8 +237,8 @@ class RecordedTraffic(TrafficSource):
         return [own, KnownTimes(*(target.sample_times_s for target in self.content.intruders))]
 
     def warnings(self) -> list[str]:
-        """Say what no aircraft does, and which error of units it looks like."""
-        lines = suspicions(self.content, float(self.context.duration_s))
+        """Say what was left out, what no aircraft does, and which error of units it looks like."""
+        lines = self.content.warnings + suspicions(self.content, float(self.context.duration_s))
         return [f"file {self.p.file}: {line}" for line in lines]
 
     def report(self) -> dict[str, Any]:
@@ -270,7 +278,7 @@ class CsvFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return _read(self.p.file, read_csv, self.p.ownship)
+        return _read(self.p.file, read_csv, self.p.ownship, self.p.altitude)
 
 
 class AsterixFile(RecordedTraffic):
@@ -281,4 +289,4 @@ class AsterixFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return _read(self.p.file, read_asterix, self.p.ownship)
+        return _read(self.p.file, read_asterix, self.p.ownship, self.p.altitude)

@@ -70,6 +70,12 @@ def page() -> str:
     names = ("quantity", "accepted names")
     unit = "unit unless the header says another"
     parts.append(_table((*names, unit, "needed"), csv_columns()))
+    parts.append(
+        "`position` holds latitude and longitude in one cell, `date` the day of a clock. Columns "
+        "of readsb, FlightRadar24 and BaseStation are in ft, kt and ft/min unless the header says "
+        "another. Rows without a time or a position are left out, a velocity or attitude with gaps "
+        "is not used; `check` says so.\n"
+    )
     parts += ["### DAIDALUS (`traffic.daa_file`, `.daa` and `.xyz`)\n"]
     parts.append(_table((*names, "unit unless the row of units says another"), daa_columns()))
     return "\n".join(parts)

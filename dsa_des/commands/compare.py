@@ -40,7 +40,7 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.runner import tables_of
-from dsa_des.studies.study import MetricSpec, Study
+from dsa_des.studies.study import MetricSpec, Study, command_of
 from dsa_des.studies.study_file import read_study, study_of_scene
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
@@ -103,10 +103,15 @@ def compare_command(
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
     check_workers(workers)
     changes = _OfAll(sets, seed, replicas)
+    words = ["compare", *(word for swap in swaps for word in ("--swap", swap))]
+    words += [] if seed is None else ["--seed", str(seed)]
+    words += [] if replicas is None else ["--replicas", str(replicas)]
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        tables = _compare_swap(chosen_file(paths[0]), swaps, changes, results, workers, out)
+        file = chosen_file(paths[0])
+        repeat = command_of(words, sets, file)
+        tables = _compare_swap(file, swaps, changes, results, workers, out, repeat)
         report_crashes(tables, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
@@ -116,6 +121,9 @@ def compare_command(
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
     files = [chosen_file(path) for path in paths]
     studies = [_study_at(path, changes) for path in files]
+    for study in studies:
+        if isinstance(study, Study):
+            study.repeat = command_of(words, sets, *files)
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         result_names(record.results, results)
@@ -138,6 +146,7 @@ def _compare_swap(
     results: Sequence[str],
     workers: int | None,
     out: str | None,
+    repeat: str,
 ) -> list[Tables]:
     """Run a scene or study with and without swaps, and compare the two."""
     chosen: list[tuple[str, list[str]]] = []
@@ -155,6 +164,7 @@ def _compare_swap(
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
     study = changes.study(path, chosen)
+    study.repeat = repeat
     result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=_ANEW)

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.costs.climb import Comparison, RungCost, applies, climb, parse_budgets
-from dsa_des.costs.output import draw_costs, print_costs, write_table
+from dsa_des.costs.output import draw_costs, print_ladder, print_rest, write_table
+from dsa_des.costs.replay import RungRun, run_watched
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
@@ -39,7 +41,10 @@ def cost_of_accuracy(
     out: str | None,
     as_json: bool,
 ) -> None:
-    """Climb the ladders of a scene's blocks, write tables and figures, and print the rows."""
+    """Climb the ladders of a scene's blocks, write tables and figures, and print the rows.
+
+    After ctrl-C the ladders that are finished are kept; exit code 130.
+    """
     if map_name is not None:
         if whole_chain or block is not None:
             raise UsageError("--map draws no scene's blocks: leave out --block and --all")
@@ -60,19 +65,31 @@ def cost_of_accuracy(
     compare = comparison()
     costs: list[RungCost] = []
     chain: list[dict[str, Any]] = []
+    stopped = False
     with target.writing() as folder:
         progress = CostProgress(silent=as_json)
-        for number, (name, ladder) in enumerate(climbs, 1):
-            progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
-            try:
-                costs += climb(variants, name, ladder, against=against, repeats=repeats,
-                               budgets=limits, compare=compare)  # fmt: skip
-            except Unavailable as error:
-                notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
+        try:
+            own = run_watched(variants.scene, {name for name, _ in climbs})
+            progress.say(foreseen(climbs, own, repeats), always=True)
+            for number, (name, ladder) in enumerate(climbs, 1):
+                progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
+                try:
+                    rungs = climb(variants, name, ladder, against=against, repeats=repeats,
+                                  budgets=limits, compare=compare, own=own[name])  # fmt: skip
+                except Unavailable as error:
+                    notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
+                    continue
+                costs += rungs
+                if not as_json:
+                    print_ladder(rungs, compare)
+        except KeyboardInterrupt:
+            if not costs:
+                raise
+            stopped = True
         rows = [cost.row() for cost in costs]
         write_table(folder / "cost.parquet", rows)
         draw_costs(folder / "cost.png", variants.scene.title, costs)
-        if whole_chain:
+        if whole_chain and not stopped:
             from dsa_des.costs.chain import draw_chain, run_chain
 
             progress.say("whole chain ...")
@@ -82,16 +99,34 @@ def cost_of_accuracy(
             label = compare.difference.label
             draw_chain(folder / "chain.png", variants.scene.title, chain, label)
         content: dict[str, Any] = {"rows": rows, "notes": notes}
-        if whole_chain:
+        if chain:
             content["chain"] = chain
         write_run_json(folder, {"title": variants.scene.title, "cost": content})
     if as_json:
         say_json(rows + chain)
     else:
-        print_costs(costs, chain, notes, compare)
+        print_rest(chain, notes, compare)
         names = sorted(path.name for path in target.path.iterdir())
         say()
         say(f"{target.path}: {', '.join(names)}")
+    if stopped:
+        done = len({(cost.block, cost.ladder.name) for cost in costs})
+        say(f"stopped: interrupted; {done} of {len(climbs)} ladders are kept", err=True)
+        sys.exit(130)
+
+
+def foreseen(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) -> str:
+    """Return how long climbing ladders takes if every rung costs as much as the scene's own."""
+    if not climbs:
+        return "no ladder to climb"
+    others = sum(len(ladder.rungs) - 1 for _, ladder in climbs)
+    run_s = next(iter(own.values())).run_cpu_s
+    timing_s = sum(len(ladder.rungs) * own[name].timing_s(repeats) for name, ladder in climbs)
+    return (
+        f"about {others * run_s + timing_s:.0f} s: {others} runs of {run_s:.2g} s and "
+        f"{timing_s:.0f} s of timing, if each model costs as much as the scene's own; dearer ones "
+        "take longer. Ctrl-C keeps what is finished; --block BLOCK or --duration S asks for less"
+    )
 
 
 class CostProgress:
@@ -100,10 +135,11 @@ class CostProgress:
     def __init__(self, silent: bool) -> None:
         self._silent, self._last_s = silent, time.monotonic()
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, always: bool = False) -> None:
         """Say what is begun."""
         now_s = time.monotonic()
-        if not self._silent and (sys.stderr.isatty() or now_s - self._last_s > _QUIET_S):
+        due = always or sys.stderr.isatty() or now_s - self._last_s > _QUIET_S
+        if not self._silent and due:
             say(text, err=True)
             self._last_s = now_s
 

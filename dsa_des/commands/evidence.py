@@ -16,6 +16,7 @@ from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.studies.runner import tables_of
+from dsa_des.studies.study import command_of
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shell_line
 
@@ -48,8 +49,9 @@ def evidence_command(
     target = location if isinstance(location, Path) else location()
     words = ["dsa-des", "evidence", "--resume", "--out", str(target)]
     words += [word for one in sets for word in ("--set", one)]
-    words += ["--encounters", str(encounters)] if encounters else []
-    again = shell_line([*words, case])
+    many = ["--encounters", str(encounters)] if encounters else []
+    again = shell_line([*words, *many, case])
+    repeat = command_of(["evidence", *many], sets, path)
     try:
         for name, content in inputs.items():
             _write(target / INPUTS / name, content)
@@ -59,6 +61,7 @@ def evidence_command(
     folders: dict[str, StudyFolder] = {}
     tables: dict[str, Tables] = {}
     for name, study in checked.studies.items():
+        study.repeat = repeat
         path = target / STUDIES / name
         folders[name] = run_into(study, path, workers, resume, again)
         tables[name] = tables_of(study, folders[name])

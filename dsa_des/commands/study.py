@@ -20,7 +20,7 @@ from dsa_des.scene.overrides import parse_assignment
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Clock, Stopped, draw_run, run_study, tables_of, why_one_by_one
-from dsa_des.studies.study import Study
+from dsa_des.studies.study import Study, command_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
@@ -28,8 +28,6 @@ from dsa_des.text.safe_text import shell_line, shortened
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
-#: Of so many runs and more the second that measuring the models' errors takes is little.
-_RUNS_TO_MEASURE = 100
 
 
 def study_command(
@@ -58,9 +56,10 @@ def study_command(
     name, path = study, chosen_file(study, "study")
     sets = (*sets, *as_sets(swaps, seed, replicas))
     described = read_study(path, sets=sets)
+    described.repeat = command_of(["study"], sets, described.path)
 
     def again(folder: Path) -> str:
-        return _resume_command(name, folder, sets, workers, executor, scheduler)
+        return _resume_command(name, folder, sets, workers, executor, scheduler, measure)
 
     target = target_of(_HOME, described.path.stem, out, resume)
     folder = run_into(described, target, workers, resume, again, executor, scheduler)
@@ -68,8 +67,8 @@ def study_command(
         tables = finish(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
         )
-        if measure or (_count(tables) >= _RUNS_TO_MEASURE and not no_figures):
-            _measure(folder)
+        if measure:
+            _measure(folder, silent=quiet)
     except KeyboardInterrupt:
         _stopped("interrupted", again(folder.path), 130)
     report_crashes([tables], again(folder.path))
@@ -114,6 +113,7 @@ def _resume_command(
     workers: int | None,
     executor: str,
     scheduler: str | None,
+    measure: bool,
 ) -> str:
     """Return what continues a study, fit to be pasted into a shell."""
     words = ["dsa-des", "study", "--resume", "--out", str(path)]
@@ -125,6 +125,7 @@ def _resume_command(
         words += ["--executor", executor]
     if scheduler is not None:
         words += ["--scheduler", scheduler]
+    words += ["--measure"] if measure else []
     # A name that begins with a dash is no option.
     return shell_line([*words, *(["--"] if study.startswith("-") else []), study])
 
@@ -262,12 +263,13 @@ def show_study(
     finish(folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json)
 
 
-def _measure(folder: StudyFolder) -> None:
+def _measure(folder: StudyFolder, silent: bool = False) -> None:
     """Measure the errors of the models of a study's first run, and keep them in its folder."""
+    from dsa_des.commands.cost import CostProgress
     from dsa_des.studies.models import measure_errors
 
     try:
-        measure_errors(folder)
+        measure_errors(folder, CostProgress(silent=silent).say)
     except (SceneError, BlockFailure) as error:
         say(f"errors of the models were not measured: {error}", err=True)
     except OSError as error:

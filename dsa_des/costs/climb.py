@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dsa_des.block.ladder import Ladder, Quantity, Unavailable
@@ -217,15 +217,17 @@ def climb(
     repeats: int = 10,
     budgets: Mapping[str, float] | None = None,
     compare: Compare | None = None,
+    own: RungRun | None = None,
 ) -> list[RungCost]:
     """Run the scene with every rung of a block's ladder and return their costs, crude to exact.
 
     `budgets` are largest allowed errors by unit, else the scene's ``[accuracy]``; `against` is
     another reference than the ladder's own; `compare` returns the changes of the run's results.
+    Without `repeats` nothing is timed. `own` is a run of the scene as it is, for its own rung.
     """
     reference = against or ladder.reference
     best = Choice(block, ladder, ladder.rung(reference))
-    baselines = {"": _attempt(variants, [best], block)}
+    baselines = {"": _attempt(variants, [best], block, own=own)}
     costs: list[RungCost] = []
     runs: dict[str, RungRun] = {reference: baselines[""]}
     for rung in ladder.rungs:
@@ -234,7 +236,7 @@ def climb(
         choice = Choice(block, ladder, rung)
         try:
             if rung.name != reference:
-                runs[rung.name] = _attempt(variants, [choice], block)
+                runs[rung.name] = _attempt(variants, [choice], block, own=own)
             shared = str(sorted(rung.shared.items())) if rung.shared else ""
             if shared and shared not in baselines:
                 baselines[shared] = _attempt(variants, [best], block, [choice])
@@ -268,11 +270,21 @@ def climb(
 
 
 def _attempt(
-    variants: Variants, choices: list[Choice], block: str, shared: list[Choice] | None = None
+    variants: Variants,
+    choices: list[Choice],
+    block: str,
+    shared: list[Choice] | None = None,
+    own: RungRun | None = None,
 ) -> RungRun:
-    """Run a variant; whatever keeps it from running makes the rung unavailable."""
+    """Run a variant, unless it is the scene itself whose run is there.
+
+    Whatever keeps it from running makes the rung unavailable.
+    """
     try:
-        return run_rung(variants.with_rungs(choices, shared or ()), block)
+        scene = variants.with_rungs(choices, shared or ())
+        if own is not None and scene.resolved() == own.scene.resolved():
+            return replace(own, passes_s=[])
+        return run_rung(scene, block)
     except SceneError as error:
         raise Unavailable("; ".join(problem.message for problem in error.problems)) from error
     except BlockFailure as error:

@@ -42,25 +42,26 @@ def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def print_costs(
-    costs: Sequence[RungCost],
-    chain: Sequence[Mapping[str, Any]],
-    notes: Sequence[str],
-    comparison: Comparison,
-) -> None:
-    """Print one table per ladder."""
+def print_ladder(rungs: Sequence[RungCost], comparison: Comparison) -> None:
+    """Print the table of one ladder."""
     console = terminal.console(150)
     effects = [change.heading for change in comparison.changes]
     headings = ["rung", "us/target-scan", "mean", "p95", "max", *effects, "remark"]
-    for (block, ladder_name), group in groupby(costs, key=lambda c: (c.block, c.ladder.name)):
-        rungs = list(group)
-        unit = rungs[0].ladder.quantities[0]
-        what = f"{ladder_name}: errors in {unit.name}, {unit.unit}, against {rungs[0].reference}"
-        console.print()
-        rows = [_cells(cost, comparison) for cost in rungs]
-        last = len(headings) - 1
-        title = f"{shortened(block)}, {what}"
-        print_table(console, title, headings, rows, below=last, right=range(1, last))
+    first = rungs[0]
+    unit = first.ladder.quantities[0]
+    what = f"{first.ladder.name}: errors in {unit.name}, {unit.unit}, against {first.reference}"
+    console.print()
+    rows = [_cells(cost, comparison) for cost in rungs]
+    last = len(headings) - 1
+    title = f"{shortened(first.block)}, {what}"
+    print_table(console, title, headings, rows, below=last, right=range(1, last))
+
+
+def print_rest(
+    chain: Sequence[Mapping[str, Any]], notes: Sequence[str], comparison: Comparison
+) -> None:
+    """Print the front of the whole chain, and notes."""
+    console = terminal.console(150)
     if chain:
         _print_chain(console, chain, comparison)
     for note in notes:

@@ -6,9 +6,10 @@ block is on the clock, and its inputs are those of the run. Errors are target-sc
 
 import copy
 import gc
+import math
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +25,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 # Slow rungs are timed fewer times: all passes of one rung together take about this long at most.
-_LONGEST_S = 2.0
+_LONGEST_S = 1.0
 _FEWEST = 3
 # A repeat is the best of so many passes: what interrupts a pass is not the block's.
 _PASSES = 10
@@ -76,6 +77,12 @@ class RungRun:
         affordable = int(_LONGEST_S / max(self.block_cpu_s, 1e-9))
         return min(wanted, max(_FEWEST, affordable))
 
+    def timing_s(self, repeats: int) -> float:
+        """Return how long timing a rung that costs as much as this one will take."""
+        if self.block_cpu_s > _LONGEST_S:
+            return 0.0
+        return self.block_cpu_s * self.passes(repeats * _PASSES)
+
     @property
     def repeats_s(self) -> list[float]:
         """Processor time of each repeat: the best of its passes; of a slow block, each pass."""
@@ -93,38 +100,52 @@ class RungRun:
 
 def run_rung(scene: Scene, block: str) -> RungRun:
     """Run a scene, recording what it records and the wakes of one block."""
+    return run_watched(scene, [block])[block]
+
+
+def run_watched(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
+    """Run a scene once, recording what it records and the wakes of some blocks."""
     sink = MemorySink()
     simulation = Simulation(scene, recorder=Recorder([sink]))
-    component = simulation.components[block]
-    wakes: list[Wake] = []
-    spent = 0
-    own: Callable[[Wake], Any] = component.run
-
-    def watched(wake: Wake) -> Any:
-        nonlocal spent
-        # In a feedback loop the engine may take a window back and run it again from some instant.
-        while wakes and wakes[-1].ticks[0] >= wake.ticks[0]:
-            wakes.pop()
-        wakes.append(wake)
-        started = time.process_time_ns()
-        result = own(wake)
-        spent += time.process_time_ns() - started
-        return result
-
-    # On this one instance: the engine calls `component.run`, and must know nothing of us.
-    component.run = watched  # type: ignore[method-assign]
+    watches = {name: _WatchedBlock(simulation.components[name]) for name in blocks}
     outcome = simulation.run()
-    return RungRun(scene, block, wakes, sink.tables(), outcome.cpu_s, spent * 1e-9)
+    tables = sink.tables()
+    return {
+        name: RungRun(scene, name, watch.wakes, tables, outcome.cpu_s, watch.spent_ns * 1e-9)
+        for name, watch in watches.items()
+    }
+
+
+class _WatchedBlock:
+    """Keeps what a block is given, and how long it works on it."""
+
+    def __init__(self, component: Component) -> None:
+        self.wakes: list[Wake] = []
+        self.spent_ns = 0
+        self._run: Callable[[Wake], Any] = component.run
+        # On this one instance: the engine calls `component.run`, and must know nothing of us.
+        component.run = self.run  # type: ignore[method-assign]
+
+    def run(self, wake: Wake) -> Any:
+        """Run the block."""
+        # In a feedback loop the engine may take a window back and run it again from some instant.
+        while self.wakes and self.wakes[-1].ticks[0] >= wake.ticks[0]:
+            self.wakes.pop()
+        self.wakes.append(wake)
+        started = time.process_time_ns()
+        result = self._run(wake)
+        self.spent_ns += time.process_time_ns() - started
+        return result
 
 
 def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
     """Time all rungs in turn, again and again, so that a noisy machine hurts all of them alike.
 
-    Every round starts with another rung. Their runs went before: libraries were imported and tables
-    that are built once were built then. A rung so slow that its run took long is not run again:
-    that run counts.
+    With no `repeats` nothing is timed. Every round starts with another rung. Their runs went
+    before: libraries were imported and tables that are built once were built then. A rung so slow
+    that its run took long is not run again: that run counts.
     """
-    for run in runs:
+    for run in runs if repeats else ():
         if run.block_cpu_s > _LONGEST_S:
             run.passes_s.append(run.block_cpu_s)
     fast = [run for run in runs if run.block_cpu_s <= _LONGEST_S]
@@ -136,7 +157,9 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
 
 
 def median_and_spread(repeats_s: Sequence[float]) -> tuple[float, float]:
-    """Return the median and half the distance between the quartiles."""
+    """Return the median and half the distance between the quartiles; NaN of nothing."""
+    if not repeats_s:
+        return math.nan, math.nan
     if len(repeats_s) < 2:
         return repeats_s[0], 0.0
     low, middle, high = statistics.quantiles(repeats_s, n=4, method="inclusive")

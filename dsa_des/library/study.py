@@ -26,7 +26,7 @@ from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
-from dsa_des.studies.study import Study, changed_scene
+from dsa_des.studies.study import Study, changed_scene, command_of
 from dsa_des.studies.study_file import read_study, study_of_tables
 from dsa_des.terminal.terminal import html_of, text_of
 from dsa_des.text.safe_text import shortened
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _MOST_WORKERS = 1024
+_BY_A_PROGRAM = "# run by a program with dsa_des.study(...); its tables stand in study.json"
 
 
 class StudyResult:
@@ -203,6 +204,7 @@ def study(
         message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
         raise SceneError([Problem("study", key, message)])
     described = study_of_tables(tables, *_base_of(*loaded.origin))
+    described.repeat = _BY_A_PROGRAM
     return _run(described, _workers(described, workers), out, resume, progress)
 
 
@@ -213,7 +215,12 @@ def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -
         raise SceneError([Problem("study", "metrics", message)])
     name = os.fspath(source)
     path = chosen_file(name, "study")
-    return read_study(path, sets=sets, keys=_tables(given))
+    described = read_study(path, sets=(sets := list(sets)), keys=_tables(given))
+    described.repeat = _BY_A_PROGRAM
+    if given.keys() <= {"replicas", "seed"}:
+        words = [word for key, value in given.items() for word in (f"--{key}", str(value))]
+        described.repeat = command_of(["study", *words], sets, path)
+    return described
 
 
 def _tables(given: Mapping[str, Any]) -> dict[str, Any]:

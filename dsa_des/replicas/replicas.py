@@ -99,16 +99,20 @@ def _checked(
 
 
 def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
-    """Part replicas into as many as may run together: what they record is held in memory."""
+    """Part replicas into as many as may run together."""
     if not scenes:
         return
-    first = scenes[0]
-    rates = [block.cls.clock_of(block.parameters) for block in first.blocks.values()]
-    per_s = float(sum(spec.rate_hz for spec in rates if spec is not None))
-    rows = max(1.0, per_s * float(first.duration_s or _A_LONG_RUN_S))
-    most = max(1, min(_MOST_TOGETHER, int(_MOST_ROWS / rows)))
+    most = most_together(scenes[0])
     for start in range(0, len(scenes), most):
         yield scenes[start : start + most]
+
+
+def most_together(scene: Scene) -> int:
+    """Return how many replicas of a scene may run together: what they record is in memory."""
+    rates = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
+    per_s = float(sum(spec.rate_hz for spec in rates if spec is not None))
+    rows = max(1.0, per_s * float(scene.duration_s or _A_LONG_RUN_S))
+    return max(1, min(_MOST_TOGETHER, int(_MOST_ROWS / rows)))
 
 
 def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:

@@ -255,6 +255,8 @@ class StudyRecord(StudyHead):
     figures: list[FigureRecord]
     requirements: list[Requirement] = []
     compare_weight: str | None = None
+    #: The command line that runs the study again; empty in folders of versions that kept none.
+    repeat: str = ""
 
     @model_validator(mode="after")
     def _consistent(self) -> "StudyRecord":

@@ -107,7 +107,7 @@ def study_report(folder: StudyFolder) -> bytes:
         packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
         hashes=_hashes(folder),
         commands=[
-            f"dsa-des study {record.study}",
+            record.repeat or f"dsa-des study {record.study}",
             f"dsa-des study show {folder.path}",
             f"dsa-des study report {folder.path}",
             explain,

@@ -16,6 +16,7 @@ from dsa_des.block.registry import NotImported, UnknownType, find, section_model
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import did_you_mean, nearest
 from dsa_des.scene.block_table import Block, BlockOptions, ProcessorParameters, split_options
+from dsa_des.scene.graph import unfed_inputs
 from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.overrides import drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
@@ -174,6 +175,8 @@ def check_activity(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
+        if unfed_inputs(name, block.cls, wires):  # that is said already
+            continue
         if not alive and name in clocks and clocks[name] is None:
             message = (
                 "would never run: it has no scan clock, no process of its own, and no wire into "

@@ -5,7 +5,7 @@ of their names. (A topological sort would do as well, but which of the many it g
 the order in the file.)
 """
 
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 
 import networkx as nx
 
@@ -48,17 +48,24 @@ def check_graph(
     Blocks in `unsure`, which a faulty wire meant to feed, are not blamed for missing it.
     """
     known = {name for name, cls in classes.items() if cls is not None}
-    fed = {(wire.target, wire.input) for _, _, wires in graph.edges(data="wires") for wire in wires}
-    for name in sorted(known):
-        for port, declared in sorted(classes[name].inputs.items()):
-            if declared.required and (name, port) not in fed and name not in unsure:
-                message = (
-                    f"input {port!r} ({declared.message.__name__}) is required and has no wire"
-                )
-                scene.report(("blocks", name), message)
+    every = [wire for _, _, wires in graph.edges(data="wires") for wire in wires]
+    unfed = {name: unfed_inputs(name, classes[name], every) for name in sorted(known - unsure)}
+    for name, ports in unfed.items():
+        for port in ports:
+            declared = classes[name].inputs[port]
+            message = f"input {port!r} ({declared.message.__name__}) is required and has no wire"
+            if scene.source_of(("blocks", name)) != scene.source_of(("wires",)):
+                message += f'; wire it, or leave the block out: blocks.remove = ["{name}"]'
+            scene.report(("blocks", name), message)
     _check_cycles(scene, graph)
     if known == set(classes) and not unsure:
-        _check_reach(scene, graph, classes)
+        _check_reach(scene, graph, classes, {name for name, ports in unfed.items() if ports})
+
+
+def unfed_inputs(name: str, cls: type[Component], wires: Iterable[Wire]) -> list[str]:
+    """Return the required inputs of a block that no wire leads to, sorted."""
+    fed = {wire.input for wire in wires if wire.target == name}
+    return sorted(port for port, of in cls.inputs.items() if of.required and port not in fed)
 
 
 def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
@@ -93,7 +100,9 @@ def _check_reach(
     scene: SceneFile,
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],
+    unfed: Set[str],
 ) -> None:
+    """Report blocks that no source reaches, but for those `unfed` and what is behind them."""
     sources = [
         name for name in graph if not any(port.required for port in classes[name].inputs.values())
     ]
@@ -101,7 +110,8 @@ def _check_reach(
         message = "no block is a source (has no required inputs)"
         scene.report(("blocks",), message)
         return
-    reached = set(sources).union(*(nx.descendants(graph, name) for name in sources))
+    begin = {*sources, *unfed}  # that nothing comes to these is said already
+    reached = begin.union(*(nx.descendants(graph, name) for name in begin))
     for name in sorted(set(graph) - reached):
         message = "no source reaches this block over the wires; wire it or remove it"
         scene.report(("blocks", name), message)

@@ -1,17 +1,20 @@
 """Merging the keys of a file over those of the files it extends.
 
-Table by table, own keys win. What more there is to it: keys that ``remove`` takes away, items of a
-list that are changed by their ``name``, and parameters that came from a block of another type.
+Table by table, own keys win. What more there is to it: keys that ``remove`` takes away, and with a
+block its wires; items of a list that are changed by their ``name``; and parameters that came from a
+block of another type.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from dsa_des.block.class_text import sourced
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.scene.keys import Key, dotted, is_new_item, names_of, no_item, place_of, step, unquoted
 
-REMOVE = "remove"
+REMOVE, BLOCKS, WIRES = "remove", "blocks", "wires"
 
 
 @dataclass(eq=False)
@@ -52,6 +55,7 @@ class Inheritance:
     def merge(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> dict[str, Any]:
         """Put the keys of `over` into `base`, table by table, and return `base`."""
         removals = over.get(REMOVE)
+        blocks = set(base[BLOCKS]) if not at and isinstance(base.get(BLOCKS), dict) else set()
         if isinstance(removals, Removals):
             for removal in removals:
                 self._remove(base, removal, at)
@@ -71,7 +75,24 @@ class Inheritance:
                 if lost:
                     self.replaced[(*at, key)] = lost
                 base[key] = value
+        if blocks and WIRES not in over and (gone := blocks - set(base[BLOCKS])):
+            self._leave_out_wires(base, gone)
         return base
+
+    def _leave_out_wires(self, base: dict[str, Any], gone: set[str]) -> None:
+        """Leave out the inherited wires from and to blocks that were removed."""
+        if not isinstance(base.get(WIRES), list):
+            return
+        kept = [
+            (old, piece) for old, entry in enumerate(base[WIRES]) for piece in _without(entry, gone)
+        ]
+        sources = {k: v for k, v in self._sources.items() if k[:1] == (WIRES,) and len(k) > 1}
+        for key in sources:
+            del self._sources[key]
+        for new, (old, _) in enumerate(kept):
+            inside = {key: file for key, file in sources.items() if key[1] == old}
+            self._sources |= {(WIRES, new, *key[2:]): file for key, file in inside.items()}
+        base[WIRES] = [piece for _, piece in kept]
 
     def note_beside(self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key) -> None:
         """Note what stands beside each table of a block that a file is the first to write."""
@@ -172,6 +193,25 @@ class Inheritance:
                 )
                 key = dotted((*at, REMOVE))
                 self._problems.append(Problem(removal.source, key, message, removal.text))
+
+
+def _without(entry: Any, gone: set[str]) -> list[Any]:
+    """Return what is left of an entry of ``wires`` without the hops from and to some blocks."""
+    if isinstance(entry, dict):
+        ends = [str(entry.get(end)).partition(".")[0].strip() for end in ("from", "to")]
+        return [] if gone & set(ends) else [entry]
+    if not isinstance(entry, str):
+        return [entry]
+    pieces: list[list[str]] = [[]]
+    for end in entry.split("->"):
+        if end.partition(".")[0].strip() in gone:
+            pieces.append([])
+        else:
+            pieces[-1].append(end)
+    return [entry] if len(pieces) == 1 else [
+        sourced("->".join(piece).strip(), getattr(entry, "folder", Path()))
+        for piece in pieces if len(piece) > 1
+    ]  # fmt: skip
 
 
 def _lost(old: Any, new: Any) -> list[str]:

@@ -187,10 +187,15 @@ def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
             raise ValueError(f"set: {name} must be a list of {len(labels)} values, one per value")
     shown = tuple(label_of(label) for label in labels)
     _refuse_twice(shown)
-    sets = tuple(
-        tuple((name, column[i]) for name, column in columns.items()) for i in range(len(labels))
+    types = {name: column for name, column in columns.items() if name.startswith(SWAP)}
+    sets, swaps = (
+        tuple(tuple((name, column[i]) for name, column in of.items()) for i in range(len(labels)))
+        for of in ({n: c for n, c in columns.items() if n not in types}, types)
     )
-    return Axis(key, shown, sets, ((),) * len(labels))
+    named = tuple(
+        tuple((name.removeprefix(SWAP), absolute(value)) for name, value in one) for one in swaps
+    )
+    return Axis(key, shown, sets, named)
 
 
 def _range(spec: Mapping[str, Any]) -> list[Any]:

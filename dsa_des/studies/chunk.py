@@ -18,7 +18,7 @@ from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
+from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
 from dsa_des.results.record import (
     CRASHED,
     DONE,
@@ -159,8 +159,11 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
     while done < len(replicas):
+        # What runs together is measured together: of what blocks make for a batch nothing is made
+        # again for the metrics, however many runs the chunk holds.
         one_run = _bytes_of_a_run.get(key, _MOST_BYTES / _FIRST_RUNS)
-        part = replicas[done : done + max(1, int(_MOST_BYTES / max(1.0, one_run)))]
+        many = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
+        part = replicas[done : done + many]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded:

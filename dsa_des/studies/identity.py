@@ -206,6 +206,7 @@ def record_text(study: Study, digest: str) -> str:
             for figure in study.figures
         ],
         "requirements": [vars(requirement) for requirement in study.requirements],
+        "repeat": study.repeat,
         "version": __version__,
         "tables": study.tables,
     }

@@ -2,11 +2,13 @@
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.costs.climb import RungCost, applies, climb
+from dsa_des.costs.replay import run_watched
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.toml_files import to_toml
@@ -114,10 +116,11 @@ def keep_explained(study: Study, folder: StudyFolder) -> None:
         folder.write_file(EXPLAINED, text.encode())
 
 
-def measure_errors(folder: StudyFolder) -> None:
+def measure_errors(folder: StudyFolder, report: Callable[[str], None] = lambda text: None) -> None:
     """Run the first run's scene with its models and their references, and keep the errors.
 
-    It reads the scene that the folder names, and imports its blocks: not for folders of strangers.
+    `report` is told which ladder is begun. It reads the scene that the folder names, and imports
+    its blocks: not for folders of strangers.
     """
     record = folder.record
     first = StoredRows(folder).first
@@ -126,20 +129,29 @@ def measure_errors(folder: StudyFolder) -> None:
         Path(record.scene), sets=[f"{key}={value}" for key, value in sets],
         swaps=[f"{block}={name}" for block, name in swaps], seed=int(first["seed"]),
     )  # fmt: skip
-    rows, notes = scene_errors(variants)
+    rows, notes = scene_errors(variants, report)
     errors = MeasuredErrors(command=record.command(first), rows=rows, notes=notes)
     folder.write_file(ERRORS, (json.dumps(errors.model_dump(), indent=1) + "\n").encode())
 
 
-def scene_errors(variants: Variants) -> tuple[list[ErrorRecord], list[str]]:
+def scene_errors(
+    variants: Variants, report: Callable[[str], None]
+) -> tuple[list[ErrorRecord], list[str]]:
     """Run a scene with its own models and with each one's reference, and return their errors.
 
     Beside them notes: of which ladders nothing could be measured, and why.
     """
     rows: list[ErrorRecord] = []
     notes: list[str] = []
-    for name, block in variants.scene.blocks.items():
-        for ladder in block.cls.ladders_for(block.parameters):
+    blocks = variants.scene.blocks
+    ladders = {name: block.cls.ladders_for(block.parameters) for name, block in blocks.items()}
+    many = sum(map(len, ladders.values()))
+    if many:
+        report(f"errors of models: the first run ({many} ladders follow)")
+    own = run_watched(variants.scene, [name for name, mine in ladders.items() if mine])
+    for name, mine in ladders.items():
+        for ladder in mine:
+            report(f"errors of models: {name}, {ladder.name}")
             why = applies(variants, name, ladder)
             if why:
                 notes.append(f"{name}, {ladder.name}: changes nothing here, {why}")
@@ -151,15 +163,15 @@ def scene_errors(variants: Variants) -> tuple[list[ErrorRecord], list[str]]:
             wanted = {rung, ladder.reference}
             short = replace(ladder, rungs=tuple(r for r in ladder.rungs if r.name in wanted))
             try:
-                costs = climb(variants, name, short, repeats=1)
+                costs = climb(variants, name, short, repeats=0, own=own[name])
             except Unavailable as error:
                 notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
                 continue
-            (mine,) = [cost for cost in costs if cost.rung == rung]
-            if not mine.errors:
-                why = mine.unavailable or mine.error_note or "nothing to compare"
+            (its,) = [cost for cost in costs if cost.rung == rung]
+            if not its.errors:
+                why = its.unavailable or its.error_note or "nothing to compare"
                 notes.append(f"{name}, {ladder.name}: not measured, {why}")
-            rows += _error_rows(mine)
+            rows += _error_rows(its)
     return rows, notes
 
 

@@ -6,7 +6,7 @@ gives never depends on the worker.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,17 @@ import numpy as np
 
 from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.source_file import absolute
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
-from dsa_des.scene.overrides import SWAP, apply_changes
+from dsa_des.scene.overrides import SWAP, apply_changes, read_sets
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
 from dsa_des.studies.study_tables import existing_file
+from dsa_des.text.safe_text import shell_line
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ class Study:
     requirements: tuple[Requirement, ...] = ()
     #: The result that weighs units where events are compared.
     compare_weight: str | None = None
+    #: The command line that runs it again, whatever was changed of its file.
+    repeat: str = ""
 
     @property
     def _sizes(self) -> tuple[int, ...]:
@@ -189,6 +193,14 @@ def set_text(value: Any) -> str:
 
         return inline(value)
     return as_text(value)
+
+
+def command_of(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:
+    """Return the command line that runs files with the same ``--set`` from any folder."""
+    every = ["dsa-des", *words]
+    for key, value in read_sets(sets)[0]:
+        every += ["--set", f"{key}={set_text(absolute(value) if SWAP in key else value)}"]
+    return shell_line([*every, *(str(path.resolve()) for path in paths)])
 
 
 def changed_scene(

@@ -17,7 +17,7 @@ from dsa_des.results.record import FigureRecord, Requirement, StopWhen
 from dsa_des.scene.checks import check_lookalikes, read_table
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key, flat
-from dsa_des.scene.overrides import apply_sets, read_sets
+from dsa_des.scene.overrides import SWAP, apply_sets, read_sets
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
@@ -174,10 +174,16 @@ class _StudyReader:
             sound = {key: value for key, value in self.data.items() if key not in wrong}
             keys = StudyKeys.model_validate(sound)
         check_lookalikes(self.file, (), self.data, keys)
+        for key, value in flat(keys.set).items():
+            if key.startswith(SWAP):
+                self.file.report(
+                    ("set", key), f"types are changed in [swap]: {key[5:]} = ...", value
+                )
         return keys
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        return (*self._sets, *flat(self.keys.set).items())
+        values = {k: v for k, v in flat(self.keys.set).items() if not k.startswith(SWAP)}
+        return (*self._sets, *values.items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
         named = [

@@ -1,6 +1,7 @@
 """Alert levels in scenes: from the truth, from fused rows and from tracks."""
 
 import math
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,10 @@ import crooked
 import numpy as np
 import pytest
 from covering import covers
+from same_runs import replicas_of, same_as_alone, same_in_any_window
 from wired import HEARS_ALL, chain, rows, run
 
+import dsa_des
 from components.alerting.daidalus import DaidalusAlerting
 from dsa_des.errors import SceneError
 
@@ -146,6 +149,45 @@ def test_a_flight_is_forgotten_when_its_positions_are_old(tmp_path):
         return max(row["time_s"] for row in rows(run(gone), "alerts"))
 
     assert (last(0.9), last(2.4)) == (2.5, 3.5 + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("keys", "begins_s"),
+    [({"scan_rate_hz": "1/4"}, 4.0), ({"scan_rate_hz": 1, "fit_s": 0.1}, 1.0)],
+)
+def test_the_last_two_poses_count_however_far_apart_they_are(tmp_path, keys, begins_s):
+    """Of the truth at its own slow clock it knows no more; it once judged nothing, and said so
+    nowhere."""
+    alone = scene(tmp_path, duration_s=9, **keys)
+    alone["blocks"] = {name: alone["blocks"][name] for name in ("traffic", "alerting")}
+    alone["wires"] = ["traffic -> alerting"]
+    found = rows(run(alone), "alerts")
+    step_s = 1 / float(Fraction(keys["scan_rate_hz"]))
+    assert [row["time_s"] for row in found] == np.arange(begins_s, 9, step_s).tolist()
+    for row in found:
+        state = truth(row["time_s"])
+        assert row["level"] == 1
+        if (wanted := max(entry_s(state, 900.0), 0.0)) > 0.5:
+            assert row["time_to_level_1_s"] == pytest.approx(wanted, rel=0.03)
+
+
+def test_a_flight_known_from_a_slow_sensor_is_carried_on_until_its_next_look(tmp_path):
+    """A radar at 0.25 Hz lets it be known from its second look on; one that is not renewed is
+    forgotten after as long as there was between the last two."""
+
+    def times(**target: Any) -> list[float]:
+        slow = scene(tmp_path, "fusion -> alerting", duration_s=16, scan_rate_hz=1)
+        slow["blocks"]["radar"]["scan_rate_hz"] = "1/4"
+        slow["blocks"]["traffic"]["intruders"] = [{**TARGET, **target}]
+        loaded = dsa_des.load_scene(slow)
+        if not target:
+            same_as_alone(replicas_of(loaded, {}, {"blocks.radar.offset_s": 0.7}))
+        alerts = same_in_any_window(loaded)["alerts"]
+        return list(alerts["time_s"].to_pylist())
+
+    assert times() == [float(t) for t in range(4, 16)]
+    assert times(end_time_s=5.0) == [4.0, 5.0, 6.0, 7.0, 8.0]
+    assert times(end_time_s=3.0) == []
 
 
 @pytest.mark.parametrize("wires", [(), ("fusion -> alerting",), ("tracker -> alerting",)])

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import mpmath
@@ -17,6 +18,7 @@ from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
 from dsa_des.commands import cost
 from dsa_des.commands.cost import ladders_to_climb
+from dsa_des.costs import replay
 from dsa_des.costs.climb import climb
 from dsa_des.costs.replay import run_rung
 from dsa_des.costs.variants import Choice, Variants
@@ -56,6 +58,49 @@ def test_who_waits_is_told_what_is_measured(monkeypatch, capsys):
     cost.CostProgress(silent=True).say("nothing")
     cost.CostProgress(silent=False).say("at once")
     assert capsys.readouterr() == ("", "at once\n")
+
+
+def test_ladders_are_printed_as_they_come_and_ctrl_c_keeps_them(tmp_path, monkeypatch):
+    """The second ladder is interrupted: the first is printed, written and kept."""
+    begun = []
+
+    def interrupted(variants, name, ladder, **options):
+        begun.append(ladder.name)
+        if len(begun) == 2:
+            raise KeyboardInterrupt
+        return climb(variants, name, ladder, **options)
+
+    monkeypatch.setattr(cost, "climb", interrupted)
+    out = tmp_path / "out"
+    done = call("cost", str(SCENE), "--duration", "4", "--repeats", "1", "--block", "transform",
+                "--out", out)  # fmt: skip
+    assert done.exit_code == 130, done.output
+    # What is foreseen stands first; the table before the word that it was stopped.
+    first, foreseen = done.stderr.splitlines()[0], done.stdout
+    assert re.match(r"about \d+ s: 5 runs of .* s and \d+ s of timing, if each model", first)
+    assert "transform, earth: errors in direction" in foreseen and "flat_earth" in foreseen
+    assert "stopped: interrupted; 1 of 2 ladders are kept" in done.stderr
+    found = {row["ladder"] for row in pq.read_table(out / "cost.parquet").to_pylist()}
+    assert found == {"earth"} and (out / "cost.png").exists()
+
+
+def test_ctrl_c_before_the_first_ladder_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(cost, "climb", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    out = tmp_path / "out"
+    done = call("cost", str(SCENE), "--duration", "4", "--block", "radar", "--out", out)
+    assert done.exit_code == 130 and done.stdout == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_scene_itself_is_run_once_for_all_ladders(tmp_path, monkeypatch):
+    """Ladders of five and two rungs, of which one each is the scene's: five other runs."""
+    runs = []
+    own = replay.Simulation.run
+    monkeypatch.setattr(replay.Simulation, "run", lambda self: runs.append(1) or own(self))
+    short = ("--duration", "2", "--repeats", "1", "--json", "--out", tmp_path / "out")
+    done = call("cost", str(SCENE), *short, "--block", "transform")
+    assert done.exit_code == 0, done.output
+    assert len(runs) == 1 + 4 + 1
 
 
 def test_rows_and_files(rows):

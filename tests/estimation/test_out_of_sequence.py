@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from components.estimation.carried_errors import MotionWithErrors
 from components.estimation.kalman import innovation, updated
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, predict
 from components.estimation.out_of_sequence import retrodiction, retrodiction_by_motion
@@ -84,6 +85,35 @@ def test_before_all_that_was_known_it_is_what_both_instants_say_together(model):
     says[size:] += np.linalg.solve(now[1][..., 0], state)
     wanted = np.linalg.solve(whole, says)[size:], np.linalg.inv(whole)[size:, size:, np.newaxis]
     assert apart(found, wanted) < 1e-7
+
+
+def test_errors_that_are_forgotten_were_as_large_before_all_that_was_known():
+    """The same by the information of both instants, errors new at each of them included."""
+    lasts_s, since = (300.0, 5.0, 0.0, 1e9), np.array([1.3])
+    model = MotionWithErrors(ConstantVelocity(3.0), lasts_s)
+    size, kept = model.size, np.exp(-1.3 / np.array([300.0, 5.0, 1e-9, 1e9]))
+    here, there = RNG.normal(size=(2, 12, size))  # what is measured now and then, by the states
+    seen_here, seen_there = RNG.normal(size=(2, 12, 1)) * 5.0
+    before = np.diag([0.0] * 6 + [1.0] * 4)  # of errors alone something is known
+    first = before + here.T @ here
+    state = np.linalg.solve(first, here.T @ seen_here)
+    now = state, np.linalg.inv(first)[:, :, np.newaxis]
+    then = retrodiction_by_motion(model, now, since)
+    root = there[:, :, np.newaxis]
+    known = np.einsum("mdn,dn->mn", root, then.state)
+    what = innovation(known, root, then.covariance, np.ones((12, 1)))
+    found = then.carried_over(*now, *updated(then.state, then.covariance, what, seen_there - known))
+
+    moves, noise = np.eye(size), np.diag([1.0] * 6 + list(1.0 - kept**2))
+    moves[:3, 3:6], moves[range(6, size), range(6, size)] = 1.3 * np.eye(3), kept
+    noise[:6, :6] = ConstantVelocity(3.0).noise(since)[..., 0]
+    steps = np.hstack([moves, -np.eye(size)])
+    whole = steps.T @ np.linalg.solve(noise, steps)
+    whole[:size, :size] += before + there.T @ there
+    whole[size:, size:] += here.T @ here
+    says = np.concatenate([there.T @ seen_there, here.T @ seen_here])
+    wanted = np.linalg.solve(whole, says)[size:], np.linalg.inv(whole)[size:, size:, np.newaxis]
+    assert apart(found, wanted) < 1e-6
 
 
 def test_with_noise_and_several_since_it_is_near_and_stays_positive():

@@ -208,12 +208,6 @@ def test_csv_iso_times_and_attitude(tmp_path):
     assert file.intruders[0].interval_present() == (1.0, 1.0)
 
 
-def test_csv_rows_without_a_position_are_skipped(tmp_path):
-    file = read_csv(write(tmp_path, CSV + "3,a,,,\n", "s.csv"))
-    assert file.ownship.interval_present() == (0.0, 2.0)
-    assert "1 rows without a position were skipped" in file.notes
-
-
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(st.data())
 def test_damaged_files_give_the_one_error_or_a_whole_result(tmp_path_factory, data):

@@ -10,21 +10,24 @@ from components.formats.text_rows import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
 FOOT, MILE, HOUR = Fraction("0.3048"), Fraction(1852), Fraction(3600)
 LENGTHS = {
     "m": 1, "metre": 1, "metres": 1, "meter": 1, "meters": 1, "km": 1000, "ft": FOOT, "foot": FOOT,
-    "feet": FOOT, "nmi": MILE, "nm": MILE,
+    "feet": FOOT, "nmi": MILE, "nm": MILE, "cm": Fraction(1, 100), "mm": Fraction(1, 1000),
 }  # fmt: skip
 SPEEDS = {
     "m/s": 1, "mps": 1, "km/h": 1000 / HOUR, "kph": 1000 / HOUR, "kmh": 1000 / HOUR,
     "knot": MILE / HOUR, "knots": MILE / HOUR, "kn": MILE / HOUR, "kt": MILE / HOUR,
     "kts": MILE / HOUR, "nmi/h": MILE / HOUR, "nmi/s": MILE, "fpm": FOOT / 60, "ft/min": FOOT / 60,
-    "ft/s": FOOT, "fps": FOOT,
+    "ft/s": FOOT, "fps": FOOT, "mph": 5280 * FOOT / HOUR, "mi/h": 5280 * FOOT / HOUR,
+    "cm/s": Fraction(1, 100),
 }  # fmt: skip
 ANGLES = {
     **dict.fromkeys(("deg", "degree", "degrees"), 1.0),
+    **dict.fromkeys(("1e-7deg", "dege7"), 1e-7),
     **dict.fromkeys(("rad", "radian", "radians"), math.degrees(1.0)),
 }
 TIMES = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1), "ms": Fraction(1, 1000), "min": 60,
-    "h": HOUR, "hr": HOUR,
+    "h": HOUR, "hr": HOUR, "us": Fraction(1, 10**6), "µs": Fraction(1, 10**6),
+    "ns": Fraction(1, 10**9),
 }  # fmt: skip
 
 

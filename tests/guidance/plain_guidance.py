@@ -6,6 +6,8 @@ import struct
 import numpy as np
 
 REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
+#: A volume that nobody meets.
+NOTHING = ("cylinder", 0.0, 0.0, 0.0, 0.0)
 
 
 def near(a, b, apart=16348, tiny=1e-13):
@@ -67,6 +69,13 @@ def conflict(volume, own, other, begin, end):
             return False
         first, last = max(0.0, first), min(room, ring[1])
     return low + first < low + last and not near(low + first, low + last)
+
+
+def meets(volume, own, other, begin, start, end):
+    """Tell whether flights meet a volume from `begin` or `start` on, at `end` if that is when."""
+    if begin == end >= start:
+        end += 1e-7 * max(1.0, end)
+    return conflict(volume, own, other, max(begin, start), end)
 
 
 class Plain:
@@ -133,7 +142,7 @@ class Plain:
         if self.kind == "alt":
             return [self.altitude_red(t, volume, other, begin, horizon, keep) for t in self.at]
         step_s, ahead, found = self.step / self.rate, self.ahead, {}
-        until = min(ahead, begin)
+        until = min(ahead, begin, horizon)
         for side, most in ((-1, self.down), (1, self.up)):
             lost = False
             for k in range(most + 1):
@@ -144,7 +153,7 @@ class Plain:
                     lost |= conflict(volume, own, other, time_s, time_s + step_s)
                 if keep and k <= math.floor(until / step_s):
                     lost |= conflict(keep, own, other, time_s, time_s + step_s)
-                bad = conflict(volume, own, other, max(begin, time_s), self.end(horizon, time_s))
+                bad = meets(volume, own, other, begin, time_s, self.end(horizon, time_s))
                 if keep and self.from_now and time_s > horizon:
                     bad |= conflict(keep, own, other, 0.0, horizon)
                 elif keep:
@@ -192,7 +201,7 @@ class Plain:
             due = time_s <= horizon or not self.from_now
             if due and time_s >= begin and inside(volume, time_s):
                 return True
-            if keep and time_s <= begin and inside(keep, time_s):
+            if keep and time_s <= min(begin, horizon) and inside(keep, time_s):
                 return True
         for start_s, end_s in ((t1, t2), (t3 + 1, math.inf)):
             own, last = flight(start_s), min(end_s, ahead)
@@ -202,9 +211,9 @@ class Plain:
             if start_s >= ahead:
                 continue
             end_s = min(self.end(horizon, start_s), last)
-            if conflict(volume, own, other, max(begin, start_s), end_s):
+            if meets(volume, own, other, begin, start_s, end_s):
                 return True
-            if keep and conflict(keep, own, other, start_s, min(begin, last)):
+            if keep and conflict(keep, own, other, start_s, min(begin, horizon, last)):
                 return True
         return False
 
@@ -307,9 +316,14 @@ class Plain:
 
         def clear_of(what, begin=0.0, keep=None):
             red = [False] * len(self.at)
-            for other in others:
-                each = self.red(what, other, begin, ahead, keep)
-                red = [a or b for a, b in zip(red, each, strict=True)]
+            for other, horizon in others:
+                every = [self.red(what, other, begin, horizon, keep)]
+                if begin > horizon:  # only the cylinder, as far as the horizon
+                    every = [
+                        self.red(keep, other, 0.0, horizon),
+                        self.red(NOTHING, other, horizon, horizon, keep),
+                    ]
+                red = [any(each) for each in zip(red, *every, strict=True)]
             return self.intervals(red)
 
         if not clear_of(("cylinder", *nmac, 0, 0)):
@@ -342,14 +356,14 @@ class Plain:
                 return layers, (-math.inf, shrinks)
 
     def those_of(self, level, others, early, number):
-        """Return the intruders whose corrective volume counts."""
+        """Return the intruders whose corrective volume counts, each with its horizon."""
         _, volume, usual, earlier = level
         found = []
         for other, on in zip(others, early, strict=True):
-            due = earlier if on == number else usual
+            due, horizon = earlier if on == number else usual, min(usual, self.ahead)
             ahead = conflict(volume, self.own, other, 0.0, self.ahead)
-            if (ahead and self.begins_before(volume, other, due)) or any(
-                self.soon(volume, other, min(usual, self.ahead))
-            ):
-                found.append(other)
+            if ahead and self.begins_before(volume, other, due):
+                found.append((other, self.ahead))
+            elif any(self.soon(volume, other, horizon)):
+                found.append((other, horizon))
         return found

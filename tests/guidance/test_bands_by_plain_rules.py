@@ -33,10 +33,11 @@ LEVELS = [
     ("MID", ("modified_tau", 850.0, 130.0, 21.0, 0.0), 44.0, 59.0),
     ("NEAR", ("time_to_closest", 640.0, 105.0, 13.0, 4.0), 25.0, 37.0),
 ]
-ALERTER = Alerter(
-    "plain",
-    tuple(Level(Volume(*v[1:], v[0]), region, t, early) for region, v, t, early in LEVELS),
-)
+
+
+def alerter_of(levels):
+    made = (Level(Volume(*v[1:], v[0]), region, t, early) for region, v, t, early in levels)
+    return Alerter("plain", tuple(made))
 
 
 def drawn(random, within_s=70.0):
@@ -54,14 +55,15 @@ def drawn(random, within_s=70.0):
     return own, others, random.integers(0, 4, 2).tolist()
 
 
-def compare(kind, values, draws):
+def compare(kind, values, draws, levels=LEVELS):
     """Compare our bands with the plain ones between all places they could end."""
-    configuration = Configuration((ALERTER,), values, {})
+    alerter = alerter_of(levels)
+    configuration = Configuration((alerter,), values, {})
     own = State(*np.array([one[0] for one in draws]).T)
     intruders = [
         GuidedIntruders(
             State(*np.array([one[1][n] for one in draws]).T),
-            ALERTER,
+            alerter,
             np.array([one[2][n] for one in draws]),
         )
         for n in (0, 1)
@@ -70,7 +72,7 @@ def compare(kind, values, draws):
     found = guidance_of_many(kind, configuration, own, intruders)
     for guided, (state, others, early) in zip(found, draws, strict=True):
         plain = Plain(kind, values, state)
-        layers, recovery = plain.layers(LEVELS, others, early)
+        layers, recovery = plain.layers(levels, others, early)
         if recovery is None:
             assert guided.recovery is None
         else:
@@ -133,3 +135,27 @@ def test_horizons_may_count_from_now(kind):
     for from_now in (True, False):
         seen = compare(kind, {**values, "bands_add_time_to_maneuver": from_now}, draws)
         assert any(recovery and recovery[0] > 0 for _, recovery in seen)
+
+
+def beside(random):
+    """Return an ownship, one that comes straight at it, and one that flies beside it."""
+    own, others, _ = drawn(random, within_s=25.0)
+    track = math.atan2(own[3], own[4]) + random.choice([-1.0, 1.0]) * math.pi / 2
+    way_m = random.uniform(900.0, 2200.0)
+    aside = np.array([way_m * math.sin(track), way_m * math.cos(track), random.normal(0.0, 130.0)])
+    drift = random.normal(0.0, 6.0, 3) * np.array([1.0, 1.0, 0.3])
+    others[1] = [*(np.array(own[:3]) + aside), *(np.array(own[3:]) + drift)]
+    return own, others, [0, 0]
+
+
+@pytest.mark.parametrize("from_now", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_is_met_only_by_manoeuvres_counts_in_recovery_up_to_its_alerting_time(kind, from_now):
+    """It was counted up to the lookahead: our way out was down where the reference has it up."""
+    random = np.random.default_rng(22)
+    values = {**VALUES, "bands_add_time_to_maneuver": from_now, "min_vertical_recovery": 60.0}
+    levels = [(region, v, 0.4 * t, 0.5 * early) for region, v, t, early in LEVELS]
+    seen = compare(kind, values, [beside(random) for _ in range(24)], levels)
+    ways = [recovery for _, recovery in seen if recovery is not None]
+    assert any(0 < time_s < 17.6 for time_s, _ in ways)
+    assert any(time_s > 17.6 for time_s, _ in ways)

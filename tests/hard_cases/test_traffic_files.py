@@ -335,7 +335,7 @@ CSV = "time,id,lat,lon,alt\n0,a,45,-75,1000\n0,b,45.1,-75,1000\n1,a,45,-75,1000\
 CSV_REFUSED = [
     ("truncated row", "contract", CSV + "2,a,45\n", "line 5: the row has 3 values"),
     ("non-numeric", "contract", CSV + "2,a,45,-75,FL100\n", "line 5, column alt: 'FL100' is not"),
-    ("NaN", "contract", CSV + "2,a,nan,-75,1\n", "line 5, column lat: 'nan' is not finite"),
+    ("infinity", "contract", CSV + "2,a,inf,-75,1\n", "line 5, column lat: 'inf' is not finite"),
     ("duplicate time", "contract", CSV + "1,a,45,-75,1\n", "line 5, column time: a already has"),
     (
         "one aircraft",

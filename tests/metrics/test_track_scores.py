@@ -69,27 +69,33 @@ def test_identities_break_and_swap():
 LIMIT = 100.0
 
 
-def told(time_s, tracks, confirmed_s=0.0):
-    """Tracks as they are told: number → (north, east, down), at rest, with unit covariance."""
+def told(time_s, tracks, true, since_s=0.0):
+    """Tracks as they are told: number → (north, east, down), at rest, with unit covariance.
+
+    What was reported `since_s` ago has been compared before, and was 7 m farther north.
+    """
     state = np.zeros((6, len(tracks)))
     for k, place in enumerate(tracks.values()):
         state[:3, k] = place
+    before = state + np.array([7.0, 0, 0, 0, 0, 0])[:, np.newaxis] * (since_s > 0.0)
     return ReportedTracks(
-        time_s, np.array(list(tracks), dtype=np.int64), state,
+        time_s, np.array(list(tracks), dtype=np.int64), state - true, before - true,
         np.repeat(np.eye(6)[np.newaxis], len(tracks), axis=0),
-        np.full(len(tracks), confirmed_s),
+        np.full(len(tracks), since_s == 0.0), np.zeros(len(tracks)),
     )  # fmt: skip
 
 
-def tallied(steps, targets=2, velocity=(0.0, 0.0, 0.0), step_s=1.0):
-    """Steps of (tracks, targets that are there), a second apart."""
+def tallied(steps, targets=2, velocity=(0.0, 0.0, 0.0), step_s=1.0, since_s=()):
+    """Steps of (tracks, targets that are there), a second apart, told some time before."""
     tally = TrackTally(LIMIT, 2.0, step_s)
     for k, (tracks, places) in enumerate(steps):
         true = np.zeros((targets, 6, len(tracks)))
         for target, place in places.items():
             true[target, :3] = np.array(place, dtype=float)[:, np.newaxis]
             true[target, 3:] = np.array(velocity)[:, np.newaxis]
-        tally.add(told(k + 1.0, tracks), true, np.array(sorted(places), dtype=np.int64))
+        before_s = since_s[k] if since_s else 0.0
+        present = np.array(sorted(places), dtype=np.int64)
+        tally.add(told(k + 1.0, tracks, true, before_s), present)
     return tally
 
 
@@ -132,6 +138,24 @@ def test_scores_of_a_small_run_by_hand():
     assert got["track_confirmation_s"] == pytest.approx(1.0 - 0.5)
     assert got["track_confirmation_from_coverage_s"] == pytest.approx((1.0 + 3.0) / 2)
     assert got["track_confirmed_share"] == 1.0
+
+
+def test_instants_without_a_track_count_and_reports_that_stand_are_new_once():
+    """A track for two of eight instants, told once; nobody ever reports the other target."""
+    here, other = (0.0, 0.0, 0.0), (1000.0, 0.0, 0.0)
+    places = {0: here, 1: other}
+    steps = [({}, places)] * 3 + [({1: (3.0, 0, 0)}, places)] * 2 + [({}, places)] * 3
+    tally = tallied(steps, since_s=(0, 0, 0, 0.0, 1.0, 0, 0, 0))
+    got = tally.results(["a", "b"], {}, {}, 8.0)
+    assert got["track_completeness"] == got["track_longest_share"] == 2 / 16
+    assert got["track_gospa_missed_m"] == pytest.approx(
+        (6 * math.sqrt(LIMIT**2) + 2 * math.sqrt(LIMIT**2 / 2)) / 8
+    )
+    with_one = math.sqrt((3.0**2 + LIMIT**2) / 2)
+    assert got["track_ospa_m"] == pytest.approx((6 * LIMIT + 2 * with_one) / 8)
+    # Of what was reported before nothing rests on its covariance again.
+    assert got["track_nees_mean"] == got["track_position_error_m"] ** 2 == 9.0
+    assert got["track_positional_accuracy_m"] == 3.0 and len(tally.nees) == 1
 
 
 def test_who_is_covered_and_gets_no_track_counts():

@@ -1,13 +1,16 @@
 """``dsa-des study report``: one page that holds all and loads nothing."""
 
+import html
 import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
+from dsa_des.results.folder import StudyFolder
 
 ROOT = Path(__file__).parents[2]
 STUDY = """\
@@ -120,3 +123,83 @@ def test_a_strangers_words_are_text(folder: Path) -> None:
     call("report", folder, "--no-figures")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "<script" not in page and "&lt;script&gt;" in page and "<img src=x" not in page
+
+
+def test_the_page_s_command_repeats_what_was_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With --replicas, --seed, --set and --swap of the command line, from any folder."""
+    scene = ROOT / "configs" / "first_light.toml"
+    plain = (
+        STUDY.replace("SCENE", str(scene)).replace("[draws]", "[draws.none]").partition("[draws")
+    )
+    (tmp_path / "my study.toml").write_text(plain[0], encoding="utf-8")
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path)
+    done = call("my study.toml", "--out", "out", "--workers", 1, "--quiet", "--no-figures",
+                "--replicas", 2, "--seed", 7, "--swap", "radar=radar.range_boundary",
+                "--set", "set.blocks.radar.range_km=5.5", "--set", "set.duration_s=3")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    call("report", "out", "--no-figures")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    commands = html.unescape(page.partition("To repeat it</h2><pre>")[2].partition("</pre>")[0])
+    program, *words = shlex.split(commands.splitlines()[0])
+    assert program == "dsa-des" and words[0] == "study"
+    monkeypatch.chdir(tmp_path / "other")
+    again = call(*words[1:], "--out", "again", "--workers", 1, "--quiet", "--no-figures")
+    assert again.exit_code == 0, again.output
+    parts = [sorted((home / "parts").glob("*.parquet")) for home in
+             (tmp_path / "out", tmp_path / "other" / "again")]  # fmt: skip
+    assert len(parts[0]) == len(parts[1]) > 0
+    for one, other in zip(*parts, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_a_run_of_linked_types_is_repeated_by_its_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = ROOT / "configs" / "first_light.toml"
+    Path("s.toml").write_text(f"""\
+scene = "{scene}"
+metrics = ["first_detection"]
+[set]
+duration_s = 2
+[axes.radar]
+values = ["a", "b"]
+set.swap.radar = ["radar.range_boundary", "radar.range_boundary"]
+set.blocks.radar.range_km = [3, 20]
+""", encoding="utf-8")  # fmt: skip
+    done = call("s.toml", "--out", "out", "--workers", 1, "--quiet", "--no-figures")
+    assert done.exit_code == 0, done.output
+    record = StudyFolder(Path("out")).record
+    command = record.command({"seed": 1, "cell": 1})
+    assert "--swap radar=radar.range_boundary --set duration_s=2" in command
+    words = shlex.split(command)[1:]
+    run = CliRunner().invoke(main, [*words, "--no-figures", "--out", "run"])
+    assert run.exit_code == 0, run.output
+
+
+def test_a_type_is_no_value_of_a_key(tmp_path: Path) -> None:
+    scene = ROOT / "configs" / "first_light.toml"
+    text = (
+        f'scene = "{scene}"\nmetrics = ["first_detection"]\n[set]\nswap.tracker = "tracking.ekf"\n'
+    )
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    done = call(tmp_path / "s.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 2 and not (tmp_path / "out").exists()
+    assert "types are changed in [swap]: tracker = ..." in done.stderr
+
+
+def test_errors_of_models_are_measured_on_request_only(tmp_path: Path) -> None:
+    """A study of many runs measures none by itself, and one of few says which it is at."""
+    scene = ROOT / "configs" / "first_light.toml"
+    text = f'scene = "{scene}"\nreplicas = 120\nmetrics = ["first_detection"]\n'
+    text += "[set]\nduration_s = 0.2\n"
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    words = (tmp_path / "s.toml", "--workers", 1, "--set", "figures=[]", "--out")
+    assert call(*words, tmp_path / "many").exit_code == 0
+    assert not (tmp_path / "many" / "errors.json").exists()
+    assert call(*words, tmp_path / "few", "--replicas", 1, "--measure").exit_code == 0
+    rows = json.loads((tmp_path / "few" / "errors.json").read_text(encoding="utf-8"))["rows"]
+    assert {"earth", "detection"} <= {row["ladder"] for row in rows}

@@ -147,6 +147,64 @@ def test_removing_what_is_not_there_is_an_error(write):
     )
 
 
+WIRED = """
+wires = ["traffic -> transform -> gate -> radar", "gate -> eye",
+         { from = "radar.detections", to = "fusion", delay_s = 0.2 },
+         { from = "eye", to = "fusion", drop_probability = 7 },
+         "traffic -> transform -> gate -> eye -> fusion -> tracker"]
+[blocks]
+traffic = { type = "traffic.random" }
+transform = { type = "geometry.ellipsoid" }
+gate = { type = "gate" }
+radar = { type = "radar.range_boundary" }
+eye = { type = "optical.range_boundary" }
+fusion = { type = "fusion.pick_best" }
+tracker = { type = "tracking.stub" }
+"""
+
+
+@pytest.mark.parametrize("text", ['blocks.remove = ["eye"]', 'remove = ["blocks.eye"]'])
+def test_the_wires_of_a_block_that_is_left_out_go_with_it(write, tmp_path, text):
+    """What is left of a chain stays: by hand, hop by hop. Sources of keys move with their wires."""
+    (tmp_path / "base.toml").write_text(WIRED)
+    file = read_scene_file(write(text))
+    assert "eye" not in file.data["blocks"]
+    assert file.data["wires"] == [
+        "traffic -> transform -> gate -> radar",
+        {"from": "radar.detections", "to": "fusion", "delay_s": 0.2},
+        "traffic -> transform -> gate",
+        "fusion -> tracker",
+    ]
+    assert {key for key in file.sources if key[:1] == ("wires",)} == {
+        ("wires",), *(("wires", k) for k in range(4)),
+        *(("wires", 1, key) for key in ("from", "to", "delay_s")),
+    }  # fmt: skip
+
+
+def test_own_wires_of_a_block_that_is_left_out_are_an_error(write, tmp_path):
+    (tmp_path / "base.toml").write_text(WIRED)
+    path = write('wires = ["traffic -> transform -> gate -> eye"]\nblocks.remove = ["eye"]')
+    with pytest.raises(SceneError, match="the scene has no block 'eye'"):
+        load_scene(path)
+
+
+def test_a_block_that_is_left_out_and_given_anew_keeps_its_wires(write, tmp_path):
+    (tmp_path / "base.toml").write_text(WIRED)
+    anew = 'blocks.remove = ["eye"]\nblocks.eye = { type = "radar.range_boundary" }'
+    assert read_scene_file(write(anew)).data["wires"][1] == "gate -> eye"
+
+
+def test_a_block_of_the_base_without_a_wire_is_said_once_and_how_to_leave_it_out(write, tmp_path):
+    path = write('wires = ["traffic -> transform"]')
+    with pytest.raises(SceneError) as refused:
+        load_scene(path)
+    assert [str(problem) for problem in refused.value.problems] == [
+        f"{tmp_path / 'base.toml'}: blocks.radar: input 'targets' (RelativeTargets) is required "
+        'and has no wire; wire it, or leave the block out: blocks.remove = ["radar"]'
+    ]
+    assert set(load_scene(write('blocks.remove = ["radar"]')).blocks) == {"traffic", "transform"}
+
+
 def test_items_of_lists_are_removed_and_changed_by_name(write):
     path = write('[blocks.traffic.intruders]\nremove = ["head_on"]\n"N12.3 [b]".east_m = 7\n')
     scene = load_scene(path)

@@ -21,7 +21,8 @@ def test_without_an_extra(): pytest.skip("{reason}")
 def test_an_unexpected_skip_fails_in_ci(reason, ci, code, tmp_path: Path) -> None:
     (tmp_path / "test_any.py").write_text(TESTS.format(reason=reason))
     (tmp_path / "skips.txt").write_text("# allowed\ntest_any.py | raster\n")
-    (tmp_path / "slow.txt").write_text("")
+    for tier in ("slow", "exhaustive"):
+        (tmp_path / f"{tier}.txt").write_text("")
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
     done = warm_process.run(
         ["-m", "pytest", "-q", "-p", "no:cacheprovider", "test_any.py"],

@@ -80,7 +80,7 @@ blocks.eo.offset_s = {{ uniform = [0.03, 0.04] }}
     (row,) = folder.results().to_pylist()
     command = folder.record.command(row)
     seen: list[object] = []
-    monkeypatch.setattr(models, "scene_errors", lambda variants: seen.append(variants)
+    monkeypatch.setattr(models, "scene_errors", lambda variants, report: seen.append(variants)
                         or ([], []))  # fmt: skip
     models.measure_errors(folder)
     (variants,) = seen

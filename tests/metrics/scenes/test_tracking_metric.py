@@ -106,8 +106,70 @@ def test_targets_count_while_they_are_there():
     assert late["track_completeness"] == 1.0
     assert late["track_gospa_missed_m"] == 0.0
     early = measured(both, {"metric": "tracking", "step_s": 0.25})
-    # There for 5 and 13 of what is told, and tracked from the third look on, of 0.5 and 3.25 s.
-    assert early["track_completeness"] == pytest.approx((4 + 11) / 18)
+    # There at 5 and 14 instants, and tracked from the third look on, of 0.5 and 3.25 s.
+    assert early["track_completeness"] == pytest.approx((4 + 12) / 19)
+
+
+LEVEL = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000.0, "heading_deg": 0.0, "speed_mps": 50.0}
+#: Passes the ownship at 600 m, and comes within 1,500 m for 22.9 of 60 s.
+PASSING = {"name": "passing", "north_m": 3600.0, "east_m": 600.0, "up_m": 0.0,
+           "heading_deg": 180.0, "speed_mps": 70.0}  # fmt: skip
+
+
+def seen_for_a_while(*others, range_km=1.5, rate_hz=2):
+    radar = {**RADAR, "range_km": range_km, "scan_rate_hz": rate_hz}
+    return chain(
+        {"radar": radar}, ownship=LEVEL, targets=(PASSING, *others), duration_s=60,
+        fusion={"type": "fusion.pass_through"}, tracker=TRACKER,
+    )  # fmt: skip
+
+
+def test_time_without_a_track_counts():
+    """In range from 18.5 to 41.5 s of 60; nothing is told before and after.
+
+    Confirmed by the third look in range, at 20 s, and, as looks out of range say nothing of it,
+    tracked on until it is deleted.
+    """
+    given = seen_for_a_while()
+    told = [r for r in rows(run(given), "state_tracks") if r["track_status"] != "tentative"]
+    gone_s = next(r["time_s"] for r in told if r["track_status"] == "deleted")
+    assert told[0]["time_s"] == 20.0 and 42.0 <= gone_s < 55.0
+    instants = (gone_s - 20.0) / 0.5
+    found = measured(given, "tracking")
+    assert found["track_completeness"] == pytest.approx(instants / 120)
+    missed_m = 300.0 / math.sqrt(2.0)
+    assert found["track_gospa_missed_m"] == pytest.approx(missed_m * (1 - instants / 120))
+    assert found["track_ospa_m"] == pytest.approx(300.0 * (1 - instants / 120), abs=1.0)
+
+
+def test_between_two_reports_a_track_goes_on_at_its_velocity():
+    """Reported every 2 s, of a target that flies 140 m meanwhile."""
+    keys = {"metric": "tracking", "from_s": 20.0, "within_m": 60.0}
+    found = measured(seen_for_a_while(range_km=20.0, rate_hz=0.5), keys)
+    assert found["track_completeness"] == 1.0 and found["track_spuriousness"] == 0.0
+    assert found["track_ospa_m"] < 15.0 and found["track_positional_accuracy_m"] < 15.0
+
+
+def test_a_target_that_is_never_seen_counts():
+    beyond = {**PASSING, "name": "beyond", "east_m": 9000.0}
+    alone = measured(seen_for_a_while(), "tracking")
+    both = measured(seen_for_a_while(beyond), "tracking")
+    assert both["track_completeness"] == pytest.approx(alone["track_completeness"] / 2)
+    nobody = measured(seen_for_a_while(range_km=0.3), "tracking")
+    assert nobody["track_completeness"] == nobody["track_false_per_hour"] == 0.0
+    assert nobody["track_ospa_m"] == 300.0 and math.isnan(nobody["track_spuriousness"])
+
+
+def test_trackers_side_by_side_are_each_asked_for_their_own():
+    """Two that number their tracks alike and report at different instants of the same target."""
+    both = seen_for_a_while()
+    both["blocks"]["other"] = {**both["blocks"]["radar"], "offset_s": 0.25}
+    both["blocks"]["pass"], both["blocks"]["second"] = {"type": "fusion.pass_through"}, TRACKER
+    both["wires"] += ["gate -> other -> pass -> second"]
+    found = measured(both, "tracking")
+    alone = measured(seen_for_a_while(), "tracking")
+    assert found["track_ambiguity"] == pytest.approx(2.0, abs=0.1)
+    assert found["track_completeness"] == pytest.approx(alone["track_completeness"], abs=0.01)
 
 
 def test_every_replica_has_its_own_tracks_and_first_detections():

@@ -58,6 +58,20 @@ def test_the_ownship_is_the_first_named_or_the_one_told(tmp_path):
     assert_crooked(seen({"type": "traffic.csv", "file": other, "ownship": "own"}))
 
 
+@covers("altitude", of=("traffic.csv",))
+@pytest.mark.parametrize(("altitude", "apart_m"), [(None, 400), ("barometric", 100)])
+def test_one_of_two_altitudes_is_flown(altitude, apart_m, tmp_path):
+    path = tmp_path / "two.csv"
+    path.write_text(
+        "time,id,lat,lon,baro_altitude,geo_altitude\n0,own,0,0,1000,1000\n2,own,0,0,1000,1000\n"
+        "0,other,0,0.0001,1100,1400\n2,other,0,0.0001,1100,1400\n"
+    )
+    traffic = {"type": "traffic.csv", "file": str(path)}
+    found = seen(traffic if altitude is None else traffic | {"altitude": altitude})
+    range_m = math.hypot(apart_m, 6_378_137 * math.radians(0.0001))
+    assert found["other", 0.0]["true_range_m"] == pytest.approx(range_m, abs=0.01)
+
+
 @covers("update_rate_hz", of=("traffic.csv", "traffic.daa_file"))
 @pytest.mark.parametrize("kind", ["traffic.csv", "traffic.daa_file"])
 def test_positions_are_held_between_updates(kind, tmp_path):
