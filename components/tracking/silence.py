@@ -21,12 +21,14 @@ from dsa_des.arrays.types import IntArray
 class Silence:
     """The rows of a wake at which a tracker is awake and no look is worked on.
 
-    They are numbered from 0, those of each run together.
+    They are numbered from 0, those of each run together. Within a second of a look nothing is
+    silent: the next look says as much.
     """
 
     instants: RunTicks  # Of all rows of the wake
     rows: IntArray  # Which of them are silent, ascending
     late_ticks: int  # So much later than it was made a detection may come
+    ticks_per_s: int
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -36,32 +38,26 @@ class Silence:
         """When they are."""
         return self.instants.take(self.rows)
 
-    def before(self, row: IntArray) -> tuple[IntArray, IntArray]:
-        """Return for works at some rows of the wake the silent rows since the work before it.
+    def before(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+        """Return for works at some rows of the wake the silence since the work before it.
 
-        They are those from the first to the second: none where the second is less.
+        It is the silent rows from the first to the second: none where the second is less. `worked`
+        is when the last work of each one's run was, before this wake.
         """
         at = self.instants.take(row)
-        last = last_of_run(self.silent, at)
         order = np.lexsort((row, at.run))
-        first = np.empty_like(last)
-        run, ordered = at.run[order], last[order]
-        first[order[1:]] = ordered[:-1] + 1
-        begins = order[np.append(True, run[1:] != run[:-1])]
-        first[begins] = self._begin(at.run[begins])
-        return first, last
+        run, since = at.run[order], worked.copy()
+        again = run[1:] == run[:-1]
+        since[order[1:][again]] = at.tick[order[:-1][again]]
+        return self._first(at.run, since), last_of_run(self.silent, at)
 
-    def after(self, run: IntArray, row: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the silent rows of some runs (ascending) after the last of some rows."""
-        first, last = self._begin(run), self._begin(run + 1) - 1
-        worked = self.instants.take(row)
-        ends = worked.take(worked.last_of_each)
-        mine = np.searchsorted(run, ends.run)
-        first[mine] = next_of_run(self.silent, ends)
-        return first, last
+    def after(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the silent rows of some runs from their last work on."""
+        ends = next_of_run(self.silent, RunTicks(run + 1, np.zeros_like(run)))
+        return self._first(run, worked), ends - 1
 
-    def _begin(self, run: IntArray) -> IntArray:
-        return next_of_run(self.silent, RunTicks(run, np.zeros_like(run)))
+    def _first(self, run: IntArray, worked: IntArray) -> IntArray:
+        return next_of_run(self.silent, RunTicks(run, worked + self.ticks_per_s))
 
     def ended(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray

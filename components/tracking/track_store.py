@@ -112,7 +112,8 @@ def estimate_columns(estimates: Estimates) -> dict[str, AnyArray]:
 def records_of(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
     """Return what is kept of each run beside its tracks, where it starts at its first look.
 
-    ``own`` is where the ownship was at the last one, in the frame with that ``origin``.
+    ``own`` is where the ownship was at the last one, in the frame with that ``origin``, and
+    ``worked_tick`` is when that came.
     """
     replicas, first = np.unique(replica, return_index=True)
     return KeyedTable(
@@ -121,6 +122,7 @@ def records_of(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
         tick=np.full(len(replicas), np.iinfo(np.int64).min),
         origin=position_deg_m[:, first],
         own=np.zeros((3, len(replicas))),
+        worked_tick=np.zeros(len(replicas), dtype=np.int64),
     )
 
 

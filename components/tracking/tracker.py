@@ -166,12 +166,12 @@ class Tracker(Component):
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what came, look by look, end what fell silent, and report all tracks."""
         busy = wake.without_idle()
-        reported, worked, rows = list[TrackStore](), _NO_ROWS, np.arange(len(wake))
+        reported, worked = list[TrackStore](), _NO_ROWS
         if busy is not None:
             reported, worked = self._looked(busy, wake)
-        silence = Silence(wake.instants, np.delete(rows, worked), self._late_ticks)
+        silence = self._silence(wake, worked)
         if len(self._store) and len(silence):
-            spans = silence.after(self._records.replica, worked)
+            spans = silence.after(self._records.replica, self._records.worked_tick)
             self._store, more = silence.ended(self._store, self._records, *spans)
             reported += more
         rows = np.unique(np.concatenate([worked, *(part.row[:1] for part in reported)]))
@@ -179,6 +179,11 @@ class Tracker(Component):
             return None
         share, errors = self.p.passive_range_share, self._estimator.errors
         return state_tracks(reported, rows, wake, self._sensors, share, errors)
+
+    def _silence(self, wake: Wake, worked: IntArray) -> Silence:
+        """Return the rows of a wake beside those that bring work."""
+        rows = np.delete(np.arange(len(wake)), worked)
+        return Silence(wake.instants, rows, self._late_ticks, self.context.ticks_per_s)
 
     def _looked(self, busy: Wake, wake: Wake) -> tuple[list[TrackStore], IntArray]:
         """Work on the looks that came; return what is reported, and the rows that brought work.
@@ -226,8 +231,10 @@ class Tracker(Component):
         # The row of the wake that each work is of.
         row = plan.row if busy is wake else np.flatnonzero(~wake.idle)[plan.row]
         rows = np.unique(row)
-        silence = Silence(wake.instants, np.delete(np.arange(len(wake)), rows), self._late_ticks)
-        first, last = silence.before(row) if len(silence) and len(row) else (row, row - 1)
+        silence, first, last = self._silence(wake, rows), row, row - 1
+        if len(silence):
+            first, last = silence.before(row, records.worked_tick[plan.of])
+        records.worked_tick[plan.of] = wake.ticks[row]
         for works in turns(plan.of):
             if len(store) and bool((first[works] <= last[works]).any()):
                 asked = records.take(plan.of[works])
