@@ -150,6 +150,11 @@ class Equipage:
         """Standard deviation of each horizontal axis of velocity, m/s."""
         return np.asarray(VELOCITY_RADIUS_M_S[self.nacv] / RADIUS_IN_DEVIATIONS)
 
+    @property
+    def late_s(self) -> FloatArray:
+        """How late positions are that are sent, by what of their latency is not compensated, s."""
+        return self.latency_s - self.compensated_s
+
     @classmethod
     def of(cls, aircraft: Sequence[Any], keys: NDArray[np.uint64]) -> Self:
         """Return the equipage of aircraft; `keys` give addresses to those without their own."""

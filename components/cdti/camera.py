@@ -93,7 +93,7 @@ class CameraSights:
             pixel_rad,
         )
         line = horizon(own_attitude, (azimuth, elevation), _dip_rad(own.alt_m), pixel_rad)
-        strength = camera.p.static_weight * pixels
+        strength = camera.p.static_weight * pixels * float(camera.share(pixels))
         contrast = (margin + camera.detector.threshold) / strength if strength > 0.0 else 0.0
         # A camera that renders what it sees shows just that.
         patches = getattr(camera, "patches", {})

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed
+from components.estimation.batched import product, product_transposed, symmetric, times
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, linearised
@@ -28,8 +28,9 @@ from components.estimation.motion import ConstantVelocity, Motion
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: Which way an error goes: of a position along north or east, and of a velocity; of its height and
-#: of its vertical rate; of the bearing and of the range at which it is seen.
-NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE = range(8)
+#: of its vertical rate; of the bearing and of the range at which it is seen; of a position that is
+#: late, back along the way of its flight.
+NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE, LATENCY = range(9)
 # Position and velocity.
 _MOVING = 6
 # Steeper than this (as a share of the range) a bearing is none.
@@ -96,8 +97,9 @@ class MotionWithErrors:
 class ReportedErrors:
     """The errors of measurements that aircraft report, or of pairs of them with tracks."""
 
-    ways: Sequence[int]  # Which way each error goes (`NORTH` to `RANGE`)
-    deviation: FloatArray  # (errors, n), standard deviation: m, m/s, rad; 0 where there is none
+    ways: Sequence[int]  # Which way each error goes (`NORTH` to `LATENCY`)
+    # (errors, n), standard deviation: m, m/s, rad, s; 0 where there is none
+    deviation: FloatArray
     age_s: FloatArray  # (n,), for how long positions were carried on by the reported velocity
     # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
@@ -108,6 +110,19 @@ class ReportedErrors:
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
         )  # fmt: skip
+
+    @property
+    def considered(self) -> BoolArray | None:
+        """Which components of a state its reports do not correct, (k, n); None for none.
+
+        All that an aircraft reports is late alike, so its reports do not tell by how much: only
+        the errors of linearising would seem to.
+        """
+        if LATENCY not in self.ways:
+            return None
+        late = np.array([way == LATENCY for way in self.ways])
+        own = late[:, np.newaxis] & (self.deviation > 0.0)
+        return np.concatenate([np.zeros((_MOVING, own.shape[1]), dtype=bool), own])
 
     def expected(self, kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
         """Return what would be measured of states with these errors, (m, n)."""
@@ -123,15 +138,17 @@ class ReportedErrors:
         whole[:, :3] = product(slope[:, :3], by_position)
         if slope.shape[1] > 3:
             whole[:, 3:6] = slope[:, 3:6]
-        effect = self._effects(cylinder)
+        if LATENCY in self.ways:
+            whole[:, 3:6] -= whole[:, :3] * self._sum(state, LATENCY)
+        effect = self._effects(state, cylinder)
         whole[:, _MOVING:] = product(slope, effect[: slope.shape[1]])
         return seen, whole
 
-    def effects(self, position_m: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return how errors move reported positions and velocities, (6, errors, n)."""
-        still = np.zeros((_MOVING + len(self.ways), position_m.shape[1]))
-        still[:3] = position_m
-        return self._effects(self._displaced(still, pose)[2])
+    def effects(self, moving: FloatArray, pose: SensorPose) -> FloatArray:
+        """Return how errors move reported positions and velocities (6, n), (6, errors, n)."""
+        state = np.zeros((_MOVING + len(self.ways), moving.shape[1]))
+        state[:_MOVING] = moving
+        return self._effects(state, self._displaced(state, pose)[2])
 
     def _sum(self, state: FloatArray, way: int) -> FloatArray:
         total = np.zeros(state.shape[1])
@@ -148,6 +165,8 @@ class ReportedErrors:
         reported[3] += self._sum(state, SPEED_NORTH)
         reported[4] += self._sum(state, SPEED_EAST)
         reported[5] -= self._sum(state, CLIMB)
+        if LATENCY in self.ways:
+            reported[:3] -= self._sum(state, LATENCY) * state[3:_MOVING]
         height = self._sum(state, HEIGHT)
         reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
         reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
@@ -184,7 +203,7 @@ class ReportedErrors:
             np.where(at, up, -z), np.where(at, distance, far),
         )  # fmt: skip
 
-    def _effects(self, cylinder: tuple[FloatArray, ...]) -> FloatArray:
+    def _effects(self, state: FloatArray, cylinder: tuple[FloatArray, ...]) -> FloatArray:
         cos, sin, level, up, distance = cylinder
         result = np.zeros((_MOVING, len(self.ways), len(cos)))
         for i, (way, deviation) in enumerate(zip(self.ways, self.deviation, strict=True)):
@@ -195,6 +214,8 @@ class ReportedErrors:
                 result[way - SPEED_NORTH, i] = deviation * self.age_s
             elif way == CLIMB:
                 result[5, i], result[2, i] = -deviation, -deviation * self.age_s
+            elif way == LATENCY:
+                result[:3, i] = -deviation * state[3:_MOVING]
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin
@@ -211,41 +232,45 @@ class ReportedErrors:
 class Ages:
     """How old reported positions and velocities are, (n,) each, s; 0 where not reported."""
 
-    position: FloatArray
+    position: FloatArray  # For how long it was carried on
     velocity: FloatArray
     since: FloatArray  # Since the track was last updated: what was new before is in its state
+    late: FloatArray  # How much older a position is than it was carried on for
 
-    def errors(self, model: Motion, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def errors(self, model: Motion, velocity_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return covariances of reported position and velocity, and of the state with it.
 
         Both are (6, 6, n), in m and m/s; of the second one rows are the state's.
+        `velocity_variance` (3, n) is the state's: a late position errs by it too, by the product
+        of two errors, which no derivative has. The one that an aircraft always has makes it go
+        with the velocity's, so it counts as two deviations.
         """
         own = model.model if isinstance(model, MotionWithErrors) else model
-        age, now = self.position, self.velocity
+        carried, now, age = self.position, self.velocity, self.position + self.late
         both = np.minimum(age, now)
         then, reported, common = (own.noise(t) for t in (age, now, both))
         held, gained = (own.noise(np.minimum(self.since, t)) for t in (age, now))
         error, shared = np.zeros((6, 6, len(age))), np.zeros((6, 6, len(age)))
         for i in range(3):
             v = i + 3
-            error[i, i] = then[i, i] - 2.0 * age * (then[i, v] - common[i, v])
-            error[i, i] += age * age * (then[v, v] + reported[v, v] - 2.0 * common[v, v])
-            error[i, v] = common[i, v] - age * (common[v, v] - reported[v, v])
+            together = age * common[v, v] - common[i, v]
+            error[i, i] = then[i, i] - 2.0 * carried * together + carried**2 * reported[v, v]
+            error[i, i] += (2.0 * self.late) ** 2 * velocity_variance[i]
+            error[i, v] = carried * reported[v, v] - together
             error[v, i], error[v, v] = error[i, v], reported[v, v]
-            shared[i, i] = age * (held[i, v] - gained[i, v]) - held[i, i]
-            shared[v, i] = age * (held[v, v] - gained[v, v]) - held[i, v]
+            shared[i, i] = age * held[i, v] - held[i, i] - carried * gained[i, v]
+            shared[v, i] = age * held[v, v] - held[i, v] - carried * gained[v, v]
             shared[i, v], shared[v, v] = -gained[i, v], -gained[v, v]
-        if not isinstance(own, ConstantVelocity):
-            # By how much the model itself has it change: that is not carried back.
-            changed = model.move(state, -now)[3:6] - state[3:6]
-            for i in range(3):
-                error[i, i] += (age * changed[i]) ** 2
-                error[i + 3, i + 3] += changed[i] ** 2
         return error, shared
 
-    def added(self, moments: Moments, model: Motion, state: FloatArray) -> Moments:
+    def added(
+        self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
+    ) -> Moments:
         """Return what is expected of measurements, with what ages add to it."""
-        error, shared = self.errors(model, state)
+        own = model.model if isinstance(model, MotionWithErrors) else model
+        if not isinstance(own, ConstantVelocity):
+            moments = self._turned_back(moments, model, state, covariance)
+        error, shared = self.errors(model, np.stack([covariance[i, i] for i in (3, 4, 5)]))
         slope = np.ascontiguousarray(moments.jacobian[:, :6])
         known = slope.shape[1]
         new = product_transposed(product(slope, error[:known, :known]), slope)
@@ -253,9 +278,41 @@ class Ages:
         both = product(slope, with_state[:known])
         cross = moments.cross.copy()
         cross[:6] += with_state
-        own = new + both.swapaxes(0, 1)
+        own_error = new + both.swapaxes(0, 1)
+        left_over = moments.left_over
         return replace(
-            moments, total=moments.total + own + both, cross=cross,
-            left_over=own if moments.left_over is None else moments.left_over + own,
+            moments, total=moments.total + own_error + both, cross=cross,
+            left_over=own_error if left_over is None else left_over + own_error,
             shared=with_state.swapaxes(0, 1),
+        )  # fmt: skip
+
+    def _turned_back(
+        self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
+    ) -> Moments:
+        """Return what is expected of velocities as they were, and of positions they carried on.
+
+        A target that turns or accelerates had another velocity when it was reported; the moments
+        are those as if it had this one.
+        """
+        carried, now, age = self.position, self.velocity, self.position + self.late
+        off, by_state = np.zeros((6, len(age))), np.zeros((6, len(state), len(age)))
+        off[3:] = model.move(state, -now)[3:6] - state[3:6]
+        off[:3] = model.move(state, -age)[:3] - state[:3] + age * state[3:6] + carried * off[3:]
+        by_state[3:] = model.jacobian(state, -now)[3:6]
+        by_state[:3] = model.jacobian(state, -age)[:3]
+        for i in range(3):
+            by_state[i + 3, i + 3] -= 1.0
+            by_state[i, i] -= 1.0
+            by_state[i, i + 3] += age
+        by_state[:3] += carried * by_state[3:]
+        slope = np.ascontiguousarray(moments.jacobian[:, :6])
+        more = product(slope, by_state)
+        with_state = product_transposed(covariance, more)
+        jacobian = more.copy()
+        jacobian[:, : moments.jacobian.shape[1]] += moments.jacobian
+        both = product(more, moments.cross)
+        total = moments.total + both + both.swapaxes(0, 1) + product(more, with_state)
+        return replace(
+            moments, expected=moments.expected + times(slope, off), total=symmetric(total),
+            cross=moments.cross + with_state, jacobian=jacobian,
         )  # fmt: skip

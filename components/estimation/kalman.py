@@ -20,7 +20,7 @@ from components.estimation.batched import (
     solve_upper,
     symmetric,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # So many tracks are updated at a time: their matrices stay in the processor's cache.
 _TOGETHER = 2048
@@ -40,6 +40,8 @@ class Innovation(Batch):
     spread: FloatArray
     # (m, k, n) or None: Of those errors, the covariance with the state's first k; `cross` has it
     shared: FloatArray | None = None
+    # (k, n) or None: Which of the state's first k are considered and not corrected (Schmidt 1966)
+    considered: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,16 +56,18 @@ class Moments:
     left_over: FloatArray | None = None
     # (m, k, n) or None: As in `Innovation`; then `left_over` has H times it as well, transposed
     shared: FloatArray | None = None
+    considered: BoolArray | None = None  # As in `Innovation`
 
     def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
         """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
-        spread, shared = self.left_over, self.shared
+        spread, shared, considered = self.left_over, self.shared, self.considered
         if which is not None and not is_everything(which, expected.shape[1]):
             expected, total = selected(expected, which), selected(total, which)
             cross, jacobian = selected(cross, which), selected(jacobian, which)
             spread = None if spread is None else selected(spread, which)
             shared = None if shared is None else selected(shared, which)
+            considered = None if considered is None else considered.take(which, axis=-1)
         else:
             total = total.copy()
             spread = None if spread is None else spread.copy()
@@ -73,7 +77,7 @@ class Moments:
                 spread[i, i] += variance[i]
         return Innovation(
             expected, cholesky(total), cross, jacobian, variance if spread is None else spread,
-            shared,
+            shared, considered,
         )  # fmt: skip
 
 
@@ -115,7 +119,13 @@ def _updated(
     moved = state + weighted[0] * apart[0]
     for k in range(1, len(apart)):
         moved += weighted[k] * apart[k]
-    return moved, joseph(covariance, weighted, innovation)
+    spread = joseph(covariance, weighted, innovation)
+    if innovation.considered is not None:
+        # With no gain of their own their covariances with the others are those of the best gain.
+        for i, stays in enumerate(innovation.considered):
+            moved[i] = np.where(stays, state[i], moved[i])
+            spread[i, i] = np.where(stays, covariance[i, i], spread[i, i])
+    return moved, spread
 
 
 def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation) -> FloatArray:

@@ -134,11 +134,11 @@ class TrafficFile:
 class Problems:
     """Collects what is wrong with one file, to be reported at once.
 
-    Its rows are lines of text, unless `of` calls them something else.
+    Its rows are lines of text, unless `of` calls them something else. The first `most` are listed.
     """
 
-    def __init__(self, path: str, of: str = "line") -> None:
-        self.path, self._of = path, of
+    def __init__(self, path: str, of: str = "line", most: int = MOST_PROBLEMS) -> None:
+        self.path, self._of, self._most = path, of, most
         #: Line (infinite for none) and text.
         self._lines: list[tuple[float, str]] = []
         self._more = 0
@@ -147,7 +147,7 @@ class Problems:
         """Note a problem, with its line and column where it has them."""
         where = [f"{self._of} {line}"] if line is not None else []
         where += [f"column {column}"] if column is not None else []
-        if len(self._lines) < MOST_PROBLEMS:
+        if len(self._lines) < self._most:
             text = f"{', '.join(where)}: {problem}" if where else problem
             self._lines.append((math.inf if line is None else line, text))
         else:

@@ -118,14 +118,15 @@ OWN_VELOCITY = {
 #: of what is new in it (m²/s²); the ownship's, where bearings are coarse; standard deviations
 #: (`ToldError`) of the target's position along north and east each (m), its height and the height's
 #: rounding, its vertical rate, its velocity along north and east each (m/s), a bearing (rad), the
-#: delay of a transponder and ranges (m); how long a position was carried on, and the age of the
-#: velocity (s); and the mean square error of all else that is new in the position, along every axis
-#: (m²).
+#: delay of a transponder and ranges (m), and of by how long positions are late (s); how long a
+#: position was carried on, and the age of the velocity (s); and the mean square error of all else
+#: that is new in the position, along every axis (m²).
 TOLD = (
     "north", "east", "down", "north_variance", "east_variance", "down_variance",
     "own_north", "own_east", "own_down", "place_deviation", "height_deviation",
     "rounding_deviation", "climb_deviation", "speed_deviation", "bearing_deviation",
-    "delay_deviation", "range_deviation", "age_s", "velocity_age_s", "white_variance",
+    "delay_deviation", "range_deviation", "latency_deviation", "age_s", "velocity_age_s",
+    "white_variance",
 )  # fmt: skip
 
 

@@ -18,7 +18,9 @@ from components.optical.detection import (
     FAINTEST_PD,
     FrameFalseAlarms,
     detection_probability,
+    filtered_share,
     noise_equivalent_pixels,
+    pixels_of_filtered,
 )
 from components.optical.detector import (
     CameraCalibration,
@@ -45,8 +47,9 @@ class CameraParameters(GlintParameters, SensorParameters):
     elevation_pixels: int = Field(gt=0, description="Pixels from its lower to its upper edge.")
     threshold: float | None = Field(
         default=None,
-        description="Signature needed for a detection (eq. 19); by default 1, or what two of "
-        "noise_equivalent_contrast, false_alarms_per_frame and calibrate say.",
+        description="Signature needed for a detection (eq. 19), of a point if there is noise: a "
+        "target of many pixels needs more; by default 1, or what noise_equivalent_contrast, "
+        "false_alarms_per_frame and calibrate say.",
     )
     cued_threshold: float | None = Field(
         default=None,
@@ -81,9 +84,10 @@ class CameraParameters(GlintParameters, SensorParameters):
     noise_equivalent_contrast: float | None = Field(
         default=None,
         ge=0,
-        description="Contrast gain of a target that stands out by as much as a pixel's noise. By "
-        "default the noise follows from the threshold and false_alarms_per_frame, or calibrate; 0 "
-        "is the thesis's rule: what reaches the threshold is detected, nothing else is.",
+        description="Contrast gain of a target that stands out by as much as a pixel's noise; "
+        "given alone, the threshold follows from 0.0001 false alarms a frame. By default the noise "
+        "follows from the threshold and false_alarms_per_frame, or calibrate; 0 is the thesis's "
+        "rule: what reaches the threshold is detected, nothing else is.",
     )
     calibrate: CameraCalibration | None = Field(
         default=None,
@@ -97,12 +101,13 @@ class CameraParameters(GlintParameters, SensorParameters):
         ge=0,
         le=1e5,
         description="False alarms expected in a frame, from which the noise follows at a given "
-        "threshold, or the threshold at a given noise; by default 0.0001 where noise is not given.",
+        "threshold, or the threshold at a given noise; by default 0.0001 where at most one of "
+        "threshold, noise_equivalent_contrast and calibrate is given.",
     )
     false_alarms: bool | None = Field(
         default=None,
         description="Whether noise is reported too, anywhere in the picture; by default where "
-        "false_alarms_per_frame is given.",
+        "false_alarms_per_frame is given, or two other keys say how many there are.",
     )
     marked_false_alarms: bool = Field(
         default=False,
@@ -143,18 +148,30 @@ class CameraParameters(GlintParameters, SensorParameters):
     @property
     def reports_noise(self) -> bool:
         """Whether there are false alarms in its reports."""
-        if self.false_alarms is None:
-            return bool(self.false_alarms_per_frame)
-        return self.false_alarms
+        if self.false_alarms is not None:
+            return self.false_alarms
+        if self.false_alarms_per_frame is not None:
+            return self.false_alarms_per_frame > 0.0
+        return self.settles_false_alarms
+
+    @property
+    def settles_false_alarms(self) -> bool:
+        """Whether two other keys say how many false alarms there are, few or many."""
+        others = self.threshold, self.noise_equivalent_contrast, self.calibrate
+        if self.noise_equivalent_contrast == 0.0 or others.count(None) != 1:
+            return False
+        return self.threshold is None or self.threshold > 0.0  # else everything is seen
 
 
 class Camera(Sensor):
     """A camera: a target is detected when its signature, as measured, reaches the threshold.
 
     E = a·Q·P + b·V with Q pixels covered, P contrast gain and V the rate of the line of sight
-    (eq. 18). Each look measures E once with Gaussian noise. Confidence is C = sample - threshold,
-    in the unit of the threshold (eq. 19); pixels are those that a target of contrast 1 covers
-    whose signature is the sample. ``looks`` has the pixels that are covered, and Pd.
+    (eq. 18). Each look measures E once with Gaussian noise, as a filter does that fits the target:
+    of Q pixels the share sqrt(s / (s + Q)) counts, in the noise of a point, whose picture takes s
+    pixels (`filtered_share`). Confidence is C = sample - threshold, in the unit of the threshold
+    (eq. 19); pixels are those that a target of contrast 1 covers whose signature is the sample.
+    ``looks`` has the pixels that are covered, and Pd.
     """
 
     Parameters = CameraParameters
@@ -189,8 +206,13 @@ class Camera(Sensor):
     @cached_property
     def detector(self) -> CameraDetector:
         """Its threshold and noise, by what the scene states of them."""
-        spot = noise_equivalent_pixels(self.p.blur_pixels)
-        return settled(self, max(1, round(self.all_pixels / spot)), self._weight * math.sqrt(spot))
+        places = max(1, round(self.all_pixels / self.spot))
+        return settled(self, places, self._weight * math.sqrt(self.spot))
+
+    @cached_property
+    def spot(self) -> float:
+        """Pixels over which the picture of a point is spread."""
+        return noise_equivalent_pixels(self.p.blur_pixels)
 
     @property
     def _weight(self) -> float:
@@ -288,6 +310,7 @@ class Camera(Sensor):
         signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
             signature = signature + added(cells)
+        signature = signature * self.share(pixels)
         threshold = self._threshold_of(cells)
         noise = self.detector.noise
         if not noise:
@@ -302,6 +325,11 @@ class Camera(Sensor):
         if self._says_looks:
             extras["detection_probability"] = detection_probability(signature, threshold, noise)
         return Look(seen, margin, extras, self.signal_of(sample, np.ones(len(cells))))
+
+    def share(self, pixels: FloatArray) -> FloatArray:
+        """Return how much of a signature counts: all, where a camera sees them without noise."""
+        silent = self.p.noise_equivalent_contrast == 0.0
+        return np.ones_like(pixels) if silent else filtered_share(pixels, self.spot)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what is recorded beside a detection: of a measured signature what it says."""
@@ -342,7 +370,7 @@ class Camera(Sensor):
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the angles to the target's centre in the picture."""
-        of_contrast = self._weight * math.sqrt(noise_equivalent_pixels(self.p.blur_pixels))
+        of_contrast = self._weight * math.sqrt(self.spot)
         ratio = signal["contrast"] * (of_contrast / self.detector.noise)
         variance = centroid_variance(signal["pixels"], ratio, self.p.blur_pixels)
         return {
@@ -363,4 +391,6 @@ class Camera(Sensor):
     def signal_of(self, signature: FloatArray, contrast: FloatArray) -> dict[str, FloatArray]:
         """Return the signal of targets that have some signatures by their size alone (eq. 18)."""
         pixels = np.maximum(signature, 0.0) / (self._weight * contrast)
+        if self.p.noise_equivalent_contrast != 0.0:
+            pixels = pixels_of_filtered(pixels, self.spot)
         return {"pixels": np.minimum(pixels, self.all_pixels), "contrast": contrast}

@@ -26,6 +26,7 @@ from components.arguments.checks import (
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.radar.detection.output import false_alarm_count
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
 _NORMAL = NormalDist()
@@ -45,6 +46,25 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
     """
     blur = float(positive("blur_pixels", blur_pixels))
     return 4.0 * math.pi * (blur**2 + _PIXEL_VARIANCE)
+
+
+def filtered_share(pixels: FloatArray, spot: float) -> FloatArray:
+    """Return how much of a target's signature counts, in the noise of a point's picture.
+
+    A filter that fits a target of N pixels lets in the noise of the pixels of its blur and of its
+    own, sqrt(spot + N) of a pixel's in place of sqrt(spot): its signal stands out by that much
+    less. The spread of a compact target adds to that of the blur, as 4 pi times the variance of a
+    disc of N pixels is N; a long and thin one stands out still less.
+    """
+    share: FloatArray = np.sqrt(spot / (spot + pixels))
+    return share
+
+
+def pixels_of_filtered(filtered: FloatArray, spot: float) -> FloatArray:
+    """Return the pixels N of which N times `filtered_share` is so much."""
+    half = filtered * filtered / (2.0 * spot)
+    pixels: FloatArray = half + filtered * np.sqrt(1.0 + half / (2.0 * spot))
+    return pixels
 
 
 def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: ArrayLike) -> Any:
@@ -219,6 +239,8 @@ class FrameFalseAlarms(Effect[Reporting]):
             return Verdict(False, "enabled is false")
         if p.false_alarms is not None:
             return Verdict.of_flag(p, "false_alarms")
+        if p.false_alarms_per_frame is None and p.settles_false_alarms:
+            return Verdict(True, "two other keys say how many there are")
         if p.false_alarms_per_frame is None:
             return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")
         rate = p.false_alarms_per_frame

@@ -119,11 +119,11 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
         rate = alarms or 0.0
         noise = level / _crossed(rate, places) if level > 0.0 and rate > 0.0 else 1.0
         return CameraDetector(level, 0.0, noise, places, rate)
-    if sum(one is not None for one in (threshold, contrast, alarms, known)) < 2:
-        if threshold is None and known is None:
-            threshold = 1.0
-        if contrast is None and alarms is None:
-            alarms = FALSE_ALARMS_PER_FRAME
+    given = sum(one is not None for one in (threshold, contrast, alarms, known))
+    if given == 0 or (given == 1 and alarms is not None):
+        threshold = 1.0
+    if given < 2 and alarms is None:
+        alarms = FALSE_ALARMS_PER_FRAME
     if alarms == 0.0 and threshold is None:
         raise ValueError(
             "false_alarms_per_frame is 0: no threshold is that high; give a rate above 0"
@@ -225,7 +225,7 @@ def known_signature(camera: Any, known: CameraCalibration) -> float:
                 "that band's air is another; give the contrast that is left (calibrate.contrast)"
             )
         contrast = contrast * visibility_transmission(range_m, 1000.0 * known.visibility_km)
-    signature = float((camera.p.static_weight * pixels * contrast)[0])
+    signature = float((camera.p.static_weight * pixels * contrast * camera.share(pixels))[0])
     if signature <= 0.0:
         raise ValueError("calibrate: the target has no signature there, so no Pd but that of noise")
     return signature
@@ -235,8 +235,8 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     """Return a range that no detection of this camera exceeds, m.
 
     The area shown is at most the sum of the bodies' areas and the contrast at most each target's
-    own, so a·Q·P reaches the faintest signature that is ever detected, the threshold less
-    `FAINTEST_DEVIATIONS` of noise, at sqrt(a·A·P / (pixel · faintest)) at the latest (errata 10).
+    own, so a target needs as many pixels at least as give the faintest signature that is ever
+    detected, the threshold less `FAINTEST_DEVIATIONS` of noise (errata 10).
     Infinite where that is not so: where noise alone reaches the threshold more often than that,
     with a rate of the line of sight in the signature, with areas from a table, with effects that
     can add to area or contrast, or with targets that the camera was not told of.
@@ -269,6 +269,10 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         + roster.column(f"{areas}.side_m2")
         + roster.column(f"{areas}.horizontal_m2")
     )
-    gain = camera.p.static_weight * float(np.max(area * roster.column(contrast)))
+    gain = roster.column(contrast)
+    seen = (gain > 0.0) & (area > 0.0) & (camera.p.static_weight > 0.0)
+    if not seen.any():
+        return _MARGIN_M
+    fewest = camera.signal_of(faintest, gain[seen])["pixels"]
     pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
-    return math.sqrt(gain / (pixel * faintest)) * _MARGIN + _MARGIN_M
+    return math.sqrt(float(np.max(area[seen] / fewest)) / pixel) * _MARGIN + _MARGIN_M

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 from components.geometry import angle_between_vectors, body_to_ned, ned_to_body, unit_vector
 from components.geometry import body_angles as angles_of
 from components.messages.detections import EXTRAS, Detections
-from components.optical.detection import noise_equivalent_pixels
 from components.optical.flow import find_spot, opencv, spot_flow
 from components.optical.picture import (
     Pinhole,
@@ -293,8 +292,7 @@ class ImageCamera(ElectroOptical):
     @property
     def pixel_noise(self) -> float:
         """Standard deviation of a pixel's noise, as a contrast."""
-        spot = noise_equivalent_pixels(self.p.blur_pixels)
-        return float(self.detector.noise / (self._weight * math.sqrt(spot)))
+        return float(self.detector.noise / (self._weight * math.sqrt(self.spot)))
 
     def _frame(
         self, scene: "_Scene", corner: IntArray, middle: FloatArray, attitude: Any, which: int

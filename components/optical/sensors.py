@@ -45,8 +45,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
                 * as_camera.pixel_azimuth_rad
                 * as_camera.pixel_elevation_rad
             )
-            weight = as_camera.p.static_weight
-            return {_AREA.name: pixel_m2 * as_camera.detector.threshold / (weight * contrast)}
+            needed = as_camera.signal_of(as_camera.detector.threshold, contrast)["pixels"]
+            return {_AREA.name: pixel_m2 * needed}
 
     else:
 

@@ -18,6 +18,7 @@ from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DEL
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
+from components.tracking.reported_errors import unknown_latency
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
@@ -215,8 +216,9 @@ class StoneSoupTracker(Component):
 
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
-        said = []
-        for name, offer in sorted(sensor_offers(self.context.producers).items()):
+        offers = sensor_offers(self.context.producers)
+        said = unknown_latency(offers)
+        for name, offer in sorted(offers.items()):
             lasting = offer.lasting if isinstance(offer, SensorOffer) else None
             if lasting is None or lasting:
                 what = (

@@ -57,12 +57,16 @@ def in_body(own: OwnBelief, ned: FloatArray) -> tuple[FloatArray, FloatArray, Fl
 
 
 def variances_in_body(
-    own: OwnBelief, ned: FloatArray, variance: tuple[FloatArray, FloatArray, FloatArray]
+    own: OwnBelief,
+    ned: FloatArray,
+    variance: tuple[FloatArray, FloatArray, FloatArray],
+    off_m: FloatArray | None = None,
 ) -> dict[str, FloatArray]:
     """Return the variances of azimuth, elevation and range by column.
 
     `variance` holds those of the position along three directions at right angles, m²: across the
-    line of sight in the horizontal, along it in the horizontal, and vertical.
+    line of sight in the horizontal, along it in the horizontal, and vertical. `off_m` (3, n) is
+    one standard deviation of an error besides, north, east and down.
     """
     ground = np.maximum(np.hypot(ned[0], ned[1]), _NEAREST_M)
     range_m = np.maximum(np.hypot(ground, ned[2]), _NEAREST_M)
@@ -71,7 +75,7 @@ def variances_in_body(
     ahead = np.stack([ned[0] / ground, ned[1] / ground, zero])
     body = [
         np.stack(ned_to_body_unchecked(axis[0], axis[1], axis[2], *own.attitude))
-        for axis in (side, ahead, np.stack([zero, zero, one]))
+        for axis in (side, ahead, np.stack([zero, zero, one]), *(() if off_m is None else (off_m,)))
     ]
     azimuth, elevation, _ = in_body(own, ned)
     level = np.maximum(np.cos(elevation), _LEAST_COS)
@@ -80,7 +84,7 @@ def variances_in_body(
     across = np.stack([-np.sin(azimuth), np.cos(azimuth), zero])
     upward = np.cross(across, along, axis=0)
     turned = [zero, zero, zero]
-    for axis, square in zip(body, variance, strict=True):
+    for axis, square in zip(body, (*variance, one), strict=False):
         for number, direction in enumerate((across, upward, along)):
             turned[number] = turned[number] + (axis * direction).sum(axis=0) ** 2 * square
     return {

@@ -13,6 +13,7 @@ from components.estimation.carried_errors import (
     CLIMB,
     EAST,
     HEIGHT,
+    LATENCY,
     NORTH,
     SPEED_EAST,
     SPEED_NORTH,
@@ -21,11 +22,15 @@ from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, ToldError
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.broadcast import CLIMB_SCALE_M_S, CORRELATION_TIME_S
+from components.surveillance.extended_squitter import (
+    ALTITUDE_STEP_FT,
+    altitude_step_ft,
+    speed_step_kt,
+)
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
-_ALTITUDE_STEP_M2 = (25.0 * FOOT_M) ** 2 / 12.0
 #: What an aircraft without a velocity may have, a deviation; and how much another one changes its
 #: own on the way from a message to a scan, where no filter says so by its own motion.
 _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
@@ -53,6 +58,10 @@ ALTIMETER = ToldError(HEIGHT, "height_deviation", math.inf)
 #: heights are carried on.
 ROUNDING = ToldError(HEIGHT, "rounding_deviation", 0.0, of_aircraft=False)
 VERTICAL_RATE = ToldError(CLIMB, "climb_deviation", 0.0, of_aircraft=False)
+
+
+#: By how long all positions of an aircraft are late: what of its latency it does not compensate.
+LATE = ToldError(LATENCY, "latency_deviation", math.inf)
 
 
 def told_errors(position_errors: str) -> tuple[ToldError, ...]:
@@ -87,20 +96,55 @@ class StatedByAircraft:
         """Mean square error of each horizontal axis of velocities, (n,)."""
         square = self.equipage.velocity_deviation_m_s[self.craft] ** 2
         speed = np.where(self.errs, square, _LEAST_M2)
-        return speed + KNOT_M_S**2 / 12.0 if self.rounds else speed
+        return speed + self._speed_rounding_m2_s2
+
+    @property
+    def _speed_rounding_m2_s2(self) -> FloatArray:
+        if not self.rounds:
+            return np.zeros(len(self.craft))
+        north, east = (self.said[f"reported_{axis}_m_s"] / KNOT_M_S for axis in ("north", "east"))
+        rounding: FloatArray = (speed_step_kt(north, east) * KNOT_M_S) ** 2 / 12.0
+        return rounding
+
+    @property
+    def _height_rounding_m2(self) -> FloatArray:
+        step = altitude_step_ft(self.said["reported_alt_m"] / FOOT_M, ALTITUDE_STEP_FT)
+        rounding: FloatArray = self.rounds * (step * FOOT_M) ** 2 / 12.0
+        return rounding
+
+    @property
+    def late_s(self) -> FloatArray:
+        """By how long positions are late along the way that a reported velocity goes, (n,)."""
+        known = ~np.isnan(self.said["reported_north_m_s"])
+        return np.where(known, self.equipage.late_s[self.craft], 0.0)
+
+    def carried_s(self, age_s: FloatArray) -> FloatArray:
+        """Return for how long positions are carried on, first by the aircraft that sends them.
+
+        Without a velocity of theirs nobody carries them on, and they are as old as they are.
+        """
+        known = ~np.isnan(self.said["reported_north_m_s"])
+        own_s = self.equipage.latency_s, self.equipage.compensated_s
+        latency_s, compensated_s = (one[self.craft] for one in own_s)
+        return age_s + np.where(known, compensated_s, latency_s)
 
     def position_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return mean square errors of positions carried on: of two level axes, and vertical."""
+        """Return mean square errors of positions carried on: of two level axes, and vertical.
+
+        What they are late by (`late_s`) is beside these.
+        """
         square = self.equipage.position_deviation_m[self.craft] ** 2
         level = np.where(self.errs, square, _LEAST_M2)
         feet = self.said["reported_alt_m"] / FOOT_M
         high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
         if self.rounds:
             level = level + _COMPACT_M2
-            high = high + _ALTITUDE_STEP_M2
+            high = high + self._height_rounding_m2
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         moving = ~np.isnan(self.said["reported_north_m_s"])
-        level = level + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * age_s**2
+        level = (
+            level + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * self.carried_s(age_s) ** 2
+        )
         return level, level, high
 
     def told(
@@ -109,28 +153,31 @@ class StatedByAircraft:
         """Return velocities of some age, and what errs of them and of positions, as `TOLD`."""
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
-        tells, none = self.errs or self.rounds, np.zeros(len(age_s))
+        none = np.zeros(len(age_s))
+        tells = (self.late_s > 0.0) | self.errs | self.rounds
+        carried_s, latency_s = self.carried_s(age_s), self.equipage.latency_s[self.craft]
         # Where errors are stated, filters know how targets move on the way.
-        turned = none if tells else (_MANOEUVRE_M_S2 * velocity_age_s) ** 2
+        turned = np.where(tells, 0.0, _MANOEUVRE_M_S2 * (velocity_age_s + latency_s)) ** 2
         # Whole knots last while a flight is steady and are new while it is not: counted as both.
-        new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)
+        new = turned + _LEAST_M2 + self._speed_rounding_m2_s2
         variances = new, new, turned + _LEAST_M2
         velocity = dict(zip(TOLD[:6], (*north_east_down_m_s, *variances), strict=True))
-        if not tells:
-            return dict.fromkeys(TOLD, np.full(len(age_s), np.nan)) | velocity
         known = ~np.isnan(north_east_down_m_s[0])
-        rounding_m2 = _ALTITUDE_STEP_M2 if self.rounds else 0.0
+        rounding_m2 = self._height_rounding_m2
         _, _, high = self.position_m2(none)
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
-        carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * age_s
+        carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * carried_s
         white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
         position = self.equipage.position_deviation_m[self.craft] if self.errs else none
-        return unstated_errors(len(age_s)) | velocity | {
+        told = unstated_errors(len(age_s)) | {
             "place_deviation": position,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
-            "rounding_deviation": none + math.sqrt(rounding_m2),
+            "rounding_deviation": np.sqrt(rounding_m2),
             "climb_deviation": none + math.sqrt(climb),
             "speed_deviation": np.sqrt(self.speed_m2_s2),
-            "age_s": np.where(known, age_s, 0.0),
-            "velocity_age_s": np.where(known, velocity_age_s, 0.0), "white_variance": white,
+            "latency_deviation": self.late_s,
+            "age_s": np.where(known, carried_s, 0.0),
+            "velocity_age_s": np.where(known, velocity_age_s + latency_s, 0.0),
+            "white_variance": white,
         }  # fmt: skip
+        return {name: np.where(tells, one, np.nan) for name, one in told.items()} | velocity

@@ -319,19 +319,22 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
     """Return where the cameras' Pd is 0.9, and that of the earlier study's Bonanza at 3 NM."""
     camera: Any = done.simulation.components["centre"]
     result = camera.detector
-    weight_m2 = camera.p.static_weight / (camera.pixel_azimuth_rad * camera.pixel_elevation_rad)
+    pixel_sr = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
     nine_of_ten = result.threshold + 1.2815515655446004 * result.noise
+    needed = float(camera.signal_of(nine_of_ten, 1.0)["pixels"])
     rows = []
     for size, area_m2 in (("small", KING_AIR_M2["Level head-on"]), ("large", 90.0)):
-        reached_km = (weight_m2 * area_m2 / nine_of_ten) ** 0.5 / 1000.0
+        reached_km = (area_m2 / (pixel_sr * needed)) ** 0.5 / 1000.0
         rows.append(printed[f"declared_{size}_nm"].beside(
             f"AFRL, declaration of the {size} aircraft: Pd 0.9", reached_km / NAUTICAL_MILE_KM,
             "NM", f"Head-on, {area_m2:.1f} m², P = 1.",
-            predicted("P = 1, and noise by 0.01 % of false alarms a frame",
+            predicted("P = 1, Pd 0.5 at Table 4.4's ranges, and 0.01 % of false alarms a frame",
+                      "systems/afrl.toml:blocks.centre.calibrate.range_km",
                       "systems/afrl.toml:blocks.centre.static_weight",
                       "systems/afrl.toml:blocks.centre.false_alarms_per_frame")))  # fmt: skip
     for cell, distance_nm in (("pd_near", 2.0), ("pd_far", 3.5)):
-        signature = weight_m2 * BONANZA_M2 / (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2
+        pixels = BONANZA_M2 / (pixel_sr * (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2)
+        signature = camera.p.static_weight * pixels * camera.share(pixels)
         pd = detection_probability(signature, result.threshold, result.noise)
         rows.append(printed[cell].beside(
             f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd), "%",

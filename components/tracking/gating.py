@@ -1,6 +1,6 @@
 """Pairs of a track and a detection in its gate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -92,10 +92,13 @@ def gated_pairs(
                 since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
                 ages = rules.carried.ages(scans, cells, since)
                 foreseen = [
-                    ages.added(result, model, state)
-                    for result, model, state in zip(
+                    replace(
+                        ages.added(result, model, state, covariance), considered=reported.considered
+                    )
+                    for result, model, state, covariance in zip(
                         rules.estimator.expect(kind, mine_then.estimates(), level_pose, reported),
-                        rules.estimator.models, mine_then.states(), strict=True,
+                        rules.estimator.models, mine_then.states(), mine_then.covariances(),
+                        strict=True,
                     )
                 ]  # fmt: skip
                 pairs = pair_measurement(

@@ -379,7 +379,8 @@ def _start_by_reports(
     if rules.carried is None or not len(telling):
         return state, covariance
     cells = detection[telling]
-    effects = rules.carried.reported(scans, cells).effects(position[:, telling], pose.take(telling))
+    reported = rules.carried.reported(scans, cells)
+    effects = reported.effects(state[:6, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
     white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
     own = covariance[:6, :6, telling]
@@ -387,11 +388,11 @@ def _start_by_reports(
         own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
     own[:3, :3] = _diagonal(white[:3])
     ages = rules.carried.ages(scans, cells, np.zeros(len(cells)))
+    own += product_transposed(effects, effects)
+    speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
-        begun = np.zeros((model.size, len(cells)))
-        begun[:6] = state[:6, telling]
-        own += ages.errors(model, begun)[0] / len(rules.estimator.models)
-    covariance[:6, :6, telling] = symmetric(own + product_transposed(effects, effects))
+        own += ages.errors(model, speeds)[0] / len(rules.estimator.models)
+    covariance[:6, :6, telling] = symmetric(own)
     covariance[:6, 6:, telling] = -effects
     covariance[6:, :6, telling] = -effects.swapaxes(0, 1)
     return state, covariance

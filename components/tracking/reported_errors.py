@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.estimation.batched import times
-from components.estimation.carried_errors import BEARING, RANGE, Ages, ReportedErrors
+from components.estimation.carried_errors import BEARING, LATENCY, RANGE, Ages, ReportedErrors
 from components.estimation.frame import SensorPose
 from components.geometry import unit_vector_unchecked
 from components.messages.columns import TOLD
@@ -19,7 +19,7 @@ from components.messages.detections import SensorOffer, ToldError
 from components.tracking.scans import Scans
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-_AGES = ("age_s", "velocity_age_s")
+_AGES = ("age_s", "velocity_age_s", "latency_deviation")
 # Nearer to the vertical azimuths say nothing.
 _LEAST_COS = 1e-3
 
@@ -31,6 +31,17 @@ def reported_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], li
         for one in offer.told_errors if isinstance(offer, SensorOffer) else ():
             result.setdefault((one, "" if one.of_aircraft else name), []).append(name)
     return result
+
+
+def unknown_latency(offers: Mapping[str, Any]) -> list[str]:
+    """Return what a tracker that carries no errors does not know of positions that are late."""
+    return [
+        f"{name} may hear aircraft that send positions late and do not carry them on (their "
+        "ads_b.latency_s is above compensated_s), an error of all reports alike along the flight "
+        "that this tracker does not carry: its tracks lie behind by the speed times that"
+        for name, offer in sorted(offers.items())
+        if isinstance(offer, SensorOffer) and any(one.way == LATENCY for one in offer.told_errors)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +89,8 @@ class CarriedErrors:
     def ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
         """Return how old the reports in detections are, for tracks last updated so long ago."""
         assert scans.reported is not None
-        position, velocity = (scans.reported[TOLD.index(name), cells] for name in _AGES)
-        return Ages(position, velocity, since_s)
+        position, velocity, late = (scans.reported[TOLD.index(name), cells] for name in _AGES)
+        return Ages(position, velocity, since_s, late)
 
 
 def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:

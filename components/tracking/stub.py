@@ -7,11 +7,13 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.columns import POSE
+from components.messages.detections import sensor_offers
 from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
+from components.tracking.reported_errors import unknown_latency
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -72,6 +74,10 @@ class TrackerStub(Component):
     def acts_every_s(self) -> Fraction | None:
         """Return how often what has grown too old is looked for, s."""
         return None if self.p.drop_after_s is None else _ACTS_EVERY_S
+
+    def warnings(self) -> list[str]:
+        """Say whose measurements lie behind their targets."""
+        return super().warnings() + unknown_latency(sensor_offers(self.context.producers))
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""

@@ -28,7 +28,7 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.reported_errors import reported_errors
+from components.tracking.reported_errors import reported_errors, unknown_latency
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.silence import Silence
@@ -143,6 +143,8 @@ class Tracker(Component):
                     "(SensorOffer.lasting): all are taken for new, and tracks are too sure where "
                     "they are not"
                 )
+        if not self._estimator.errors:
+            result += unknown_latency(offers)
         return super().warnings() + result
 
     def offer(self, port: str) -> Any:

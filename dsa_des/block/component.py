@@ -150,6 +150,8 @@ class Context:
         The tables that somebody reads of what is recorded; None for all that there are.
     tolerance : mapping
         What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
+    rewinds : bool
+        Whether the engine may take blocks of this run back to an instant before.
     """
 
     streams: Streams
@@ -163,6 +165,7 @@ class Context:
     recorded_runs: int = 1
     recorded_tables: Collection[str] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
+    rewinds: bool = False
 
 
 class Component:

@@ -111,7 +111,9 @@ class Simulation:
         grain = self.timeline.grain(window)
         #: Where blocks are kept from looking ahead: which ones are the reason, and why each.
         self.slow = grain.slow
-        assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
+        assembly = Assembly(
+            scene, timeline, recorder, simulate_everything, wrap_effect, grain.rewinds
+        )
         self.components: Mapping[str, Component] = assembly.components
         self.duration_s: Fraction = assembly.duration_s
         self.plan = assembly.plan

@@ -1,5 +1,7 @@
 """Errors that a filter carries as states: against differences, and one batch of all looks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from components.estimation.carried_errors import (
     CLIMB,
     EAST,
     HEIGHT,
+    LATENCY,
     NORTH,
     RANGE,
     SPEED_EAST,
@@ -18,6 +21,7 @@ from components.estimation.carried_errors import (
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
 from components.estimation.interacting_models import InteractingMultipleModels
+from components.estimation.kalman import linear_moments, updated
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
@@ -45,14 +49,18 @@ def told(count, at_range):
 def test_derivatives_are_those_of_differences(at_range):
     count, rng = 40, np.random.default_rng(3)
     errors, kind, place = told(count, at_range), Kind(True, False, True), pose(count)
+    late = np.full((1, count), 0.0 if at_range else 0.6)
+    errors = ReportedErrors(
+        (*WAYS, LATENCY), np.concatenate([errors.deviation, late]), errors.age_s, errors.at_range
+    )
     state = np.concatenate([
         rng.choice([-1.0, 1.0], (2, count)) * rng.uniform(2000.0, 6000.0, (2, count)),
         rng.normal(0.0, 400.0, (1, count)),
-        rng.normal(0.0, 60.0, (3, count)), rng.normal(size=(len(WAYS), count)),
+        rng.normal(0.0, 60.0, (3, count)), rng.normal(size=(len(WAYS) + 1, count)),
     ])  # fmt: skip
     seen, slope = errors.linearised(kind, state, place)
     np.testing.assert_array_equal(seen, errors.expected(kind, state, place))
-    for i, step in enumerate([1e-2] * 6 + [1e-4] * len(WAYS)):
+    for i, step in enumerate([1e-2] * 6 + [1e-4] * (len(WAYS) + 1)):
         off = np.zeros_like(state)
         off[i] = step
         both = [errors.expected(kind, state + sign * off, place) for sign in (1.0, -1.0)]
@@ -75,6 +83,36 @@ def test_a_height_at_a_range_moves_on_a_sphere_and_a_bearing_about_the_vertical(
         else:
             seen = [errors._displaced(x, place)[0][2, 0] for x in (state, moved)]
         assert seen[0] == pytest.approx(seen[1], abs=1e-6)
+
+
+def test_a_late_position_lies_back_along_the_flight_and_reports_do_not_tell_how_late():
+    """Half a second at 80 m/s; covariances with what is corrected are those of Schmidt's filter."""
+    place, kind = pose(1), Kind(True, False, True)
+    late = ReportedErrors(
+        (NORTH, LATENCY), np.array([[3.0], [0.5]]), np.zeros(1), np.zeros(1, bool)
+    )
+    state = np.zeros((8, 1))
+    state[:6, 0] = [4000.0, 3000.0, -2600.0, 80.0, 0.0, 0.0]
+    state[7] = 1.0
+    seen = late.expected(kind, state, place)
+    state[0] -= 40.0
+    state[7] = 0.0
+    np.testing.assert_allclose(seen, late.expected(kind, state, place), rtol=1e-12)
+
+    root = np.random.default_rng(5).normal(size=(8, 8))
+    covariance = (root @ root.T * 9.0 + np.diag([900.0] * 3 + [9.0] * 3 + [1.0] * 2))[..., None]
+    moments = linear_moments(*late.linearised(kind, state, place), covariance)
+    moments = replace(moments, considered=late.considered)
+    variance = np.array([1e-6, 1e-6, 25.0, 1.0, 1.0, 1.0])[:, None]
+    measured = np.array([0.01, -0.004, 30.0, 2.0, -1.0, 0.5])[:, None]
+    moved, spread = updated(state, covariance, moments.innovation(variance), measured)
+    p, h = covariance[..., 0], moments.jacobian[..., 0]
+    gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(variance[:, 0]))
+    gain[7] = 0.0
+    rest = np.eye(8) - gain @ h
+    wanted = rest @ p @ rest.T + gain * variance[:, 0] @ gain.T
+    np.testing.assert_allclose(moved[:, 0], state[:, 0] + gain @ measured[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(spread[..., 0], wanted, rtol=1e-6, atol=1e-7)
 
 
 def test_errors_are_forgotten_and_stay_as_large():

@@ -19,12 +19,14 @@ from components.estimation.carried_errors import (
     SPEED_EAST,
     SPEED_NORTH,
     Ages,
+    MotionWithErrors,
     ReportedErrors,
 )
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
+from components.estimation.kalman import linear_moments
 from components.estimation.measurement import Kind
-from components.estimation.motion import ConstantVelocity
+from components.estimation.motion import ConstantVelocity, CoordinatedTurn
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
 
 KIND = Kind(True, False, True)
@@ -87,14 +89,14 @@ def nees_of(estimator, intensity, flown, seed=5):
             WAYS, np.repeat(DEVIATION[:, np.newaxis], COUNT, axis=1), np.full(COUNT, ages[0]),
             np.zeros(COUNT, dtype=bool),
         )  # fmt: skip
-        age = Ages(*(np.full(COUNT, one) for one in (*ages, 1.0 if look else 0.0)))
+        age = Ages(*(np.full(COUNT, one) for one in (*ages, 1.0 if look else 0.0, 0.0)))
         model = estimator.models[0]
         if tracks is None:
             tracks = begun(said, told, age, model, place)
         else:
             tracks = estimator.predict(tracks, np.ones(COUNT))
             foreseen = estimator.expect(KIND, tracks, place, told)
-            foreseen = [age.added(foreseen[0], model, tracks.states[0])]
+            foreseen = [age.added(foreseen[0], model, tracks.states[0], tracks.covariances[0])]
             measured = plain.expected(KIND, said, place)
             away = np.linalg.norm(said[:3] - place.position_m, axis=0)
             level = away * np.cos(measured[1])
@@ -115,8 +117,8 @@ def nees_of(estimator, intensity, flown, seed=5):
 def begun(said, told, age, model, place):
     state, covariance = np.zeros((12, COUNT)), np.zeros((12, 12, COUNT))
     state[:6] = said
-    effects = told.effects(said[:3], place)
-    new = age.errors(model, state)[0]
+    effects = told.effects(said, place)
+    new = age.errors(model, np.ones((3, COUNT)))[0]
     for i in range(6):
         new[i, i] += WHITE_M2
         covariance[6 + i, 6 + i] = 1.0
@@ -185,3 +187,64 @@ def straight(place_m, speed_m_s, climb_m_s, intensity):
             )
         found.append(np.trace(np.linalg.solve(believed[:2, :2], true[:2, :2])))
     return np.array(found)
+
+
+def test_what_a_target_did_since_is_in_what_is_told_of_earlier_by_how_old_it_is():
+    """A position carried on for 0.4 s of its 0.9, by a velocity 1.3 s old; updated 0.7 s ago.
+
+    By integrals over the white acceleration of so long ago, in steps: to a thousandth.
+    """
+    carried_s, late_s, velocity_age_s, since_s = 0.4, 0.5, 1.3, 0.7
+    ages = Ages(*(np.array([one]) for one in (carried_s, velocity_age_s, since_s, late_s)))
+    error, shared = ages.errors(ConstantVelocity(4.0), np.array([[0.0], [0.0], [9.0]]))
+    ago_s = (np.arange(20_000) + 0.5) * 1e-4  # for how long an acceleration has acted
+    position = np.maximum(carried_s + late_s - ago_s, 0.0)
+    velocity = -1.0 * (ago_s < velocity_age_s)
+    told = np.stack([position + carried_s * velocity, velocity])
+    # Of the track's own errors: what was new since, by which a prediction falls short.
+    known = -np.stack([ago_s, np.ones_like(ago_s)]) * (ago_s < since_s)
+    for found, one in ((error, told), (shared, -known)):
+        wanted = 4.0 * 1e-4 * one @ told.T
+        for axis in (0, 1, 2):
+            both = found[[axis, axis + 3]][:, [axis, axis + 3], 0]
+            if found is error:  # by how late it is times twice the velocity's deviation
+                both = both - np.diag([4.0 * late_s**2 * (9.0 if axis == 2 else 0.0), 0.0])
+            np.testing.assert_allclose(both, wanted, atol=3e-3)
+
+
+def test_what_is_told_of_a_turn_is_expected_as_it_was():
+    """A circle's chord and tangent of then, carried on; and the slope by finite differences."""
+    count, speed, rate = 1, 90.0, np.radians(5.0)
+    model = MotionWithErrors(CoordinatedTurn(0.1, 1e-8), (300.0,))
+    ages = Ages(*(np.full(count, one) for one in (0.6, 0.9, 1.0, 0.3)))
+    place, kind = pose().take(np.arange(count)), KIND
+    state = np.array([4000.0, 3000.0, -2600.0, speed, 0.0, -3.0, 0.2, rate])[:, np.newaxis]
+    covariance = np.diag([100.0] * 3 + [4.0] * 3 + [1.0, 1e-4])[:, :, np.newaxis]
+    told = ReportedErrors((NORTH,), np.full((1, count), 3.0), ages.position, np.zeros(count, bool))
+
+    def expected(state):
+        moments = linear_moments(*told.linearised(kind, state, place), covariance)
+        return ages._turned_back(moments, model, state, covariance)
+
+    then, tangent = -rate * 0.9, -rate * 0.9
+    radius = speed / rate
+    was = state[:6, 0].copy()
+    was[:3] += [radius * np.sin(then), radius * (1.0 - np.cos(then)), 3.0 * 0.9]
+    was[3:] = [speed * np.cos(tangent), speed * np.sin(tangent), -3.0]
+    was[:3] += 0.6 * was[3:]
+    was[:3] += 0.3 * state[3:6, 0]  # by how late it is: the error that is carried says so
+    reported = np.concatenate([was[:, np.newaxis], state[6:]])
+    found = expected(state)
+    wanted = told.expected(kind, reported, place)
+    np.testing.assert_allclose(found.expected[2:], wanted[2:], atol=0.02)
+    np.testing.assert_allclose(found.expected[:2], wanted[:2], atol=4e-6)
+    for i in (3, 4, 7):
+        step = np.zeros_like(state)
+        step[i] = 1e-4 if i == 7 else 1e-2
+        apart = expected(state + step).expected - expected(state - step).expected
+        slope = apart / (2.0 * step[i])
+        np.testing.assert_allclose(found.jacobian[3:, i], slope[3:], rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(
+        found.total[..., 0], found.jacobian[..., 0] @ covariance[..., 0] @ found.jacobian[..., 0].T,
+        rtol=1e-9, atol=1e-12,
+    )  # fmt: skip

@@ -37,7 +37,7 @@ def noisy(kind, mode, **keys):
     if mode == "stated":
         ours |= STATED
     if mode == "signal" and kind in CAMERAS:
-        ours |= {"noise_equivalent_contrast": 0.5, "threshold": None}
+        ours |= {"noise_equivalent_contrast": 0.3, "threshold": None}
     if kind == "radar.threshold":
         ours |= {"threshold_db": 8.0, "power_w": 40.0}
     return sensor(kind, errors=mode, **{"scan_rate_hz": 10, **ours, **keys})
@@ -114,14 +114,18 @@ def test_the_order_within_a_scan_tells_nothing(kind):
 def test_the_pixels_of_noise_give_its_confidence_as_a_target_s_do(kind, noise, gains):
     """Eq. 18: 0.3 times pixels times contrast, less the threshold.
 
-    What is measured with noise says nothing of a contrast; else it is a target's.
+    What is measured with noise says nothing of a contrast, and its size brings noise: of N pixels
+    sqrt(s / (s + N)) counts, where a point's picture takes s = 4 pi / 3. Else it is a target's.
     """
+    spot = np.inf if noise == 0.0 else 4.0 * np.pi / 3.0
     targets = [{**target, "contrast": gain, "contrast_ir": gain}
                for target, gain in zip(CROWD, (0.5, 1.25) * 15, strict=True)]  # fmt: skip
     camera = noisy(kind, "grid", noise_equivalent_contrast=noise)
     true, false, _, _ = both(chain({"sensor": camera}, targets=targets, duration_s=20))
     for part in (true, false):
-        gain = (part["confidence"].astype(float) + 1.0) / (0.3 * part["pixels"].astype(float))
+        pixels = part["pixels"].astype(float)
+        counted = pixels / np.sqrt(1.0 + pixels / spot)
+        gain = (part["confidence"].astype(float) + 1.0) / (0.3 * counted)
         assert {round(value, 9) for value in gain} == gains
 
 

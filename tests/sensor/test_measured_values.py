@@ -315,7 +315,7 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
 
 def test_a_camera_s_false_alarm_errs_like_a_target_of_its_signature():
-    """Noise of signature E is E / 0.3 pixels of contrast 1, over a noise of 0.25."""
+    """Noise of signature E is of as many pixels of contrast 1 as give E, over a noise of 0.25."""
     keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 9.0,
             "glint_share": 0.0}  # fmt: skip
     run_ = alone("optical.eo", threshold=None, quantised=False, scan_rate_hz=5, **keys)
@@ -326,8 +326,9 @@ def test_a_camera_s_false_alarm_errs_like_a_target_of_its_signature():
     threshold = 0.3 * 0.25 * math.sqrt(area) * norm.isf(9.0 * area / (36000 * 18000))
     assert 20 < len(found) < 75
     for row in found:
-        pixels = (row["confidence"] + threshold) / 0.3
-        assert row["pixels"] == pytest.approx(pixels)
+        pixels = row["pixels"]
+        counted = pixels / math.sqrt(1.0 + pixels / area)
+        assert 0.3 * counted == pytest.approx(row["confidence"] + threshold)
         s2 = 0.25 + (pixels + 1.0) / 12.0
         expected = pixel**2 * 8.0 * math.pi * s2**2 / (pixels / 0.25) ** 2
         assert row["azimuth_variance_rad2"] == pytest.approx(expected)

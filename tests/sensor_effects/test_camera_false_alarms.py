@@ -59,8 +59,11 @@ def test_the_two_thresholds_of_the_flight_tests_are_of_one_noise(configs):
                 }
             blocks = dsa_des.run(scene).summary["cameras"]
             camera[name] = blocks[low_key]
-        assert camera["high"]["threshold"] == 1.0
-        assert camera["low"]["threshold"] == pytest.approx(apart, abs=2e-5)
+        # Half of the looks of the higher one detect where eq. 18 gives 1, of 1 / 0.3 pixels.
+        spot = 4.0 * math.pi / 3.0
+        high = math.sqrt(spot / (spot + 1.0 / 0.3))
+        assert camera["high"]["threshold"] == pytest.approx(high, rel=2e-5)
+        assert camera["low"]["threshold"] == pytest.approx(apart * high, rel=2e-5)
         assert camera["low"]["noise"] == pytest.approx(camera["high"]["noise"], rel=2e-5)
         for name, share in (("high", 0.0001), ("low", 0.00045)):
             assert camera[name]["false_alarms_per_frame"] == pytest.approx(share, rel=1e-9)

@@ -139,6 +139,7 @@ def test_positions_carried_on_err_by_the_error_of_the_velocity_times_their_age()
         "velocity_deviation_m_s": np.array([2.0]),
     }
     said = {name: np.full(3, 1000.0) for name in ("reported_alt_m", "reported_north_m_s")}
+    deviations |= {"latency_s": np.zeros(1), "compensated_s": np.zeros(1)}
     stated = StatedByAircraft(
         SimpleNamespace(**deviations), np.zeros(3, dtype=int), said, errs=True, rounds=False
     )

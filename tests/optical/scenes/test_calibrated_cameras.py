@@ -28,6 +28,11 @@ def used(kind: str, targets=TARGETS, **keys) -> dict[str, float]:
     return run(scene).summary["cameras"]["sensor"]
 
 
+def filtered(pixels, spot: float = SPOT):
+    """Pixels of a point that stand out as much: a filter of N pixels lets in the noise of each."""
+    return pixels * np.sqrt(spot / (spot + pixels))
+
+
 def noise_of(contrast: float, weight: float = 0.3, spot: float = SPOT) -> float:
     return weight * contrast * math.sqrt(spot)
 
@@ -36,18 +41,18 @@ def noise_of(contrast: float, weight: float = 0.3, spot: float = SPOT) -> float:
 @pytest.mark.parametrize("kind", CAMERAS)
 def test_looks_detect_as_often_as_noise_lets_signatures_reach_the_threshold(kind):
     """Two cameras of other thresholds and noise, banked, in the south; 4,000 looks of each."""
-    strength = {
-        row["target"]: 0.3 * row["pixels"] * CONTRAST[kind]
-        for row in rows(run(chain({"s": sensor(kind)}, targets=TARGETS)), scan=0)
-    }
-    middle = math.sqrt(math.prod(strength.values()))
-    cameras = {
-        "low": {"threshold": 0.7 * middle, "contrast": 0.15 * middle, "blur_pixels": 0.8},
-        "high": {"threshold": 1.2 * middle, "contrast": 0.4 * middle, "blur_pixels": 0.5},
-    }
+    found = rows(run(chain({"s": sensor(kind)}, targets=TARGETS)), scan=0)
+    pixels = np.array([row["pixels"] for row in found])
+    cameras = {}
+    for name, share, noise, blur in (("low", 0.9, 0.3, 0.8), ("high", 1.2, 0.4, 0.5)):
+        spot = 4.0 * math.pi * (blur**2 + 1.0 / 12.0)
+        middle = math.sqrt(np.prod(0.3 * CONTRAST[kind] * filtered(pixels, spot)))
+        cameras[name] = {"threshold": share * middle, "contrast": noise * middle,
+                         "blur_pixels": blur}  # fmt: skip
     sensors = {
         name: sensor(kind, scan_rate_hz=1000, threshold=keys["threshold"],
-                     noise_equivalent_contrast=keys["contrast"], blur_pixels=keys["blur_pixels"])
+                     noise_equivalent_contrast=keys["contrast"], blur_pixels=keys["blur_pixels"],
+                     false_alarms=False)
         for name, keys in cameras.items()
     }  # fmt: skip
     scene = chain(sensors, targets=TARGETS, duration_s=2, record={"looks": True})
@@ -56,7 +61,8 @@ def test_looks_detect_as_often_as_noise_lets_signatures_reach_the_threshold(kind
         looks = rows(found, "looks", block=name)
         spot = 4.0 * math.pi * (keys["blur_pixels"] ** 2 + 1.0 / 12.0)
         deviation = noise_of(keys["contrast"], spot=spot)
-        signature = 0.3 * CONTRAST[kind] * np.array([row["pixels"] for row in looks])
+        pixels = np.array([row["pixels"] for row in looks])
+        signature = 0.3 * CONTRAST[kind] * filtered(pixels, spot)
         pd = norm.cdf((signature - keys["threshold"]) / deviation)
         said = np.array([row["detection_probability"] for row in looks])
         np.testing.assert_allclose(said, pd, rtol=1e-10)
@@ -72,7 +78,8 @@ def test_looks_detect_as_often_as_noise_lets_signatures_reach_the_threshold(kind
         assert (margin >= 0.0).all()
         uniform = share / pd[detected]
         assert abs(uniform.mean() - 0.5) < 3.3 / math.sqrt(12 * len(uniform))
-        assert [row["pixels"] for row in seen] == pytest.approx(
+        measured = np.array([row["pixels"] for row in seen])
+        assert filtered(measured, spot) == pytest.approx(
             (margin + keys["threshold"]) / 0.3, rel=1e-9
         )
 
@@ -159,7 +166,7 @@ def test_a_known_range_gives_noise_or_threshold(kind, aspect_deg, tmp_path):
     left = math.exp(-3.912 * 2.0 / 5.0)
     known = {"aircraft": other, "aspect_deg": aspect_deg, "range_km": 2.0, "pd": 0.9}
     hazy = {**known, "visibility_km": 5.0}
-    signature = 0.3 * pixels * CONTRAST[kind] * left
+    signature = 0.3 * filtered(pixels) * CONTRAST[kind] * left
     apart = norm.isf(0.1)
     for keys, noise, threshold in (
         ({"threshold": 0.9 * signature}, 0.1 * signature / apart, 0.9 * signature),
@@ -173,7 +180,9 @@ def test_a_known_range_gives_noise_or_threshold(kind, aspect_deg, tmp_path):
             signature - apart * noise if threshold is None else threshold, rel=1e-6
         )
     clear = used(kind, calibrate={**known, "contrast": 0.5}, noise_equivalent_contrast=0.02)
-    assert clear["threshold"] == pytest.approx(0.3 * pixels * 0.5 - apart * noise_of(0.02))
+    assert clear["threshold"] == pytest.approx(
+        0.3 * filtered(pixels) * 0.5 - apart * noise_of(0.02)
+    )
     if kind == "optical.projection":
         return
     shown = {"area_m2": size, "contrast": CONTRAST[kind], **hazy}
@@ -183,7 +192,7 @@ def test_a_known_range_gives_noise_or_threshold(kind, aspect_deg, tmp_path):
     tabulated = used(kind, targets, calibrate=hazy, silhouette="aspect_table")
     area = 33.0 if aspect_deg < 100.0 else 44.0
     assert tabulated["noise"] / used(kind, calibrate=hazy)["noise"] == pytest.approx(
-        area / size, rel=1e-6
+        filtered(pixels * area / size) / filtered(pixels), rel=1e-6
     )
 
 
@@ -203,7 +212,7 @@ def test_a_calibrated_camera_sees_that_aircraft_there_as_often():
 def test_who_is_too_faint_is_left_out_to_the_bit(kind):
     """A target just inside and one just outside of what is looked at, at a Pd of about 1e-6."""
     found = {row["target"]: row for row in rows(run(chain({"s": sensor(kind)}, targets=TARGETS)))}
-    weakest = min(0.3 * row["pixels"] * CONTRAST[kind] for row in found.values())
+    weakest = min(0.3 * filtered(row["pixels"]) * CONTRAST[kind] for row in found.values())
     for threshold in (1.5 * weakest, 5.0 * weakest):
         camera = sensor(kind, threshold=threshold, noise_equivalent_contrast=None, scan_rate_hz=200)
         scene = chain({"s": camera}, targets=TARGETS, record={"looks": True})
@@ -212,7 +221,8 @@ def test_who_is_too_faint_is_left_out_to_the_bit(kind):
         faint = [row for row in rows(every, "looks") if row["detection_probability"] == 0.0]
         deviation = threshold / norm.isf(1e-4 / FRAME)
         for row in rows(every, "looks"):
-            pd = norm.sf((threshold - 0.3 * CONTRAST[kind] * row["pixels"]) / deviation)
+            signature = 0.3 * CONTRAST[kind] * filtered(row["pixels"])
+            pd = norm.sf((threshold - signature) / deviation)
             assert (row["detection_probability"] == 0.0) == (pd < 1e-6)
             assert not (row["detected"] and pd < 1e-6)
         assert bool(faint) == (threshold > 4.0 * weakest)
@@ -233,7 +243,7 @@ def test_who_is_too_faint_is_left_out_to_the_bit(kind):
          "false_alarms_per_frame is 0.5: it must be below 0.5"),
         ({"noise_equivalent_contrast": 0.3, "false_alarms_per_frame": 0.0},
          "false_alarms_per_frame is 0: no threshold is that high"),
-        ({"noise_equivalent_contrast": 9.0, "false_alarms": True}, "false alarms per frame"),
+        ({"noise_equivalent_contrast": 9.0, "threshold": 1.0}, "false alarms per frame"),
         ({"errors": "signal", "threshold": -1.0}, "noise_equivalent_contrast is not given"),
         ({"noise_equivalent_contrast": 0.0, "calibrate": {"range_km": 2.0, "pd": 0.9,
           "area_m2": 9.0}}, "without noise calibrate has no Pd"),

@@ -7,7 +7,12 @@ import pytest
 from wired import chain, rows, run
 
 import components.surveillance.active as active
+import dsa_des
+from components.estimation.estimator import ExtendedKalmanFilter
+from components.estimation.motion import ConstantVelocity
+from components.tracking.tracker import Tracker
 from docs.make.track_consistency import CASES, nees_of, summary
+from dsa_des.running.simulation import Simulation
 
 ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "reception": "certain"}
 KEA = {"name": "kea", "north_m": -9000, "east_m": -4000, "up_m": 200, "heading_deg": 80,
@@ -58,6 +63,90 @@ def test_straight_flights_are_told_by_as_much_too_careful_as_their_climb_is():
     assert found["tracks"] >= 118 and found["lost"] < 0.01
     off = 2.576 * np.sqrt((4 * 2.0 + KURTOSIS - 1.0) / found["tracks"])
     assert 5.1 - off < found["mean"] < 5.1 + off
+
+
+LATE = {"nacp": 10, "nacv": 2, "latency_s": 0.5}
+
+
+def late_case(says, *, turns=(), **tracker):
+    """Three at 120 m/s that send where they were half a second before."""
+    flights = [
+        {**one, "speed_mps": 120.0, "ads_b": {**LATE, **says}, **({"legs": turns} if turns else {})}
+        for one in CASES["ads_b"].targets
+    ]
+    case = replace(CASES["ads_b_compact"], targets=flights, within_m=600.0)
+    return replace(case, tracker=tracker) if tracker else case
+
+
+def test_a_position_that_is_late_is_one_deviation_off_along_the_flight():
+    """Sixty metres each, of 4 m stated: 203 where nothing is said of it; with it, 1 more at most.
+
+    A latency that the aircraft compensates is none; one of 1 s, 120 m, is as honest.
+    """
+    found = {}
+    for name, says in (
+        ("none", {"latency_s": 0.0}), ("late", {}), ("later", {"latency_s": 1.0}),
+        ("compensated", {"compensated_s": 0.5}),
+    ):  # fmt: skip
+        nees = nees_of(late_case(says), 20)
+        assert np.isnan(nees).mean() < 0.01
+        found[name] = np.nanmean(nees, axis=0)
+        off = 2.576 * np.sqrt((5 * 2.0 + KURTOSIS - 1.0) / len(nees))
+        assert (np.abs(found[name] - 6.0) < off).all(), name
+    assert 0.0 < (found["late"] - found["none"]).mean() < 1.1
+    assert abs(found["compensated"] - found["none"]).mean() < 0.3
+
+
+@pytest.mark.parametrize("kind", ["tracking.ukf", "tracking.imm"])
+def test_so_it_is_of_other_filters_and_in_a_turn_of_models_that_have_one(kind):
+    turns = [{"kind": "straight", "duration_s": 10}, {"kind": "turn", "rate_deg_s": 3}]
+    nees = nees_of(late_case({}, turns=turns if kind == "tracking.imm" else (), type=kind), 20)
+    assert np.isnan(nees).mean() < 0.01
+    off = 2.576 * np.sqrt((5 * 2.0 + KURTOSIS - 1.0) / len(nees))
+    assert (np.nanmean(nees, axis=0) < 6.0 + off).all()
+    assert (nees > 60.0).mean() < 0.01
+
+
+def test_a_radar_beside_it_pulls_nobody_off():
+    """Both of one aircraft: the radar's plots are not 60 m from what the tracks are sure of."""
+    radar = {"type": "radar.range_boundary", "range_km": 20, "scan_rate_hz": 1, "errors": "stated",
+             "quantised": False, "azimuth_error_deg": 0.5, "elevation_error_deg": 0.6,
+             "range_error_m": 15.0}  # fmt: skip
+    case = late_case({}, type="tracking.ekf")
+    nees = nees_of(replace(case, sensors={**case.sensors, "radar": radar}), 20)
+    assert np.isnan(nees).mean() < 0.01
+    assert (nees > 30.0).mean() < 0.005 and (np.nanmean(nees, axis=0) < 7.0).all()
+
+
+def test_a_tracker_that_cannot_carry_it_says_so():
+    def said(kind, says):
+        scene = chain(
+            {"ether": ADS_B}, targets=[{**KEA, "ads_b": says}], duration_s=2,
+            fusion={"type": "fusion.pass_through"}, tracker={"type": kind},
+        )  # fmt: skip
+        block = Simulation(dsa_des.load_scene(scene)).components["tracker"]
+        return [one for one in block.warnings() if "ether may hear aircraft" in one]
+
+    own = f"{__name__}:CarriesNothing"
+    for kind in ("tracking.stub", own):
+        (one,) = said(kind, LATE)
+        assert "latency_s is above compensated_s" in one
+        assert said(kind, {**LATE, "compensated_s": 0.5}) == []
+    assert said("tracking.ekf", LATE) == []
+
+
+class Plain(ExtendedKalmanFilter):
+    """A filter that carries no errors."""
+
+    def carrying(self, lasts_s):
+        return self
+
+
+class CarriesNothing(Tracker):
+    """Its tracker."""
+
+    def estimator(self):
+        return Plain(ConstantVelocity(1.0))
 
 
 def test_active_surveillance_is_honest_where_bearings_are_fine(monkeypatch):
