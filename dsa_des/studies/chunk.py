@@ -17,17 +17,20 @@ from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import SceneError
+from dsa_des.files.sealed_files import parquet
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
 from dsa_des.results.record import (
     CRASHED,
     DONE,
     FAILED,
+    STANDS_FOR,
     columns_of,
     draw_column,
 )
-from dsa_des.results.sealed_files import parquet
 from dsa_des.scene.scene import Scene
+from dsa_des.studies.allocation import Allocation
+from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
 from dsa_des.studies.metric import Group, Metric, wanted_by
 from dsa_des.studies.study import Chunk, Study, set_text
 
@@ -57,13 +60,14 @@ def schema_of(study: Study) -> pa.Schema:
         [(axis.column, axis.numeric) for axis in study.axes],
         [(draw_column(draw.key), draw.numeric) for draw in study.draws],
         [result for metric in metrics for result in metric.results()],
+        geometry_of(metrics) if study.allocate else (),
     )
 
 
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
-    tables = [_run_cell(study, schema, *part) for part in chunk.runs]
+    tables = [_run_cell(study, schema, *part, chunk.plans.get(part[0])) for part in chunk.runs]
     done = done_of(chunk.name, pa.concat_tables(tables))
     del tables
     if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
@@ -144,7 +148,10 @@ def _nothing(count: int, *, text: bool) -> AnyArray:
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
-def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) -> pa.Table:
+def _run_cell(
+    study: Study, schema: pa.Schema, cell: int, start: int, end: int, plan: Allocation | None
+) -> pa.Table:
+    """Return the rows of some replicas of a cell, of which those that a plan chooses are flown."""
     numbers = range(start, end)
     rows = _leading(study, cell, numbers)
     try:
@@ -154,8 +161,59 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
+    if not study.allocate:
+        values = _flown(scene, metrics, replicas, rows["error"], (str(study.path), cell))
+        return _table(study, schema, cell, rows, values)
+    known, errors = _foreseen(scene, metrics, replicas)
+    for k, text in errors.items():
+        rows["error"][k] = text
+    results = [result for metric in metrics for result in metric.results()]
+    shares = stands_for(study, cell, numbers, plan, results, known)
+    chosen = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
+    wrong: list[str | None] = [None] * len(chosen)
+    flown = _flown(scene, metrics, [replicas[k] for k in chosen], wrong, (str(study.path), cell))
+    for k, said in zip(chosen, wrong, strict=True):
+        rows["error"][k] = said
+    values = {}
+    for name, column in flown.items():
+        values[name] = _nothing(len(numbers), text=column.dtype == object)
+        values[name][chosen] = column
+    return _table(study, schema, cell, rows, values | known | {STANDS_FOR: shares})
+
+
+def _foreseen(
+    scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
+    """Return what is known of runs before they are flown, and the error of each that gave none."""
+    try:
+        return foresee(scene, metrics, replicas), {}
+    except BaseException as error:
+        if must_pass(error):
+            raise
+        if len(replicas) == 1:
+            return {}, {0: f"before it is flown: {error_text(error)}"}
+    result: dict[str, AnyArray] = {}
+    errors: dict[int, str] = {}
+    for k, replica in enumerate(replicas):
+        values, wrong = _foreseen(scene, metrics, [replica])
+        if wrong:
+            errors[k] = wrong[0]
+        for name, column in values.items():
+            nothing = _nothing(len(replicas), text=column.dtype == object)
+            result.setdefault(name, nothing)[k] = column[0]
+    return result, errors
+
+
+def _flown(
+    scene: Scene,
+    metrics: Sequence[Metric],
+    replicas: Sequence[Replica],
+    errors: list[str | None],
+    key: tuple[str, int],
+) -> dict[str, AnyArray]:
+    """Run replicas and return result → values; what went wrong is put among `errors`."""
     values: dict[str, AnyArray] = {}
-    done, key = 0, (str(study.path), cell)
+    done = 0
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
     while done < len(replicas):
@@ -171,15 +229,15 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
-                rows["error"][done + k] = outcome.error
-        result, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+                errors[done + k] = outcome.error
+        result, wrong = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
         for name, column in result.items():
-            nothing = _nothing(len(numbers), text=column.dtype == object)
+            nothing = _nothing(len(replicas), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
-        for k, text in errors.items():
-            rows["error"][done + good[k]] = text
+        for k, text in wrong.items():
+            errors[done + good[k]] = text
         done += len(part)
-    return _table(study, schema, cell, rows, values)
+    return values
 
 
 #: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
