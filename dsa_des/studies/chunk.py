@@ -29,7 +29,7 @@ from dsa_des.results.record import (
     draw_column,
 )
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.allocation import Plan
+from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
 from dsa_des.studies.metric import Group, Metric, wanted_by
 from dsa_des.studies.study import Chunk, Study, set_text
@@ -149,7 +149,7 @@ def _nothing(count: int, *, text: bool) -> AnyArray:
 
 
 def _run_cell(
-    study: Study, schema: pa.Schema, cell: int, start: int, end: int, plan: Plan | None
+    study: Study, schema: pa.Schema, cell: int, start: int, end: int, plan: Allocation | None
 ) -> pa.Table:
     """Return the rows of some replicas of a cell, of which those that a plan chooses are flown."""
     numbers = range(start, end)
