@@ -5,6 +5,7 @@ the same.
 """
 
 import gc
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,8 +18,10 @@ from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import SceneError
+from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
+from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
+from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
     DONE,
@@ -63,9 +66,10 @@ def schema_of(study: Study) -> pa.Schema:
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
-    tables = [_run_cell(study, schema, *part) for part in chunk.runs]
-    done = done_of(chunk.name, pa.concat_tables(tables))
-    del tables
+    cells = [_run_cell(study, schema, *part) for part in chunk.runs]
+    tables = [table for table, _ in cells]
+    done = done_of(chunk.name, pa.concat_tables(tables), added(undone for _, undone in cells))
+    del tables, cells
     if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
         gc.collect()
     return done
@@ -80,22 +84,24 @@ def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
         rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
         rows["status"] = [CRASHED] * (end - start)
         tables.append(_table(study, schema, cell, rows, {}))
-    return done_of(chunk.name, pa.concat_tables(tables))
+    return done_of(chunk.name, pa.concat_tables(tables), {})
 
 
-def done_of(name: str, table: pa.Table) -> Done:
-    """Return rows as the result of a chunk."""
+def done_of(name: str, table: pa.Table, undone: Undone) -> Done:
+    """Return rows as the result of a chunk, with what blocks could not do in these runs."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
-    return Done(name, parquet(table), table.num_rows, failed, status.count(CRASHED))
+    about = json.dumps(undone).encode() if undone else b""
+    return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
 
 
 def joined(name: str, parts: Sequence[Done]) -> Done:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    order = [("cell", "ascending"), ("replica", "ascending")]
-    return done_of(name, pa.concat_tables(tables).sort_by(order))
+    undone = added(map(undone_of, tables))
+    rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
+    return done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
@@ -144,7 +150,10 @@ def _nothing(count: int, *, text: bool) -> AnyArray:
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
-def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) -> pa.Table:
+def _run_cell(
+    study: Study, schema: pa.Schema, cell: int, start: int, end: int
+) -> tuple[pa.Table, Undone]:
+    """Return the rows of some runs of a cell, and what blocks could not do in them."""
     numbers = range(start, end)
     rows = _leading(study, cell, numbers)
     try:
@@ -152,9 +161,10 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         metrics = [spec.build(scene) for spec in study.metrics]
     except (SceneError, ValueError) as error:
         rows["error"] = [str(error)] * len(numbers)
-        return _table(study, schema, cell, rows, {})
+        return _table(study, schema, cell, rows, {}), {}
     replicas = [study.replica(number, cell) for number in numbers]
     values: dict[str, AnyArray] = {}
+    undone: Undone = {}
     done, key = 0, (str(study.path), cell)
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
@@ -165,6 +175,7 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         many = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
         part = replicas[done : done + many]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
+        undone = added([undone, undone_in(outcomes)])
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded:
             _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)
@@ -179,7 +190,7 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         for k, text in errors.items():
             rows["error"][done + good[k]] = text
         done += len(part)
-    return _table(study, schema, cell, rows, values)
+    return _table(study, schema, cell, rows, values), undone
 
 
 #: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
