@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
+from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
@@ -307,5 +308,9 @@ def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
         )  # fmt: skip
         number = int(message.track[k])
         place = float(np.squeeze(lat)), float(np.squeeze(lon)), float(np.squeeze(alt))
-        found.append(Flying(number, f"T{number}", *place, *speeds))
+        # A track's velocity is along the axes of its frame, an ADS-B report's along those there.
+        origin = message.origin_lat_deg[k : k + 1], message.origin_lon_deg[k : k + 1]
+        here = np.array(place[:2]).reshape(2, 1)
+        along = vectors_in_frame(here, np.array(origin), np.array(speeds).reshape(3, 1))
+        found.append(Flying(number, f"T{number}", *place, *along[:, 0].tolist()))
     return found

@@ -26,6 +26,7 @@ from components.surveillance.cooperative import (
     CooperativeSensor,
     velocity_of,
 )
+from components.surveillance.extended_squitter import altitude_step_ft
 from components.surveillance.interrogation import (
     CUT,
     IN_1_S,
@@ -223,10 +224,13 @@ class Active(CooperativeSensor):
         if self.p.replies == "rounds":
             detected[asked] = self._answer(cells, asked, probability[asked])
         answered = np.flatnonzero(detected)
+        now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
+        # An altitude that no code has is not available: such an answer places nobody.
+        detected[answered] = np.isfinite(now)
+        answered, now = answered[np.isfinite(now)], now[np.isfinite(now)]
         extras = unreported(len(cells))
         equipage, craft = cells.roster.equipage, cells.craft[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
-        now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
         if len(answered):
@@ -271,7 +275,7 @@ class Active(CooperativeSensor):
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
         """Return what some cells' transponders report of true altitudes, m."""
-        step_ft = self._step_ft(cells, which) if self._errs else 0.0
+        step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.of(cells, which)
         return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
 
@@ -334,17 +338,21 @@ class Active(CooperativeSensor):
         position_m, attitude_rad = navigation_noise(self.context)
         own = velocity_of(cells, detected, none, cells.seen_at(detected, none), "own")
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
+        step_ft = self._step_ft(cells, detected, altitude_m)
         return unstated_errors(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
             "height_deviation": np.sqrt(altimetry_ft2) * FOOT_M,
-            "rounding_deviation": self._step_ft(cells, detected) * FOOT_M / math.sqrt(12.0),
+            "rounding_deviation": step_ft * FOOT_M / math.sqrt(12.0),
             "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
             "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),
             "range_deviation": none + RANGE_ERROR_M,
             "white_variance": none + _WHITE_M2 + max(position_m) ** 2,
         }  # fmt: skip
 
-    def _step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
+    def _step_ft(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
+        return altitude_step_ft(altitude_m / FOOT_M, self._mode_step_ft(cells, which))
+
+    def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
         mode_s = cells.roster.equipage.mode_s[cells.craft[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
 
@@ -366,6 +374,6 @@ class Active(CooperativeSensor):
         place_m2 = max(position_m[:2]) ** 2
         across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
         along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
-        step_ft = self._step_ft(cells, detected)
+        step_ft = self._step_ft(cells, detected, altitude_m)
         feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + step_ft**2 / 12.0
         return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, locked, write_file
 from dsa_des.files.output_names import why_not_written
+from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, sealed
 from dsa_des.record.undone import Undone, added
 from dsa_des.results.record import StudyHead, StudyRecord
-from dsa_des.results.sealed_files import ABOUT, is_sealed, open_lock, read_regular, sealed
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -154,6 +154,22 @@ def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
     headings = [*tables.rows.axes, *RATIO_HEADS]
     print_table(console, f"parts of the ratios, {level} intervals", headings, rows,
                 group=len(tables.rows.axes))  # fmt: skip
+    if tables.record.geometry:
+        for line in lines[:_MOST_SHOWN]:
+            console.print(gain_text(line))
+
+
+def gain_text(line: Line) -> str:
+    """Return how many runs were flown for a ratio, and what that is worth."""
+    ratio = line.ratio
+    assert ratio is not None
+    at = "".join(f"{short(value)}: " for value in line.at)
+    said = f"{at}{line.result.name}: {ratio.flown:,} of {ratio.encounters:,} runs were flown"
+    if not ratio.gain > 0.0:
+        return said
+    if ratio.gain <= 1.0:
+        return f"{said}; as wide an interval costs no more with all of them: nothing is gained"
+    return f"{said}; as wide an interval costs {ratio.gain:.2g} times as much with all of them"
 
 
 def _note_unreached(console: Any, tables: Tables) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from dsa_des.files.sealed_files import read_regular
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
 from dsa_des.results.models import (
@@ -26,7 +27,6 @@ from dsa_des.results.models import (
 )
 from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, rounded
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO, run_command
-from dsa_des.results.sealed_files import read_regular
 from dsa_des.results.summary import Answer, Line, one_sided
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.text.safe_text import printable, shortened
