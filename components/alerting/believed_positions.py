@@ -30,6 +30,7 @@ class BelievedFlights(NamedTuple):
     target: IntArray | None = None
     number: IntArray | None = None  # of tracks
     deviations: Deviations | None = None  # of (rows,)
+    age_s: FloatArray | None = None  # (rows,) of the last measurement of each track
 
 
 class BelievedPositions:

@@ -10,7 +10,13 @@ from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
+from components.messages.state_tracks import (
+    COASTED,
+    CONFIRMED,
+    COVARIANCE,
+    STALE_S,
+    StateTracks,
+)
 from dsa_des.arrays.entries import row_of_entries
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
@@ -26,7 +32,10 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 
 
 class EstimatedFlights:
-    """What has come of trackers' states: confirmed and coasted tracks that have a range."""
+    """What has come of trackers' states: confirmed and coasted tracks that have a range.
+
+    One that has had no detection for `STALE_S` is refused, whatever is still held of it.
+    """
 
     def __init__(self) -> None:
         #: How many tracks have no range, of how many.
@@ -36,7 +45,13 @@ class EstimatedFlights:
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
         #: n) of latitude, longitude (deg) and height (m), of the instant ``time_s``.
         self._tracks = KeyedTable.empty(
-            {"replica": int, "number": int, "time_s": float, **dict.fromkeys(_SHAPES, float)},
+            {
+                "replica": int,
+                "number": int,
+                "time_s": float,
+                "updated_s": float,
+                **dict.fromkeys(_SHAPES, float),
+            },
             _SHAPES,
         )
 
@@ -52,6 +67,7 @@ class EstimatedFlights:
             replica=came.run[row_of_entries(tracks.offsets)],
             number=tracks.track,
             time_s=tracks.state_s,
+            updated_s=tracks.updated_s,
             state=np.array([getattr(tracks, name) for name in STATE]),
             covariance=np.array([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
             origin=np.array([getattr(tracks, name) for name in ORIGIN]),
@@ -73,18 +89,25 @@ class EstimatedFlights:
 
     def states(
         self, now: RunTicks, now_s: FloatArray, own_place: FloatArray
-    ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
-        """Return the flights that are known at some instants, by instant and track."""
+    ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
+        """Return the flights that are known at some instants, by instant and track.
+
+        They are the instant, number, state and deviations of each, and how old its last
+        measurement is.
+        """
         last = self._rows.last(now)
         some = np.flatnonzero(last >= 0)
         rows = self._rows.take(last[some])
         index, entry = _each(rows.begin, rows.count)
         instant = some[index]
+        young = now_s[instant] - self._tracks.updated_s[entry] <= STALE_S
+        instant, entry = instant[young], entry[young]
         order = np.lexsort((self._tracks.number[entry], instant))
         instant, tracks = instant[order], self._tracks.take(entry[order])
         ahead_s = now_s[instant] - tracks.time_s
         state = _in_plane(tracks, ahead_s, own_place[:, instant])
-        return instant, tracks.number, state, _deviations(tracks.covariance, ahead_s)
+        deviations = _deviations(tracks.covariance, ahead_s)
+        return instant, tracks.number, state, deviations, now_s[instant] - tracks.updated_s
 
 
 def _each(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
@@ -175,13 +198,13 @@ class BelievedTracks:
         self._unmoving += len(asked) - len(moving), len(asked)
         now = asked.take(moving)
         result = self._estimates.states(now, times_s[moving], poses.place(now))
-        scan, number, state, deviations = moving[result[0]], *result[1:]
+        scan, number, state, deviations, age_s = moving[result[0]], *result[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
         relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))
         known = np.ones((len(scan), 1), dtype=bool)
         target = self._nearest(asked.take(scan), state[:3].T)
-        return BelievedFlights(known, relative, scan, target, number, deviations)
+        return BelievedFlights(known, relative, scan, target, number, deviations, age_s)
 
     def _nearest(self, now: RunTicks, position_m: FloatArray) -> IntArray:
         """Return the target nearest to each of some positions (n, 3), -1 where none is near."""

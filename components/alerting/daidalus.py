@@ -9,7 +9,11 @@ from pydantic import Field, field_validator
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration, Deviations, margins
 from components.alerting.alert_tables import without_memory
-from components.alerting.believed_positions import BelievedPositions, true_positions_m
+from components.alerting.believed_positions import (
+    BelievedFlights,
+    BelievedPositions,
+    true_positions_m,
+)
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
@@ -23,7 +27,7 @@ from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.well_clear.separation import separation
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import offsets_of
@@ -198,7 +202,7 @@ class DaidalusAlerting(Component):
             result.time_to_closest_s,
             result.miss_horizontal_m,
             result.miss_vertical_m,
-            {} if flights.number is None else {"track": flights.number},
+            _of_tracks(flights),
             {} if wrong is None else wrong._asdict(),
             dict(zip(_RELATIVE, relative, strict=True)),
             own,
@@ -215,6 +219,13 @@ class DaidalusAlerting(Component):
         # The next scans come after all of these.
         since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
         self._own.set_aside(since, wake, late_sights=self._source != "estimates")
+
+
+def _of_tracks(flights: BelievedFlights) -> dict[str, AnyArray]:
+    """Return what is recorded of the tracks that are believed; nothing where there are none."""
+    if flights.number is None or flights.age_s is None:
+        return {}
+    return {"track": flights.number, "track_age_s": flights.age_s}
 
 
 def _own_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:

@@ -271,6 +271,14 @@ class Component:
         """Return how long this block's data lasts, for scenes that give no ``duration_s``."""
         return None
 
+    def acts_every_s(self) -> Fraction | None:
+        """Return how often the block is woken though nothing comes, s; None for never.
+
+        For a block that is triggered and must act in time all the same: `Wake.idle` says at which
+        rows nothing came. Asked once, after `setup`; the same of all runs in lock step.
+        """
+        return None
+
     @property
     def width(self) -> int:
         """Number of targets per row this block emits, for sizing windows."""
