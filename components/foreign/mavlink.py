@@ -16,7 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
@@ -256,7 +256,7 @@ class Mavlink(Component):
 def _row(wake: Wake, says: AutopilotSays) -> AutopilotStates:
     flying = says.flying
     times = (t if math.isfinite(t) else math.nan for t in (says.attitude_s, says.position_s))
-    return AutopilotStates(wake.ticks, *(np.array([v]) for v in (*times, *flying[2:])))
+    return AutopilotStates(wake.ticks, *(np.array([v]) for v in (*times, *flying[2:11])))
 
 
 def _flying(
@@ -288,11 +288,16 @@ def _flying(
 
 
 def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
-    """Return confirmed and coasted tracks with a range, carried on straight to an instant."""
+    """Return confirmed and coasted tracks with a range, carried on straight to an instant.
+
+    One without a detection for `STALE_S` is none.
+    """
     row = int(rows[0])
     found = []
     for k in range(int(message.offsets[row]), int(message.offsets[row + 1])):
         if not message.has_range[k] or message.track_status[k] not in (CONFIRMED, COASTED):
+            continue
+        if (age_s := time_s - float(message.updated_s[k])) > STALE_S:
             continue
         speeds = [float(getattr(message, f"{axis}_m_s")[k]) for axis in ("north", "east", "down")]
         ahead_s = time_s - float(message.state_s[k])
@@ -312,5 +317,6 @@ def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
         origin = message.origin_lat_deg[k : k + 1], message.origin_lon_deg[k : k + 1]
         here = np.array(place[:2]).reshape(2, 1)
         along = vectors_in_frame(here, np.array(origin), np.array(speeds).reshape(3, 1))
-        found.append(Flying(number, f"T{number}", *place, *along[:, 0].tolist()))
+        one = Flying(number, f"T{number}", *place, *along[:, 0].tolist())
+        found.append(one._replace(age_s=max(age_s, 0.0)))
     return found

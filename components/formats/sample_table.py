@@ -69,8 +69,9 @@ class SampleTable:
         gaps: bool = False,
         instead: Mapping[str, str] | None = None,
         rows: str = "rows",
+        least: int = 2,
     ) -> None:
-        self._kind_of_rows = rows
+        self._kind_of_rows, self._least = rows, least
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
@@ -165,7 +166,7 @@ class SampleTable:
         names = list(kept)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
-        if len(names) == 1:
+        if len(names) < self._least:
             self._problems.add(
                 f"there is one aircraft only, {shortened(names[0])!r}: an ownship and at least "
                 "one intruder are needed"

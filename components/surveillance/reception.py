@@ -60,6 +60,14 @@ def do_365(range_m: FloatArray) -> FloatArray:
     return np.where(range_m <= inner, near, np.where(range_m <= outer, far, 0.0))
 
 
+def time_to_receive_s(probability: FloatArray) -> FloatArray:
+    """Return in which time one of two messages a second has come 19 times in 20, s; 60 at most."""
+    missed = np.log1p(-np.clip(probability, 1e-9, 1.0 - 1e-9))
+    messages = np.maximum(np.ceil(np.log(0.05) / missed - 1e-6), 1.0)
+    # Messages are up to 0.6 s apart, and a tracker heeds a look a tenth of the time before it.
+    return np.minimum(messages / _PER_SECOND + 0.2, 60.0)
+
+
 def certain(range_m: FloatArray) -> FloatArray:
     """Return 1 at any range."""
     return np.ones_like(range_m, dtype=np.float64)

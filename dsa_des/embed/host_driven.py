@@ -118,6 +118,7 @@ class _Runner:
         component = self.component = node.component
         self.name, self.cursor = component.name, cursor
         self.before = None if node.clock is None else node.clock.before
+        self.pulse = None if node.pulse is None else ScanCursor(node.pulse.first)
         self.demands = [] if cursor else [demand.block for demand in node.demands]
         into: dict[str, list[_Wire]] = {}
         for wire in wires:
@@ -281,11 +282,17 @@ class HostDriven:
                     triggered = triggered or wire.trigger
                     wire.push(tick, new)
             scan = scans.get(runner.name)
+            idle = None
+            if runner.pulse is not None:
+                # It acts at the first call at or after each of its instants.
+                acts = runner.pulse.due(tick) is not None
+                idle = np.array([scan is None and not triggered])
+                triggered = triggered or acts
             if scan is None and not triggered:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before)
+            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before, idle=idle)
             if wake is None:
                 continue
             try:

@@ -46,7 +46,7 @@ _LEAST_CHANCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Known:
+class ForeseenRuns:
     """Runs as their geometry and nominal flights tell them, before they are flown.
 
     Geometry (numbers, runs); nominal flags (events, runs), 0 outside an event's class; the chance
@@ -60,7 +60,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Allocation:
     """With which probability runs of a cell are flown, by what is known of them."""
 
     middle: FloatArray
@@ -74,12 +74,12 @@ class Plan:
     #: Of the runs it was learnt from, so many would be flown.
     share: float = 1.0
 
-    def probabilities(self, runs: Known) -> FloatArray:
+    def probabilities(self, runs: ForeseenRuns) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
         worth = np.sqrt(_combined(self.precision, self._chances(runs)))
         return flown_with(runs.weight * worth, self.size)
 
-    def _chances(self, runs: Known) -> FloatArray:
+    def _chances(self, runs: ForeseenRuns) -> FloatArray:
         terms = model_terms(self._scaled(runs.geometry), runs.nominal)
         return chances(terms, runs, self.coefficients)
 
@@ -102,7 +102,7 @@ def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
     return np.concatenate([within, within**2 - 1.0, nominal])
 
 
-def chances(terms: FloatArray, runs: Known, coefficients: FloatArray) -> FloatArray:
+def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
     """Return the chance of each event by the logistic models, (events, runs)."""
     design = _design(terms)
     without, having = (
@@ -113,12 +113,12 @@ def chances(terms: FloatArray, runs: Known, coefficients: FloatArray) -> FloatAr
     return result
 
 
-def learn(runs: Known, happened: FloatArray, stands_for: FloatArray) -> Plan:
+def learn(runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray) -> Allocation:
     """Return the plan for further runs of a cell, from those that are known.
 
     Parameters
     ----------
-    runs : Known
+    runs : ForeseenRuns
     happened : (events, runs)
         Whether each event happened with the remedy; of those not flown anything.
     stands_for : (runs,)
@@ -139,11 +139,11 @@ def learn(runs: Known, happened: FloatArray, stands_for: FloatArray) -> Plan:
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
             fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
     precision, size = best_size(runs, chances(terms, runs, fitted))
-    plan = Plan(middle, spread, fitted, precision, size)
+    plan = Allocation(middle, spread, fitted, precision, size)
     return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
-def best_size(runs: Known, chance: FloatArray) -> tuple[FloatArray, float]:
+def best_size(runs: ForeseenRuns, chance: FloatArray) -> tuple[FloatArray, float]:
     """Return 1/V of each event, and the size of π with the least variance times cost."""
     w, n = runs.weight, runs.nominal
     below = (w * n).sum(axis=1)

@@ -15,7 +15,7 @@ from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import EVENT, RATIO, STANDS_FOR, RatioOf, Result, geometry_column
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.allocation import PILOT, UNTOLD, Known, Plan, drawn, learn
+from dsa_des.studies.allocation import PILOT, UNTOLD, Allocation, ForeseenRuns, drawn, learn
 from dsa_des.studies.draws import uniform
 from dsa_des.studies.metric import Group, Metric, expected_column
 from dsa_des.studies.study import AUTO, Study
@@ -79,7 +79,7 @@ def stands_for(
     study: Study,
     cell: int,
     numbers: Sequence[int],
-    plan: Plan | None,
+    plan: Allocation | None,
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
 ) -> FloatArray:
@@ -95,13 +95,13 @@ def stands_for(
     return drawn(plan.probabilities(_known(columns, ratios)), draws)[1]
 
 
-def _known(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> Known:
+def _known(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
     chances = [geometry_column(expected_column(of.above)) for of in ratios]
     names = sorted(name for name in columns if name.startswith(geometry_column("")))
     geometry = [columns[n] for n in names if not n.startswith(geometry_column(expected_column("")))]
     weights = [np.ones(len(geometry[0])) if of.weight is None else columns[of.weight]
                for of in ratios]  # fmt: skip
-    return Known(
+    return ForeseenRuns(
         np.array(geometry, dtype=np.float64),
         np.array([_of_class(columns, of, columns[of.below]) for of in ratios]),
         np.array(
@@ -122,7 +122,7 @@ def _of_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> Float
 
 def plans_of(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
-) -> dict[int, Plan]:
+) -> dict[int, Allocation]:
     """Return the plan of every cell for the round that begins with a replica, by earlier rounds."""
     if not study.allocate or first < PILOT:
         return {}

@@ -21,7 +21,7 @@ from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text,
 from dsa_des.scene.overrides import SWAP, apply_changes, read_sets
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.studies.allocation import Plan, round_ends
+from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -62,7 +62,7 @@ class Chunk:
     name: str
     runs: tuple[tuple[int, int, int], ...]
     #: Of cells of which a sample of the runs is flown.
-    plans: Mapping[int, Plan] = field(default_factory=dict)
+    plans: Mapping[int, Allocation] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)
@@ -180,7 +180,7 @@ class Study:
         return run_command(str(self.scene_path), replica.seed, swaps, changes)
 
     def chunks(
-        self, round_number: int, cells: Sequence[int], plans: Mapping[int, Plan] | None = None
+        self, round_number: int, cells: Sequence[int], plans: Mapping[int, Allocation] | None = None
     ) -> Iterator[Chunk]:
         """Return the chunks of one round: a batch of replicas of each of the given cells.
 

@@ -161,7 +161,7 @@ class _StudyReader:
             compare_weight=weight,
             requirements=self.requirements(axes),
             allocate=() if keys.allocate is None else tuple(_listed(keys.allocate)),
-            runs_per_chunk=keys.runs_per_chunk or max(1, min(512, -(-runs // 32))),
+            runs_per_chunk=keys.runs_per_chunk or max(1, min(1024, -(-runs // 16))),
             base=base,
             tables=resolved(self.data, swaps),
         )

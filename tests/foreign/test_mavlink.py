@@ -221,7 +221,9 @@ def test_tracks_are_carried_on_to_the_instant(away_m):
         down_m=zero - 30, north_m_s=zero - 50, east_m_s=zero + 20, down_m_s=zero + 2,
         origin_lat_deg=zero - 33.9, origin_lon_deg=zero - 179.999, origin_alt_m=zero + 100,
     )  # fmt: skip
+    assert mavlink._tracks(message, np.array([0]), 30.5) == []  # of half a minute ago
     (track,) = mavlink._tracks(message, np.array([0]), 9.5)
+    assert track.age_s == 9.5
     origin = -33.9, -179.999, 100
     where = pymap3d.ned2geodetic(900 - 125, 50 - away_m, -30 + 5, *origin)
     later = pymap3d.ned2geodetic(900 - 175, 70 - away_m, -30 + 7, *origin)
