@@ -89,8 +89,8 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     row, column = np.unravel_index(
         int(np.argmax(np.where(sought, through, -math.inf))), picture.shape
     )
-    x = column + 0.5 + _vertex(through[row, max(column - 1, 0) : column + 2])
-    y = row + 0.5 + _vertex(through[max(row - 1, 0) : row + 2, column])
+    x = float(column + 0.5 + _vertex(through[row, max(column - 1, 0) : column + 2]))
+    y = float(row + 0.5 + _vertex(through[max(row - 1, 0) : row + 2, column]))
     finest = cv2.GaussianBlur(flat, (0, 0), spread_pixels, borderType=cv2.BORDER_REFLECT)
     level = float(finest[row, column])
     stands = sought & (finest > 0.5 * level)
