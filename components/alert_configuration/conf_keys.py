@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from components.alert_configuration.configuration import REGIONS
+from components.alert_configuration.configuration import REGIONS, VERSIONS, VERSIONS_BETWEEN
 from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.formats.text_rows import (
     ANGLE_DEG,
@@ -97,9 +97,6 @@ KEYS: Mapping[str, tuple[str, object, str]] = {
     "daidalus_version": ("version", "2.0.4", ""),
 }
 
-#: Releases whose rules may be taken, the default last: they differ in guidance only.
-VERSIONS = ("2.0.1", "2.0.4")
-
 #: Keys that only their default may be given for, since what they switch on is not there.
 ONLY_OFF = ("conflict_crit", "recovery_crit", "hdir_bands_below_min_as", "dta_logic")
 #: Keys that may be negative.
@@ -134,6 +131,9 @@ CLASSES: Mapping[str, str] = {
     "WCV_TEP": "time_to_entry",
     "WCV_TAUMOD_SUM": "modified_tau",
 }
+#: A cylinder: its radius and half its height.
+CYLINDER_CLASS = "CDCylinder"
+CYLINDER_KEYS: Mapping[str, str] = {"D": "length", "H": "length"}
 CLASS_PREFIX = "gov.nasa.larcfm.ACCoRD."
 
 
@@ -163,11 +163,15 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
     if kind == "region":
         return _region(plain), ""
     if kind == "version":
-        if plain not in VERSIONS:
+        plain = plain.strip("\"'")
+        if plain not in (*VERSIONS, *VERSIONS_BETWEEN):
             close = nearest(plain, VERSIONS)
             hint = f"; did you mean {close}?" if close else ""
             allowed = " or ".join(VERSIONS)
-            raise BadValue(f"is {shortened(plain, 40)!r}: it must be {allowed}{hint}")
+            raise BadValue(
+                f"is {shortened(plain, 40)!r}: it must be {allowed}, whose rules are known, or a "
+                f"release between them{hint}"
+            )
         return plain, ""
     if kind == "yes or no":
         result = {**_YES, **_NO}.get(plain.lower())

@@ -14,6 +14,10 @@ from dsa_des.text.safe_text import shortened
 
 #: Regions of guidance from mild to severe.
 REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
+#: Releases whose rules are known, the default last: they differ in guidance only.
+VERSIONS = ("2.0.1", "2.0.4")
+#: Releases between them: taken for the last, which is said.
+VERSIONS_BETWEEN = ("2.0.2", "2.0.3")
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,19 @@ class Configuration:
         return self.values[key]
 
     def notes(self) -> list[str]:
-        """Say what of its file it does not use."""
-        if not self.left_out:
-            return []
-        shown = shortened(", ".join(self.left_out))
-        return [f"alerters of the file that its key 'alerters' does not name are ignored: {shown}"]
+        """Say what of its file it does not use, or uses otherwise."""
+        said = []
+        if self.left_out:
+            shown = shortened(", ".join(self.left_out))
+            said.append(
+                f"alerters of the file that its key 'alerters' does not name are ignored: {shown}"
+            )
+        if (version := self["daidalus_version"]) in VERSIONS_BETWEEN:
+            said.append(
+                f"daidalus_version is {version}: the rules of {VERSIONS[-1]} are used, since what "
+                "that release does otherwise is not known"
+            )
+        return said
 
     @property
     def most_levels(self) -> int:

@@ -187,6 +187,8 @@ def _show(configuration: Configuration, done: list[_Done], places: dict[str, Pat
     for note in configuration.notes():
         say(f"note: {note}")
     for one in done:
+        for note in one.encounter.notes:
+            say(f"note: {one.path}: {note}")
         if one.encounter.left_out:
             say(
                 f"note: {one.path}: {one.encounter.left_out} rows of targets are left out: the "

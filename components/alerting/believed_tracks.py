@@ -5,12 +5,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations, largest
-from components.alerting.believed_positions import BelievedFlights
+from components.alerting.believed_positions import BelievedFlights, judged_not
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
+from components.messages.state_tracks import (
+    COASTED,
+    CONFIRMED,
+    COVARIANCE,
+    STALE_S,
+    StateTracks,
+)
 from dsa_des.arrays.entries import row_of_entries
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
@@ -26,21 +32,34 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 
 
 class EstimatedFlights:
-    """What has come of trackers' states: confirmed and coasted tracks that have a range."""
+    """What has come of trackers' states: confirmed and coasted tracks that have a range.
+
+    One that has had no detection for `STALE_S` is refused, whatever is still held of it.
+    """
 
     def __init__(self) -> None:
+        #: How many tracks have no range, of how many.
+        self.rangeless = np.zeros(2, dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
         self._rows = ReceivedRows.none("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
         #: n) of latitude, longitude (deg) and height (m), of the instant ``time_s``.
         self._tracks = KeyedTable.empty(
-            {"replica": int, "number": int, "time_s": float, **dict.fromkeys(_SHAPES, float)},
+            {
+                "replica": int,
+                "number": int,
+                "time_s": float,
+                "updated_s": float,
+                **dict.fromkeys(_SHAPES, float),
+            },
             _SHAPES,
         )
 
     def add(self, came: RunTicks, tracks: StateTracks) -> None:
         """Take in tracks of a tracker, and when each row came."""
-        good = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
+        good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
+        self.rangeless += np.count_nonzero(good & ~tracks.has_range), np.count_nonzero(good)
+        good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
         self._rows = self._rows.with_more(came, begin=begin, count=np.diff(before))
@@ -48,6 +67,7 @@ class EstimatedFlights:
             replica=came.run[row_of_entries(tracks.offsets)],
             number=tracks.track,
             time_s=tracks.state_s,
+            updated_s=tracks.updated_s,
             state=np.array([getattr(tracks, name) for name in STATE]),
             covariance=np.array([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
             origin=np.array([getattr(tracks, name) for name in ORIGIN]),
@@ -69,18 +89,25 @@ class EstimatedFlights:
 
     def states(
         self, now: RunTicks, now_s: FloatArray, own_place: FloatArray
-    ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
-        """Return the flights that are known at some instants, by instant and track."""
+    ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
+        """Return the flights that are known at some instants, by instant and track.
+
+        They are the instant, number, state and deviations of each, and how old its last
+        measurement is.
+        """
         last = self._rows.last(now)
         some = np.flatnonzero(last >= 0)
         rows = self._rows.take(last[some])
         index, entry = _each(rows.begin, rows.count)
         instant = some[index]
+        young = now_s[instant] - self._tracks.updated_s[entry] <= STALE_S
+        instant, entry = instant[young], entry[young]
         order = np.lexsort((self._tracks.number[entry], instant))
         instant, tracks = instant[order], self._tracks.take(entry[order])
         ahead_s = now_s[instant] - tracks.time_s
         state = _in_plane(tracks, ahead_s, own_place[:, instant])
-        return instant, tracks.number, state, _deviations(tracks.covariance, ahead_s)
+        deviations = _deviations(tracks.covariance, ahead_s)
+        return instant, tracks.number, state, deviations, now_s[instant] - tracks.updated_s
 
 
 def _each(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
@@ -140,6 +167,12 @@ class BelievedTracks:
         self._estimates = EstimatedFlights()
         #: Where the targets are: a track is named by the nearest.
         self._true = ReceivedRows.none(position_m=(targets, 3))
+        #: At how many scans the ownship's velocity is not known yet, of how many.
+        self._unmoving = np.zeros(2, dtype=np.int64)
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often something could not be judged."""
+        return judged_not(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in the tracks of a tracker."""
@@ -162,15 +195,16 @@ class BelievedTracks:
         """
         # Without two poses the ownship's own velocity is not known, and no relative one.
         moving = np.flatnonzero(np.isfinite(own["east_mps"]))
+        self._unmoving += len(asked) - len(moving), len(asked)
         now = asked.take(moving)
         result = self._estimates.states(now, times_s[moving], poses.place(now))
-        scan, number, state, deviations = moving[result[0]], *result[1:]
+        scan, number, state, deviations, age_s = moving[result[0]], *result[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
         relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))
         known = np.ones((len(scan), 1), dtype=bool)
         target = self._nearest(asked.take(scan), state[:3].T)
-        return BelievedFlights(known, relative, scan, target, number, deviations)
+        return BelievedFlights(known, relative, scan, target, number, deviations, age_s)
 
     def _nearest(self, now: RunTicks, position_m: FloatArray) -> IntArray:
         """Return the target nearest to each of some positions (n, 3), -1 where none is near."""

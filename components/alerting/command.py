@@ -45,7 +45,8 @@ from dsa_des.commands.group import plain_errors
 def alert(**options: Any) -> None:
     """Alert levels of recorded encounters, by a configuration of DAIDALUS.
 
-    FILE is a .daa or .xyz file, whose first aircraft is the ownship, or a folder of them.
+    FILE is a .daa or .xyz file, or a .csv table as traffic.csv reads it, whose first aircraft is
+    the ownship; or a folder of .daa and .xyz files.
     """
     from components.alerting.alert_files import alert_files
 

@@ -9,21 +9,25 @@ from pydantic import Field, field_validator
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration, Deviations, margins
 from components.alerting.alert_tables import without_memory
-from components.alerting.believed_positions import BelievedPositions, true_positions_m
+from components.alerting.believed_positions import (
+    BelievedFlights,
+    BelievedPositions,
+    true_positions_m,
+)
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
 from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
-from components.messages.alerts import MOST_LEVELS, AlertLevels
+from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.well_clear.separation import separation
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import offsets_of
@@ -104,9 +108,28 @@ class DaidalusAlerting(Component):
         self._over_s = 0.0 if self._source == "estimates" else self.p.fit_s
         self._memory = LevelMemory(memory_rule(configuration))
 
+    def offer(self, port: str) -> AlertsOffered:
+        """Say how many levels there are, and how far apart the scans."""
+        return AlertsOffered(len(self.p.read()[1].levels), float(1 / self.p.scan_rate_hz))
+
     def warnings(self) -> list[str]:
-        """Say what of its configuration is not used."""
-        return self._configuration.notes()
+        """Say what of its configuration is not used, and what leaves it without work."""
+        said, period_s = self._configuration.notes(), float(1 / self.p.scan_rate_hz)
+        if 0.0 < self._configuration["hysteresis_time"] < period_s:
+            said.append(
+                f"hysteresis_time is {self._configuration['hysteresis_time']:g} s and scans are "
+                f"{period_s:g} s apart: no level is remembered"
+            )
+        if self.p.offset_s + 1 / self.p.scan_rate_hz >= self.context.duration_s:
+            said.append(
+                f"scan_rate_hz is {float(self.p.scan_rate_hz):g}: in "
+                f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
+            )
+        return said
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often a flight could not be judged."""
+        return {} if self._roster is None else self._belief.undone()
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
@@ -179,7 +202,7 @@ class DaidalusAlerting(Component):
             result.time_to_closest_s,
             result.miss_horizontal_m,
             result.miss_vertical_m,
-            {} if flights.number is None else {"track": flights.number},
+            _of_tracks(flights),
             {} if wrong is None else wrong._asdict(),
             dict(zip(_RELATIVE, relative, strict=True)),
             own,
@@ -196,6 +219,13 @@ class DaidalusAlerting(Component):
         # The next scans come after all of these.
         since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
         self._own.set_aside(since, wake, late_sights=self._source != "estimates")
+
+
+def _of_tracks(flights: BelievedFlights) -> dict[str, AnyArray]:
+    """Return what is recorded of the tracks that are believed; nothing where there are none."""
+    if flights.number is None or flights.age_s is None:
+        return {}
+    return {"track": flights.number, "track_age_s": flights.age_s}
 
 
 def _own_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:

@@ -2,19 +2,24 @@
 
 from collections.abc import Callable
 from os import PathLike
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.alert_configuration.configuration import Configuration, Deviations, largest, margins
 from components.alerting.levels import AlertPairs
+from components.flights.attitude import fit_path
+from components.flights.sampled_flight import SampledTrajectory
+from components.formats.csv_file import read_csv
 from components.formats.daa_file import EXTRA_COLUMNS, read_daa_samples
-from components.formats.text_rows import Problems
+from components.formats.text_rows import Problems, TrafficFileError
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
 from components.well_clear.detection import Bounds
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.text.safe_text import shortened
 
 Samples = dict[str, FloatArray]
 
@@ -42,6 +47,7 @@ class Encounter(NamedTuple):
     # air, which changes none of the differences
     wind: FloatArray
     left_out: int  # Samples of targets at other instants than the ownship's
+    notes: tuple[str, ...] = ()  # What was assumed in reading the file
 
     @property
     def pairs(self) -> AlertPairs:
@@ -57,15 +63,16 @@ def read_encounter(
     configuration: Configuration,
     wind_mps: tuple[float, float] | None = None,
 ) -> Encounter:
-    """Read a `.daa` or `.xyz` file, whose first aircraft is the ownship.
+    """Read a `.daa` or `.xyz` file, or a table as `read_csv` does; the first is the ownship.
 
+    Aircraft of a table are sampled at the ownship's times, on the flights that traffic follows.
     The wind (towards the east and the north, m/s) is by default what the ownship's columns
     `heading` and `airspeed` imply, where both are given, else none. Targets count at the ownship's
     times: a sample at another instant is left out, as the reference leaves it out. Raises
     `TrafficFileError` with all problems of the file, also without velocities or with an alerter
     that is not there.
     """
-    samples = read_daa_samples(path, tuple(EXTRA_COLUMNS))
+    samples, notes = _samples(path)
     problems = Problems(str(path))
     names = tuple(samples)
     own = samples[names[0]]
@@ -96,7 +103,53 @@ def read_encounter(
         target_plane,
         wind,
         sum(len(other["time"]) for other in others) - int(present.sum()),
+        notes,
     )
+
+
+def _samples(path: str | PathLike[str]) -> tuple[dict[str, Samples], tuple[str, ...]]:
+    """Return the samples of each aircraft of a file, and what was assumed of them."""
+    if Path(path).suffix.lower() != ".csv":
+        return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
+    try:
+        file = read_csv(path)
+    except TrafficFileError:
+        try:  # one with a row of units is of DAIDALUS, whatever it is called
+            return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
+        except TrafficFileError:
+            pass
+        raise
+    own = file.ownship
+    time_s = own.sample_times_s
+    result, far = {own.name: _sampled(own, time_s, file.start_time_s)}, []
+    for craft in file.intruders:
+        first_s, last_s = craft.interval_present()
+        there = time_s[(time_s >= first_s) & (time_s <= last_s)]
+        if len(there):
+            result[craft.name] = _sampled(craft, there, file.start_time_s)
+        else:
+            far.append(craft.name)
+    if len(result) < 2:
+        Problems(str(path)).fail(f"no aircraft is there at a time at which {own.name} is")
+    notes = [*file.notes, *file.warnings, "flights are interpolated to the times of the ownship"]
+    if far:
+        notes.append(f"never there at a time of the ownship: {shortened(', '.join(far))}")
+    return result, tuple(notes)
+
+
+def _sampled(craft: SampledTrajectory, time_s: FloatArray, start_s: float) -> Samples:
+    """Return the samples of an aircraft at some times of its flight."""
+    known_s, path = craft.sample_times_s, (craft.lat_deg, craft.lon_deg, craft.alt_m)
+    velocity = craft.velocity_enu_mps
+    if velocity is None:
+        velocity = fit_path(known_s, *path)[0]
+    state = craft.at(time_s)
+    place = {"lat": state.lat_deg, "lon": state.lon_deg, "alt": state.alt_m}
+    rates = {
+        name: np.interp(time_s, known_s, part)
+        for name, part in zip(("ve", "vn", "vu"), velocity, strict=True)
+    }
+    return {"time": time_s + start_s, **place, **rates}
 
 
 def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:

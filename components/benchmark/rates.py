@@ -134,6 +134,17 @@ def risk(count: int) -> Callable[[], object]:
     return _chunks("closed_loop_risk.toml", tables, count)
 
 
+def risk_tracked(count: int) -> Callable[[], object]:
+    """Return what runs a chunk of the shipped study `radar_and_camera_risk`."""
+    volume = {"horizontal_m": 670.56, "vertical_m": 137.16, "by": [], "needless": True}
+    tables = {
+        "replicas": 100_000,
+        "metrics": [{"metric": "risk_ratio", **volume}],
+        "draws": {"blocks": {"traffic": {"encounter": {"sequence": [0, 1]}}}},
+    }
+    return _chunks("../avoidance/radar_and_camera.toml", tables, count)
+
+
 def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], object]:
     """Return what runs chunks of a study, each time one of other runs."""
     study = study_of_tables(tables, read_scene_file(SCENES / scene), (), ())
@@ -260,6 +271,13 @@ RATES = (
         167,
         512,
         risk,
+    ),
+    Rate(
+        "risk_tracked",
+        "the same with radar and camera of stated errors, EKF, DO-365 alerting and a pilot",
+        100,
+        512,
+        risk_tracked,
     ),
 )
 

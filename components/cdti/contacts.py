@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import TangentPlane, offset_positions
-from components.geometry import body_to_ned, unit_vector_unchecked
+from components.display.picture import offset_positions
+from components.estimation.frame import vectors_in_frame
+from components.geometry import body_to_ned, north_east_up, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
@@ -25,8 +26,8 @@ _SPEED_OVER_S = 0.5
 class OwnNow:
     """The ownship at the latest instant that is known."""
 
-    east_m: float
-    north_m: float
+    lat_deg: float
+    lon_deg: float
     alt_m: float
     heading_rad: float
     pitch_rad: float
@@ -40,21 +41,15 @@ class OwnFlight:
 
     def __init__(self) -> None:
         self.now: OwnNow | None = None
-        self.plane: TangentPlane | None = None
         self._tick: IntArray = np.empty(0, dtype=np.int64)
-        # East, north, altitude, yaw, pitch, roll.
+        # Latitude, longitude (deg), altitude, yaw, pitch, roll.
         self._pose: FloatArray = np.empty((0, 6))
 
     def take(self, states: TrafficStates, ticks_per_s: int) -> None:
         """Take in new positions."""
-        if self.plane is None:
-            self.plane = TangentPlane(float(states.own_lat_deg[0]), float(states.own_lon_deg[0]))
-        east, north = self.plane.east_north_m(
-            states.own_lat_deg, states.own_lon_deg, states.own_alt_m
-        )
         new = np.stack([
-            east, north, states.own_alt_m, states.own_yaw_rad, states.own_pitch_rad,
-            states.own_roll_rad,
+            states.own_lat_deg, states.own_lon_deg, states.own_alt_m, states.own_yaw_rad,
+            states.own_pitch_rad, states.own_roll_rad,
         ], axis=1)  # fmt: skip
         keep = self._tick < states.tick[0]
         self._tick = np.concatenate([self._tick[keep], states.tick])[-_KEPT:]
@@ -62,17 +57,31 @@ class OwnFlight:
         then = int(np.searchsorted(self._tick, self._tick[-1] - _SPEED_OVER_S * ticks_per_s))
         then = min(then, max(len(self._tick) - 2, 0))
         apart_s = (self._tick[-1] - self._tick[then]) / ticks_per_s
-        moved = self._pose[-1] - self._pose[then]
         speed, climb = 0.0, 0.0
         if apart_s > 0.0:
-            speed, climb = math.hypot(moved[0], moved[1]) / apart_s, float(moved[2]) / apart_s
-        east_m, north_m, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
-        self.now = OwnNow(east_m, north_m, alt_m, yaw, pitch, roll, speed, climb)
+            east, north, up = _away(self._pose[-1], self._pose[then, np.newaxis, :3])[0].tolist()
+            speed, climb = math.hypot(east, north) / apart_s, -up / apart_s
+        lat_deg, lon_deg, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
+        self.now = OwnNow(lat_deg, lon_deg, alt_m, yaw, pitch, roll, speed, climb)
 
     def poses(self, tick: IntArray) -> FloatArray:
         """Return the last poses not after some instants, (n, 6); the first one before it."""
         index = np.searchsorted(self._tick, tick, side="right") - 1
         return self._pose[np.maximum(index, 0)]
+
+
+def _away(own: FloatArray, position: FloatArray) -> FloatArray:
+    """Return how far positions (n, 3) are east and north of a place, and how much higher, (n, 3).
+
+    Latitude and longitude, deg, and altitude, m; NaN where they are not known.
+    """
+    result = np.full(position.shape, np.nan)
+    known = np.isfinite(position).all(axis=1)
+    there = position[known]
+    here = (np.full(len(there), value) for value in own[:3].tolist())
+    north, east, _ = north_east_up(*here, *np.ascontiguousarray(there.T))
+    result[known] = np.column_stack([east, north, there[:, 2] - own[2]])
+    return result
 
 
 @dataclass(frozen=True)
@@ -81,8 +90,8 @@ class Contacts:
 
     The number is that of the target, -1 for none, or `TRACKS_FROM` and the tracker's number. Of one
     that was seen last at `seen_s` the range and when it was measured are NaN without one, as is the
-    position (n, 3): east and north in the plane, and altitude. The line of sight is `toward`
-    (n, 2): bearing from north and elevation, rad.
+    position (n, 3): latitude, longitude (deg) and altitude (m). The line of sight is `toward`
+    (n, 2): bearing from north where the ownship was, and elevation, rad.
     """
 
     number: IntArray
@@ -90,7 +99,7 @@ class Contacts:
     ranged: BoolArray
     range_m: FloatArray
     range_s: FloatArray
-    position_m: FloatArray
+    position: FloatArray
     toward: FloatArray
 
     def shown(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
@@ -101,7 +110,8 @@ class Contacts:
         """
         fresh = np.flatnonzero(time_s - self.seen_s < forgotten_s)
         fresh = fresh[np.argsort(~self.ranged[fresh], kind="stable")]
-        away = self.position_m[fresh] - (own.east_m, own.north_m, own.alt_m)
+        here = np.array([own.lat_deg, own.lon_deg, own.alt_m])
+        away = _away(here, self.position[fresh])
         bearing = np.degrees(self.toward[fresh, 0]) % 360.0
         table = np.round(np.column_stack([away, bearing, time_s - self.seen_s[fresh]]), 2)
         result = []
@@ -127,10 +137,10 @@ def contacts_of_lines(
     pose = own.poses(message.measured_tick)
     body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
-    away = np.stack([east, north, -down], axis=1) * range_m[:, np.newaxis]
+    ends = offset_positions(np.stack([north, east, down]) * range_m, pose[:, :3].T)
     toward = np.stack([np.arctan2(east, north), np.arcsin(np.clip(-down, -1.0, 1.0))], axis=1)
     result = Contacts(
-        message.target, seen_s, np.isfinite(range_m), range_m, range_s, pose[:, :3] + away, toward
+        message.target, seen_s, np.isfinite(range_m), range_m, range_s, ends.T, toward
     )
     if before is None or isinstance(message, Tracks):
         return result
@@ -160,16 +170,22 @@ def _held(
 def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -> Contacts:
     """Return the contacts of one row of estimated states."""
     lives = np.flatnonzero(message.track_status != DELETED)
-    position = np.full((len(lives), 3), np.nan)
     ranged = message.has_range[lives] & np.isfinite(message.north_m[lives])
-    if own.plane is not None:
-        ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
-        origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
-        ends = offset_positions(np.where(ranged, ned_m, np.nan), [part[lives] for part in origin])
-        position = np.stack([*own.plane.east_north_m(*ends), ends[2]], axis=1)
-    toward = np.stack([message.azimuth_rad[lives], message.elevation_rad[lives]], axis=1)
+    ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
+    origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
+    origin = [part[lives] for part in origin]
+    ends = offset_positions(np.where(ranged, ned_m, np.nan), origin)
+    sight = np.stack(
+        unit_vector_unchecked(message.azimuth_rad[lives], message.elevation_rad[lives])
+    )
+    if own.now is not None:  # directions are along the axes of the tracker's frame
+        here = np.repeat([[own.now.lat_deg], [own.now.lon_deg]], len(lives), axis=1)
+        sight = vectors_in_frame(here, np.array(origin), sight)
+    toward = np.stack(
+        [np.arctan2(sight[1], sight[0]), np.arcsin(np.clip(-sight[2], -1, 1))], axis=1
+    )
     seen_s = message.updated_s[lives]
     unknown = np.full(len(lives), np.nan)
     return Contacts(
-        TRACKS_FROM + message.track[lives], seen_s, ranged, unknown, unknown, position, toward
+        TRACKS_FROM + message.track[lives], seen_s, ranged, unknown, unknown, ends.T, toward
     )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_run import POSE, RecordedTables
+from components.estimation.frame import vectors_in_frame
 from components.geometry import body_to_ned, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import ORIGIN, POSITION
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
@@ -37,6 +38,18 @@ class TangentPlane:
                 self.lat_deg, self.lon_deg, 0.0, lat_deg[known], lon_deg[known], alt_m[known]
             )
         return east, north
+
+    def turned_rad(self, place: FloatArray | Sequence[FloatArray]) -> FloatArray:
+        """Return the direction in the plane of the north of places (latitude, longitude; deg).
+
+        Far from where the plane touches the Earth it is another direction than the plane's north.
+        """
+        there = np.array([place[0], place[1]])
+        here = np.array([np.full(there.shape[1], v) for v in (self.lat_deg, self.lon_deg)])
+        level = np.zeros((3, there.shape[1]))
+        level[0] = 1.0
+        north, east, _ = vectors_in_frame(here, there, level)
+        return np.arctan2(east, north)
 
 
 def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray]) -> FloatArray:

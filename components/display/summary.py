@@ -122,11 +122,16 @@ class _Sensor:
         self.last = _nearer(self.last, last) if same_instant else last
 
     def result(self) -> dict[str, Any]:
+        # Who looks at no target in particular, as a foreign sensor, cannot say whose they are.
+        unnamed = 0
+        if not (self.detections or self.evaluated or any(self.skipped.values())):
+            unnamed = self.false_alarms
         return {
             "scans": self.scans,
             "evaluated": self.evaluated,
             "detections": self.detections,
-            "false_alarms": self.false_alarms,
+            "false_alarms": self.false_alarms - unnamed,
+            **({"unnamed_detections": unnamed} if unnamed else {}),
             "skipped": {
                 name.removeprefix(_SKIPPED): n
                 for name, n in self.skipped.items()

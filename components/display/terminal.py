@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from components.display.outcomes import NEAR_M
+from dsa_des.record.undone import undone_sentences
 from dsa_des.text.safe_text import printable, shortened
 
 MOST_TARGETS = 10
@@ -21,13 +22,17 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         )
         for line in cut_off_lines(summary["sensors"]) + unseen_lines(summary["sensors"]):
             _print_line(console, line)
-        alarms = [
-            f"{name} {entry['false_alarms']:,}"
-            for name, entry in summary["sensors"].items()
-            if entry.get("false_alarms")
-        ]
-        if alarms:
-            _print_line(console, f"False alarms (not counted above): {', '.join(alarms)}")
+        for key, said in (
+            ("false_alarms", "False alarms (not counted above)"),
+            ("unnamed_detections", "Detections of targets that the sensor does not name"),
+        ):
+            counts = [
+                f"{name} {entry[key]:,}"
+                for name, entry in summary["sensors"].items()
+                if entry.get(key)
+            ]
+            if counts:
+                _print_line(console, f"{said}: {', '.join(counts)}")
     if summary.get("fused"):
         _print_table(
             console,
@@ -38,6 +43,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
     if summary.get("targets"):
         _show_closest(console, summary["targets"])
     for line in outcome_lines(summary):
+        _print_line(console, line)
+    for line in undone_sentences(summary.get("undone") or {}):
         _print_line(console, line)
     for line in attitude_lines(summary.get("traffic") or {}):
         _print_line(console, line)

@@ -98,7 +98,8 @@ class FixedPath:
             raise ValueError(f"times_s is {shown}: it must give one time for each of {count} rows")
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError("times_s must be finite and ascending")
-        self._times = times
+        # A row begins where adding up steps in floats may have begun it.
+        self._times = times - 16.0 * np.arange(count) * np.spacing(np.abs(times))
         self._rows = np.hstack(
             [np.broadcast_to(position, (count, 3)), np.broadcast_to(attitude, (count, 3))]
         )

@@ -184,8 +184,10 @@ class Simulator:
         after_s : float, optional
             By default the time of the last call; before the first, the scene's start, included.
         """
-        if after_s is not None or not self._chains:
+        if not self._chains:
             return self._clocks.next_scan_s(after_s)
+        if after_s is not None:
+            return self._clocks.scan_after(self._chains[0].tick_of(after_s))
         return self._clocks.scan_after(max(chain.last_tick for chain in self._chains))
 
     def simulate(
@@ -210,7 +212,8 @@ class Simulator:
             The same for every plane that the host moves, in the order in which they were added; a
             row of NaN for one that is not there. (3,) for a single one, and with `plane`.
         time_s : float
-            Seconds since the scene's start, rounded to the nearest tick; it never goes back.
+            Seconds since the scene's start, rounded to the nearest tick; it never goes back. A time
+            that adding up steps in floats may have led off a scan means that scan.
         plane : str or int, optional
             The host calls plane by plane; at the same instant this gives the same as one call for
             all. False alarms belong to no plane and are then left out. A host keeps to one way.

@@ -231,7 +231,7 @@ class _EncounterTraffic(RecordedTraffic):
         notes = [f"encounter {self.encounter_set.numbers[self.index]} of {len(self.encounter_set)}"]
         if self.encounter_set.skipped:
             notes.append(f"{self.encounter_set.skipped} damaged encounters of the set were skipped")
-        return TrafficFile(own, others, 0.0, notes)
+        return TrafficFile(own, others, 0.0, notes, notes[1:])
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -276,6 +276,12 @@ class ModelTraffic(_EncounterTraffic):
         Verified("pairs and their weights", "the gas model's closed form; a plain Monte Carlo",
                  "4 standard errors", "tests/encounters/test_pairing.py"),
     )  # fmt: skip
+
+    def warnings(self) -> list[str]:
+        """Say which units of the models were taken for others too."""
+        models = dict.fromkeys((self.p.file, self.p.intruder_file or self.p.file))
+        notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
+        return notes + super().warnings()
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:

@@ -7,6 +7,7 @@ encounter model of the National Airspace System", MIT Lincoln Laboratory, ATC-34
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -181,10 +182,10 @@ class EncounterModel:
     of the initial variables. The transition network is over these (dynamic ones at t) and dynamic
     ones at t + 1: `sources` gives for each of its variables the initial one whose value it is at t,
     or -1, and `targets` maps those at t + 1 to the initial ones. `notes` say what is odd about the
-    file.
+    file, and which units were taken for others. Values are in knots, ft/min, deg/s and seconds.
     """
 
-    name: str
+    path: Path
     initial: BayesNetwork
     transition: BayesNetwork
     bins: tuple[Bins, ...]
@@ -192,6 +193,11 @@ class EncounterModel:
     sources: tuple[int, ...]
     targets: dict[int, int]
     notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What the file is called."""
+        return self.path.stem
 
     @property
     def labels(self) -> tuple[str, ...]:

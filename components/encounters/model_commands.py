@@ -64,11 +64,11 @@ def sample_tracks(
     try:
         rows = _write(path, batches)
     except TrackError as error:
-        raise UsageError(f"{model}: {error}") from None
+        raise UsageError(str(error)) from None
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     for note in encounter_model.notes:
-        say(f"note: {note}")
+        say(f"note: {model}: {note}")
     say(f"{path}: {count} tracks of {seconds} s, {rows} rows")
 
 
@@ -200,7 +200,10 @@ def generate_set(
         pairing = PairSampler(own, intruder, seed, rules)
         write_set(path, about, parts(pairing))
     except TrackError as error:
-        raise UsageError(f"{model}: {error}") from None
+        raise UsageError(str(error)) from None
+    for file, notes in {one.path: one.notes for one in (own, intruder)}.items():
+        for note in notes:
+            say(f"note: {file}: {note}")
     say(f"{path}: {count} encounters of {rules.duration_s} s")
     say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
 

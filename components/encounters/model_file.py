@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from components.encounters.model import (
+    CLIMB,
+    SPEED,
+    TURN,
     BayesNetwork,
     Bins,
     EncounterModel,
@@ -34,6 +37,12 @@ _INSTANT = re.compile(r"\s*\(\s*t\s*(\+\s*1\s*)?\)$")
 _MOST_BINS = 10_000
 #: So many nodes must agree about the number of cases before one that does not is called wrong.
 _MAJORITY = 4
+#: Which largest values are too small for the usual unit, what the other is worth, and both.
+_UNITS = {
+    CLIMB: (100.0, 60.0, "ft/s", "ft/min"),
+    TURN: (0.5, 180.0 / math.pi, "rad/s", "deg/s"),
+}
+_FASTEST_KT = 1000.0
 _Rows = list[tuple[int, str]]
 
 
@@ -104,10 +113,10 @@ class _ModelReader:
         transition = self.network("transition", now, later, sorted(targets))
         rates = self.rates(labels)
         notes = self.totals(initial)
+        bins, taken = self.in_usual_units(labels, self.bins(labels, sizes))
         return EncounterModel(
-            self.path.stem, initial, transition, self.bins(labels, sizes), rates, sources, targets,
-            notes,
-        )  # fmt: skip
+            self.path, initial, transition, bins, rates, sources, targets, (*notes, *taken)
+        )
 
     # -- variables ---------------------------------------------------------------------------
 
@@ -254,6 +263,29 @@ class _ModelReader:
                 )
             bins.append(Bins(edges, size))
         return tuple(bins)
+
+    def in_usual_units(
+        self, labels: tuple[str, ...], bins: tuple[Bins, ...]
+    ) -> tuple[tuple[Bins, ...], list[str]]:
+        """Return bins in ft/min and deg/s, and notes on those that must be in other units.
+
+        A file does not say its units; no aircraft climbs and sinks so little, or turns so slowly.
+        """
+        found, notes = list(bins), []
+        for label, (least, factor, other, usual) in _UNITS.items():
+            if label not in labels or (edges := bins[labels.index(label)].edges) is None:
+                continue
+            most = float(np.abs(edges).max())
+            if most < least:
+                found[labels.index(label)] = Bins(edges * factor, len(edges) - 1)
+                notes.append(
+                    f"variable '{label}' is read in {other}: its values reach {most:g} only, which "
+                    f"no aircraft keeps to in {usual}"
+                )
+        speeds = bins[labels.index(SPEED)].edges if SPEED in labels else None
+        if speeds is not None and speeds.max() > _FASTEST_KT:
+            notes.append(f"variable '{SPEED}' reaches {speeds.max():g} kt: is it in ft/s?")
+        return tuple(found), notes
 
     def rates(self, labels: tuple[str, ...]) -> FloatArray:
         rates = self.numbers("resample_rates", "must be probabilities")

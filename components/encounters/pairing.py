@@ -119,9 +119,10 @@ class PairSampler:
                 parts.append((pairs if paths else pairs.at_start()).take(kept[first]))
                 left = np.setdiff1d(left, fresh, assume_unique=True)
             if len(left) and attempt[left].max() > _MOST_ATTEMPTS:
+                own, intruder = (rules.model.path for rules in self._rules)
                 raise TrackError(
-                    f"pair {wanted[left[0]]} was rejected {_MOST_ATTEMPTS} times: the two models "
-                    "do not meet"
+                    f"{own} and {intruder}: pair {wanted[left[0]]} was rejected {_MOST_ATTEMPTS} "
+                    "times: the two models do not meet"
                 )
         together = _together(parts)
         return together.take(np.argsort(together.numbers))

@@ -7,24 +7,42 @@ class of its geometry. The ratios themselves are taken over all runs of a cell.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.losses import nearest_of, ways_of
+from components.metrics.losses import FlightsTogether, nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, prepare_traffic, traffic_block
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import CLASS, EVENT, KEY, NUMBER, RATIO, Group, Metric, RatioOf, Result
+from dsa_des.studies.metric import (
+    CLASS,
+    EVENT,
+    KEY,
+    NUMBER,
+    RATIO,
+    Group,
+    Metric,
+    RatioOf,
+    Result,
+    expected_column,
+)
 
 
 def has_weights(scene: Scene) -> bool:
     """Return whether the traffic of a scene is one encounter of many, each with its weight."""
     return hasattr(traffic_block(scene).parameters, "encounter")
+
+
+def make_together(scenes: Sequence[Scene]) -> None:
+    """Make the encounters of many scenes at once: each will be asked for several times."""
+    blocks = [traffic_block(scene) for scene in scenes]
+    if blocks and hasattr(blocks[0].cls, "prepare"):
+        blocks[0].cls.prepare([block.parameters for block in blocks])
 
 
 class EncounterWeight(Metric):
@@ -60,6 +78,11 @@ class EncounterWeight(Metric):
             "encounter": numbers, "encounter_weight": weights, "encounter_family": families,
         }  # fmt: skip
 
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all three, which no flight changes."""
+        make_together(group.scenes)
+        return self.measure(group)
+
 
 #: Sides from which an intruder closes in, by bearing from the ownship's course.
 BEARINGS = ("ahead", "right", "behind", "left")
@@ -67,6 +90,13 @@ _CLASSES = {"geometry": GEOMETRIES, "bearing": BEARINGS}
 _EVENTS = ("nmac", "well_clear_lost")
 # Of needless manoeuvres.
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
+# What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
+# which was just missed, and that one is flown where well clear is just kept; falling with the miss
+# distance. Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
+_STAYS, _INDUCED, _NEEDS = 0.2, 0.02, 0.1
+_LEAST_SIZES = 0.01
+# How far apart distances are looked at to choose runs by.
+_COARSE_S = 1.0
 # Courses are taken over this time to both sides of the closest approach.
 _BASE_S = 0.5
 
@@ -91,6 +121,12 @@ class RiskRatios(Mitigated):
     """Risk ratios of NMAC and of loss of well clear, with the flags that they are made of."""
 
     Parameters = RiskRatioParameters
+    geometry = (
+        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps",
+        "course_along", "course_across", "bearing_ahead", "bearing_right",
+        "log_miss_in_nmac_sizes", "log_miss_in_well_clear_sizes",
+        *(expected_column(name) for name in (*(f"{e}_mitigated" for e in _EVENTS), _NEEDLESS)),
+    )  # fmt: skip
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -131,11 +167,43 @@ class RiskRatios(Mitigated):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all but the ratios for every replica."""
         result = dict(super().measure(group))
+        result |= self._unsteered(group, result)
         if self.p.needless:
             commanded = np.zeros(len(group))
             commanded[list(self.manoeuvres(group))] = 1.0
-            kept = 1.0 - result["well_clear_lost_nominal"]
-            result |= {_KEPT: kept, _COMMANDED: commanded, _NEEDLESS: kept * commanded}
+            result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
+        return result
+
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return what no manoeuvre changes, and the geometry of the closest approach."""
+        make_together(group.scenes)
+        result = dict(self.losses(group, steered=False))
+        result |= self._unsteered(group, result)
+        *values, course_deg, bearing_deg = self.of_flights(group, nominal_geometry, steered=False)
+        angles = np.radians([course_deg, bearing_deg])
+        values += [part for angle in angles for part in (np.cos(angle), np.sin(angle))]
+        result |= dict(zip(self.geometry, values, strict=False))
+        clear, nmac = (
+            np.maximum(values[1] / radius_m, values[2] / half_m)
+            for radius_m, half_m in self.p.sizes_m
+        )
+        for name, sizes in (("well_clear", clear), ("nmac", nmac)):
+            result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
+        for event, sizes in zip(_EVENTS, (nmac, clear), strict=True):
+            there = result[f"{event}_nominal"] > 0.0
+            result[expected_column(f"{event}_mitigated")] = np.where(
+                there, _STAYS, _INDUCED * np.maximum(np.nan_to_num(sizes, nan=np.inf), 1.0) ** -8.0
+            )
+        kept = 1.0 - result["well_clear_lost_nominal"]
+        alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
+        result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
+        return result
+
+    def _unsteered(self, group: Group, known: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+        """Return weight and classes, and whether well clear is kept, as without manoeuvres."""
+        result: dict[str, AnyArray] = {}
+        if self.p.needless:
+            result[_KEPT] = 1.0 - known["well_clear_lost_nominal"]
         if self._weight is not None:
             result |= self._weight.measure(group)
         if self.p.by:
@@ -163,8 +231,59 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     never meet.
     """
     flights = [flight for run in runs for flight in run]
-    distance_m, time_s = nearest_of(flights)
+    nearest = _nearest_of_each(runs, *nearest_of(flights))
     angles = np.full((2, len(runs)), np.nan)
+    angles[:, nearest.runs] = _angles_deg(
+        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
+    )
+    return angles
+
+
+def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
+
+    Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
+    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
+    every `_COARSE_S`: enough to choose runs by.
+    """
+    flights = [flight for run in runs for flight in run]
+    result = np.full((6, len(runs)), np.nan)
+    if not flights:
+        return result
+    together = FlightsTogether(flights)
+    many = 1 + int(max(flight.end_s for flight in flights) / _COARSE_S)
+    times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
+    level_m, up_m = (
+        part.reshape(len(flights), many)
+        for part in together.level_distances_m(
+            np.repeat(every, many), np.tile(times_s, len(flights))
+        )
+    )
+    range_m = np.hypot(level_m, up_m)
+    index = np.argmin(range_m, axis=1)
+    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
+    some, time_s = nearest.flights, nearest.time_s
+    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
+    speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
+    result[0, nearest.runs] = time_s
+    result[1, nearest.runs] = level_m[some, index[some]]
+    result[2, nearest.runs] = up_m[some, index[some]]
+    result[3, nearest.runs] = speed_mps
+    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
+    return result
+
+
+class _Nearest(NamedTuple):
+    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
+
+    runs: list[int]
+    flights: IntArray
+    time_s: FloatArray
+
+
+def _nearest_of_each(
+    runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
+) -> _Nearest:
     met: list[int] = []
     nearest: list[int] = []
     start = 0
@@ -174,8 +293,14 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
             met.append(number)
             nearest.append(index)
         start += len(run)
-    ways = ways_of([flights[index] for index in nearest], time_s[nearest], _BASE_S)
-    for number, own, other in zip(met, *(way.T.tolist() for way in ways), strict=True):
+    chosen = np.array(nearest, dtype=np.int64)
+    return _Nearest(met, chosen, time_s[chosen])
+
+
+def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
+    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
+    angles = np.empty((2, own_m.shape[1]))
+    for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
         closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
         angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0

@@ -43,7 +43,7 @@ _FLOWN = (SPEED, ACCELERATION, CLIMB, TURN, LAYER)
 
 
 class TrackError(ValueError):
-    """A model's tracks cannot be flown, or none of them is accepted."""
+    """A model's tracks cannot be flown, or none of them is accepted; it names the model's file."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,9 @@ class TrackRules:
         for label in _FLOWN:
             if model.index_of(label) is None:
                 raise TrackError(
-                    f"the model has no variable {label!r}{did_you_mean(label, model.labels)}: its "
-                    "tracks cannot be flown (--raw writes what it gives)"
+                    f"{model.path}: the model has no variable {label!r}"
+                    f"{did_you_mean(label, model.labels)}: its tracks cannot be flown (--raw "
+                    "writes what it gives)"
                 )
         self._layer = self._at(LAYER)
         bins = model.bins[self._layer]
@@ -88,8 +89,8 @@ class TrackRules:
         if edges is None:
             if bins.size > len(LAYERS_FT) - 1:
                 raise TrackError(
-                    f"variable {LAYER!r} has {bins.size} layers without edges; known are the edges "
-                    f"of {len(LAYERS_FT) - 1}"
+                    f"{model.path}: variable {LAYER!r} has {bins.size} layers without edges; known "
+                    f"are the edges of {len(LAYERS_FT) - 1}"
                 )
             edges = np.array(LAYERS_FT[: bins.size + 1])
         self._edges_ft = edges
@@ -176,8 +177,13 @@ class TrackRules:
         index = self._at(label)
         edges = self.model.bins[index].edges
         if edges is None:
-            raise TrackError(f"variable {label!r} has no edges: its values are no rates")
-        table = conditional(self.model.initial, self._given, index)
+            raise TrackError(
+                f"{self.model.path}: variable {label!r} has no edges: its values are no rates"
+            )
+        try:
+            table = conditional(self.model.initial, self._given, index)
+        except TrackError as error:
+            raise TrackError(f"{self.model.path}: {error}") from None
         summed = np.cumsum(table, axis=1)
         low, high = (np.argmax(summed >= share - 1e-12, axis=1) for share in _SHARES)
         result = np.stack([edges[low + 1], edges[high + 1]])
@@ -243,6 +249,9 @@ def accepted_tracks(
             if not len(left):
                 break
         else:
-            raise TrackError(f"track {some[int(left[0])]} was rejected {_MOST_ATTEMPTS} times")
+            number = some[int(left[0])]
+            raise TrackError(
+                f"{rules.model.path}: track {number} was rejected {_MOST_ATTEMPTS} times"
+            )
         assert kept is not None
         yield kept, rules.commands(kept).fly(dynamics)

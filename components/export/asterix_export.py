@@ -1,12 +1,12 @@
 """A run as ASTERIX: plots (048, with 034), tracks (062), ADS-B received and the ownship's (021)."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from components.display.picture import LINE, estimated_positions, held_positions, sights
 from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
+from components.estimation.frame import frame_change
 from components.formats.asterix_records import (
     ADS_B,
     NORTH_MARKER,
@@ -17,19 +17,17 @@ from components.formats.asterix_records import (
     callsign,
     write_records,
 )
-from components.geometry import local_axes
 from components.messages.columns import ORIGIN, VELOCITY
+from components.messages.state_tracks import COVARIANCE, full_covariance
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.errors import UsageError
 
 #: Largest range rate that a plot holds.
 _FASTEST_M_S = 511.0
-#: Standard deviations that a track says of itself, and the variances in north, east and down.
+#: Standard deviations that a track says of itself, and which of its state's variances they are of.
 _ERRORS = {
-    "north_error_m": "covariance_00_m2", "east_error_m": "covariance_11_m2",
-    "alt_error_m": "covariance_22_m2", "velocity_north_error_m_s": "covariance_33_m2_s2",
-    "velocity_east_error_m_s": "covariance_44_m2_s2",
-    "velocity_up_error_m_s": "covariance_55_m2_s2",
+    "north_error_m": 0, "east_error_m": 1, "alt_error_m": 2, "velocity_north_error_m_s": 3,
+    "velocity_east_error_m_s": 4, "velocity_up_error_m_s": 5,
 }  # fmt: skip
 #: System area code of everything here: none is assigned to it.
 _SAC = 0
@@ -173,15 +171,12 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     if len(rows) == 0:
         return
     origin = run.stacked("state_tracks", ORIGIN, rows)
-    # Velocities are along the axes of the frame's origin; the track's own have turned a little.
-    moves = run.stacked("state_tracks", VELOCITY, rows)
-    east, north, up = local_axes(origin[0], origin[1])
-    earth = [
-        moves[0] * n + moves[1] * e - moves[2] * u for n, e, u in zip(north, east, up, strict=True)
-    ]
-    own_axes = local_axes(positions[0], positions[1])
-    along: list[Any] = [sum(v * a for v, a in zip(earth, axis, strict=True)) for axis in own_axes]
-    errors = np.sqrt(np.maximum(run.stacked("state_tracks", _ERRORS.values(), rows), 0.0))
+    # Velocities and errors are along the axes of the frame's origin; the track's own have turned.
+    turned = frame_change(origin, positions)
+    moves = turned.vectors(run.stacked("state_tracks", VELOCITY, rows))
+    table = {name: run.numbers("state_tracks", name) for name in COVARIANCE.values()}
+    spread = turned.covariances(full_covariance(table, rows))
+    errors = np.sqrt(np.maximum(np.stack([spread[i, i] for i in _ERRORS.values()]), 0.0))
     stated = np.asarray(np.isfinite(errors).all(axis=0))
     blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
     numbers = run.values("state_tracks", "track")
@@ -194,9 +189,9 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
             "tentative": int(statuses[row] == "tentative"),
             "coasted": int(statuses[row] == "coasted"),
             "last": int(statuses[row] == "deleted"),
-            "velocity_east_m_s": float(along[0][k]),
-            "velocity_north_m_s": float(along[1][k]),
-            "velocity_up_m_s": float(along[2][k]),
+            "velocity_east_m_s": float(moves[1][k]),
+            "velocity_north_m_s": float(moves[0][k]),
+            "velocity_up_m_s": -float(moves[2][k]),
         }
         if stated[k]:
             values |= dict(zip(_ERRORS, errors[:, k].tolist(), strict=True))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_run import RecordedTables
+from components.estimation.frame import pose_in_frame
 from components.export.globe_run import DETECTION_LASTS_S, START, Seen, marks_in, seen_positions
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
@@ -134,7 +135,8 @@ def _drawn(run: RecordedTables) -> Iterator[_Message]:
     for name, flight in flights.items():
         position = [flight[key] for key in ("lat_deg", "lon_deg", "alt_m")]
         origin = origin or tuple(float(part[0]) for part in position)
-        turned = _orientations(*(flight[f"{a}_rad"] for a in ("heading", "pitch", "roll")))
+        attitude = [flight[f"{angle}_rad"] for angle in ("heading", "pitch", "roll")]
+        turned = _orientations(origin, position, attitude)
         poses = zip(_offsets(origin, *position), turned, strict=True)
         rows = zip(flight["time_s"].tolist(), *(part.tolist() for part in position), strict=True)
         for (time_s, lat, lon, alt), (offset, turn) in zip(rows, poses, strict=True):
@@ -192,21 +194,17 @@ def _offsets(
 
 
 def _orientations(
-    heading_rad: FloatArray, pitch_rad: FloatArray, roll_rad: FloatArray
+    origin: tuple[float, ...], position: list[FloatArray], attitude_rad: list[FloatArray]
 ) -> list[dict[str, float]]:
-    """Return quaternions that turn axes forward, left and up into east, north and up."""
-    (cz, sz), (cy, sy), (cx, sx) = (
-        (np.cos(half), np.sin(half))
-        for half in ((0.5 * np.pi - heading_rad) / 2.0, -pitch_rad / 2.0, roll_rad / 2.0)
-    )
-    parts = (
-        cz * cy * sx - sz * sy * cx,
-        cz * sy * cx + sz * cy * sx,
-        sz * cy * cx - cz * sy * sx,
-        cz * cy * cx + sz * sy * sx,
-    )
-    rows = zip(*(part.tolist() for part in parts), strict=True)
-    return [dict(zip("xyzw", row, strict=True)) for row in rows]
+    """Return quaternions that turn axes forward, left and up into the origin's east, north, up."""
+    from scipy.spatial.transform import Rotation
+
+    here = np.array([np.full(len(position[0]), value) for value in origin])
+    pose = pose_in_frame(here, np.array(position), np.array(attitude_rad))
+    # Rows are nose, right wing and floor along north, east and down of the origin.
+    nose, right, floor = pose.to_body[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0])[:, np.newaxis]
+    turned = Rotation.from_matrix(np.stack([nose, -right, -floor]).transpose(2, 1, 0))
+    return [dict(zip("xyzw", row, strict=True)) for row in turned.as_quat().tolist()]
 
 
 def _instant(time_s: float) -> int:

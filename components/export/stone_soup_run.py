@@ -15,8 +15,8 @@ from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
-from components.estimation.frame import pose_in_frame
-from components.geometry import local_axes, north_east_up
+from components.estimation.frame import pose_in_frame, vectors_in_frame
+from components.geometry import north_east_up
 from components.messages.columns import ORIGIN
 from components.stone_soup.objects import (
     POSITION,
@@ -219,17 +219,8 @@ def _velocity(
     flight: Mapping[str, FloatArray], position: list[FloatArray], here: list[FloatArray]
 ) -> FloatArray:
     """Return velocities along the frame's axes, of those along the aircraft's own horizon."""
-    east, north, up = local_axes(position[0], position[1])
-    along_east, along_north, along_up = local_axes(here[0], here[1])
-    earth = [
-        flight[_VELOCITY[0]] * n + flight[_VELOCITY[1]] * e - flight[_VELOCITY[2]] * u
-        for n, e, u in zip(north, east, up, strict=True)
-    ]
-    n, e, u = (
-        sum(v * axis for v, axis in zip(earth, axes, strict=True))
-        for axes in (along_north, along_east, along_up)
-    )
-    return np.stack([n, e, -u])
+    own = np.stack([flight[name] for name in _VELOCITY])
+    return vectors_in_frame(np.array(here), np.array(position), own)
 
 
 def _platform(

@@ -3,10 +3,11 @@
 Distances are compared at given times. A target that is d away at one of them is nowhere nearer
 than d - v·dt up to a time dt before or after it, with v the sum of the two largest speeds: a
 stretch of time in which that leaves nothing nearer than what is known already is not looked at.
-The result is that of looking at every time, to the bit.
+The result is that of looking at every time, to the bit. `look_between` then looks between the
+nearest of these times and its neighbours.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -171,6 +172,47 @@ def closest_approaches(
     return best
 
 
+#: Distances are compared at times so far apart where nothing else is asked for, s.
+STEP_S = 0.1
+# Nearer by less is rounding: an aircraft in formation is closest when it first is.
+_NEARER_M = 1e-3
+
+
+def look_between(
+    own_at: Callable[[IntArray, FloatArray], Any],
+    targets_at: Callable[[IntArray, FloatArray], Any],
+    step_s: FloatArray,
+    present_s: tuple[FloatArray, FloatArray],
+    best: Approaches,
+) -> None:
+    """Improve closest approaches, in place, by what lies within a step (targets,) of their times.
+
+    The square of a distance is a parabola in time where both fly straight: the vertex is exact
+    then, and is come nearer to in smaller steps where they turn. Flights are asked as by
+    `closest_approaches`.
+    """
+    target = np.flatnonzero(np.isfinite(best.range_m))
+    for share in (1.0, 0.1, 0.01) if len(target) else ():
+        middle, reach = best.time_s[target], share * step_s[target]
+        ends = (
+            np.maximum(middle - reach, present_s[0][target]),
+            np.minimum(middle + reach, present_s[1][target]),
+        )
+        before, after = (_apart(own_at(target, t), targets_at(target, t))[0] for t in ends)
+        square = best.range_m[target] ** 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rising = (square - before**2) / (middle - ends[0])
+            slope = (after**2 - square) / (ends[1] - middle)
+            bend = (slope - rising) / (ends[1] - ends[0])
+            vertex = middle - 0.5 * (rising / bend + middle - ends[0])
+        some = np.flatnonzero(np.isfinite(vertex) & (bend > 0.0))
+        time_s = np.round(np.clip(vertex, *ends)[some], _DIGITS)
+        here = target[some]
+        range_m, there = _apart(own_at(here, time_s), targets_at(here, time_s))
+        nearer = there & (range_m < best.range_m[here] - _NEARER_M)
+        best.range_m[here[nearer]], best.time_s[here[nearer]] = range_m[nearer], time_s[nearer]
+
+
 def _apart(own: Any, other: Any) -> tuple[FloatArray, Any]:
     """Return slant ranges between two states, and whether both are there."""
     range_m = slant_range_m(
@@ -193,10 +235,12 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
     best.time_s[target[one]] = time_s[one]
 
 
-def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
+def censored_approaches(
+    source: Any, compared_at: Sequence[SampleTimes], time_s: FloatArray, end_s: float
+) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
     present_s = np.array(present_together_s(source.own, source.targets.intervals_present_s, end_s))
-    looked_s = np.array(_looked_at_s(source, *present_s))
+    looked_s = np.array(_looked_at_s(compared_at, *present_s))
     return [
         end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
         for number, time in enumerate(time_s.tolist())
@@ -224,11 +268,11 @@ def present_together_s(
 
 
 def _looked_at_s(
-    source: Any, begin_s: FloatArray, end_s: FloatArray
+    compared_at: Sequence[SampleTimes], begin_s: FloatArray, end_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last sample (targets,) in [begin_s, end_s]; NaN without any."""
     first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
-    for times in source.sample_times():
+    for times in compared_at:
         targets = np.arange(len(begin_s))
         low, high = times.between(targets, begin_s, end_s)
         some = np.flatnonzero(high >= low)

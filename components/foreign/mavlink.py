@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
+from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
@@ -255,7 +256,7 @@ class Mavlink(Component):
 def _row(wake: Wake, says: AutopilotSays) -> AutopilotStates:
     flying = says.flying
     times = (t if math.isfinite(t) else math.nan for t in (says.attitude_s, says.position_s))
-    return AutopilotStates(wake.ticks, *(np.array([v]) for v in (*times, *flying[2:])))
+    return AutopilotStates(wake.ticks, *(np.array([v]) for v in (*times, *flying[2:11])))
 
 
 def _flying(
@@ -287,11 +288,16 @@ def _flying(
 
 
 def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
-    """Return confirmed and coasted tracks with a range, carried on straight to an instant."""
+    """Return confirmed and coasted tracks with a range, carried on straight to an instant.
+
+    One without a detection for `STALE_S` is none.
+    """
     row = int(rows[0])
     found = []
     for k in range(int(message.offsets[row]), int(message.offsets[row + 1])):
         if not message.has_range[k] or message.track_status[k] not in (CONFIRMED, COASTED):
+            continue
+        if (age_s := time_s - float(message.updated_s[k])) > STALE_S:
             continue
         speeds = [float(getattr(message, f"{axis}_m_s")[k]) for axis in ("north", "east", "down")]
         ahead_s = time_s - float(message.state_s[k])
@@ -307,5 +313,10 @@ def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
         )  # fmt: skip
         number = int(message.track[k])
         place = float(np.squeeze(lat)), float(np.squeeze(lon)), float(np.squeeze(alt))
-        found.append(Flying(number, f"T{number}", *place, *speeds))
+        # A track's velocity is along the axes of its frame, an ADS-B report's along those there.
+        origin = message.origin_lat_deg[k : k + 1], message.origin_lon_deg[k : k + 1]
+        here = np.array(place[:2]).reshape(2, 1)
+        along = vectors_in_frame(here, np.array(origin), np.array(speeds).reshape(3, 1))
+        one = Flying(number, f"T{number}", *place, *along[:, 0].tolist())
+        found.append(one._replace(age_s=max(age_s, 0.0)))
     return found

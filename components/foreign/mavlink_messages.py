@@ -13,6 +13,7 @@ _DIALECT = "pymavlink.dialects.v20.common"
 _SYSTEM, _COMPONENT = 255, 156
 _ADSB_VALID = 1 | 2 | 4 | 8 | 16 | 128  # coordinates, altitude, heading, velocities, callsign
 _MOST_CM_S = 65535
+_MOST_AGE_S = 255
 
 
 class Flying(NamedTuple):
@@ -27,6 +28,8 @@ class Flying(NamedTuple):
     north_mps, east_mps, down_mps : float
     yaw_rad, pitch_rad, roll_rad : float
         An intruder has none of them that is known.
+    age_s : float
+        How old what is known of an intruder is.
     """
 
     number: int
@@ -40,6 +43,7 @@ class Flying(NamedTuple):
     yaw_rad: float = 0.0
     pitch_rad: float = 0.0
     roll_rad: float = 0.0
+    age_s: float = 0.0
 
     @property
     def course_rad(self) -> float:
@@ -81,7 +85,8 @@ class Link:
                 one.number, _degrees(one.lat_deg), _degrees(one.lon_deg),
                 self._dialect.ADSB_ALTITUDE_TYPE_GEOMETRIC, _whole(one.alt_m * _MILLI, 32), course,
                 min(round(level * _CENTI), _MOST_CM_S), _whole(-one.down_mps * _CENTI, 16), name,
-                self._dialect.ADSB_EMITTER_TYPE_NO_INFO, 0, _ADSB_VALID, 0,
+                self._dialect.ADSB_EMITTER_TYPE_NO_INFO, min(round(one.age_s), _MOST_AGE_S),
+                _ADSB_VALID, 0,
             )  # fmt: skip
             found.append(bytes(made.pack(self._ours)))
         return found

@@ -16,7 +16,7 @@ from components.aircraft.known_targets import known_targets
 from components.foreign.reported_look import reported_looks
 from components.formats.measurement_file import Measurements, read_measurements
 from components.messages.columns import OWN_VELOCITY, POSE
-from components.messages.detections import EXTRAS, Detections, SensorOffer
+from components.messages.detections import EXTRAS, Detections, SensorOffer, promises_of_looks
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import (
@@ -176,8 +176,13 @@ class RecordedSensor(Component):
         known = [np.nanmedian(v) for v in angles if not np.isnan(v).all()]
         return SensorOffer(
             self._has("range_m"), math.sqrt(12.0 * max(known, default=0.0)),
-            self._has("range_rate_m_s"), **same,
+            self._has("range_rate_m_s"), promises=self._promises(), **same,
         )  # fmt: skip
+
+    def _promises(self) -> tuple[tuple[float, float], ...]:
+        """Return what looks as far apart as most here promise."""
+        apart_s = np.diff(np.sort(self._measured.time_s))
+        return promises_of_looks(float(np.median(apart_s))) if len(apart_s) else ()
 
     def _has(self, name: str) -> bool:
         values = self._measured.entries.get(name)

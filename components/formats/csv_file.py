@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.formats.receiver_logs import read_log
 from components.formats.sample_columns import (
     VELOCITIES,
     Altitude,
@@ -29,7 +30,8 @@ from components.formats.text_rows import (
     TrafficFile,
     clean_token,
     did_you_mean,
-    read_lines,
+    lines_of,
+    read_content,
     shown_columns,
 )
 from dsa_des.arrays.types import FloatArray
@@ -86,9 +88,10 @@ _EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
 def read_csv(
     path: str | PathLike[str], ownship: str | None = None, altitude: Altitude | None = None
 ) -> TrafficFile:
-    """Read a CSV file with columns for time, id, latitude, longitude and altitude.
+    """Read a CSV file with columns for time, id, latitude, longitude and altitude, or a log.
 
-    It is separated by commas, semicolons, tabs or blanks; cells may be quoted. Header names are
+    Logs are those that `components.formats.receiver_logs` knows; either may be packed (gzip). A
+    table is separated by commas, semicolons, tabs or blanks; cells may be quoted. Header names are
     matched without regard to case, blanks and underscores, and may carry their unit: ``alt_ft``,
     ``Altitude (ft)``, ``time [ms]``; without one they are in seconds, degrees, metres, m/s, but for
     tables with columns that only readsb, FlightRadar24 or BaseStation write, which are in feet,
@@ -99,7 +102,15 @@ def read_csv(
     aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
     """
     problems = Problems(str(path))
-    lines = read_lines(Path(path), problems, comments=True)
+    data = read_content(Path(path), problems)
+    return read_log(problems, data, ownship, altitude) or _read_table(
+        problems, lines_of(data, problems, comments=True), ownship, altitude
+    )
+
+
+def _read_table(
+    problems: Problems, lines: list[tuple[int, str]], ownship: str | None, altitude: Altitude | None
+) -> TrafficFile:
     lines = lines[_header_among(lines) :]
     header_line, header_text = lines[0]
     header_text = header_text.lstrip("#").strip(" ")

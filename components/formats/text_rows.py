@@ -6,14 +6,22 @@ import csv
 import io
 import math
 import re
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.flights.sampled_flight import SampledTrajectory
 from dsa_des.errors import Lines, nearest
-from dsa_des.files.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
+from dsa_des.files.input_files import (
+    LARGEST_BYTES,
+    InputFileError,
+    NoSuchFile,
+    is_folder,
+    read_input_bytes,
+)
 from dsa_des.text.safe_text import shortened
 
 LENGTH_M = {
@@ -134,11 +142,11 @@ class TrafficFile:
 class Problems:
     """Collects what is wrong with one file, to be reported at once.
 
-    Its rows are lines of text, unless `of` calls them something else.
+    Its rows are lines of text, unless `of` calls them something else. The first `most` are listed.
     """
 
-    def __init__(self, path: str, of: str = "line") -> None:
-        self.path, self._of = path, of
+    def __init__(self, path: str, of: str = "line", most: int = MOST_PROBLEMS) -> None:
+        self.path, self._of, self._most = path, of, most
         #: Line (infinite for none) and text.
         self._lines: list[tuple[float, str]] = []
         self._more = 0
@@ -147,7 +155,7 @@ class Problems:
         """Note a problem, with its line and column where it has them."""
         where = [f"{self._of} {line}"] if line is not None else []
         where += [f"column {column}"] if column is not None else []
-        if len(self._lines) < MOST_PROBLEMS:
+        if len(self._lines) < self._most:
             text = f"{', '.join(where)}: {problem}" if where else problem
             self._lines.append((math.inf if line is None else line, text))
         else:
@@ -162,10 +170,11 @@ class Problems:
             lines[-1] += f" (and {self._more} more problems)"
         raise TrafficFileError(self.path, lines)
 
-    def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+    def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> NoReturn:
         """Note a problem that makes reading on pointless, and raise."""
         self.add(problem, line=line, column=column)
         self.raise_if_any()
+        raise AssertionError
 
 
 def shown_columns(headers: Iterable[str], known: bool) -> str:
@@ -192,14 +201,17 @@ _ROWS = "a row of column names and rows of samples"
 
 
 def read_lines(
-    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS, *,
-    comments: bool = False,
-) -> list[tuple[int, str]]:  # fmt: skip
-    """Return a file's lines that hold something, but `comments` on request, numbered from 1.
+    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
+) -> list[tuple[int, str]]:
+    """Return a file's lines that hold something but comments, with their numbers from 1.
 
-    It may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end in
-    LF, CR LF or CR. `needed` and `holds` are for the messages of a binary and of an empty file.
+    `needed` and `holds` are for the messages of a binary and of an empty file.
     """
+    return lines_of(read_content(path, problems), problems, needed, holds)
+
+
+def read_content(path: Path, problems: Problems) -> bytes:
+    """Return a file's bytes, unpacked where they are packed (gzip)."""
     try:
         data = read_input_bytes(path)
     except NoSuchFile:
@@ -209,6 +221,30 @@ def read_lines(
         if is_folder(path):
             problems.fail("this is a directory: give the file itself")
         problems.fail(f"the file {error}")
+    if not data.startswith(b"\x1f\x8b"):
+        return data
+    unpack = zlib.decompressobj(wbits=31)
+    try:
+        content = unpack.decompress(data, LARGEST_BYTES)
+    except zlib.error as error:
+        problems.fail(f"the packed file is damaged ({error})")
+    if not unpack.eof:
+        larger = (
+            f"holds more than {LARGEST_BYTES / 2**20:,.0f} MB" if unpack.unconsumed_tail else ""
+        )
+        problems.fail(f"the packed file {larger or 'is cut off'}")
+    return content
+
+
+def lines_of(
+    data: bytes, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS, *,
+    comments: bool = False,
+) -> list[tuple[int, str]]:  # fmt: skip
+    """Return the lines that hold something, but `comments` on request, numbered from 1.
+
+    Text may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end
+    in LF, CR LF or CR.
+    """
     text = _decoded(data)
     if text is None:
         problems.fail(f"this is a binary file: {needed} is needed")

@@ -36,6 +36,8 @@ _PLANE = ("time_s", "x_ft", "y_ft", "z_ft")
 _ROWS = 7
 #: Of MATLAB's elements, the one that is packed.
 _COMPRESSED = 15
+#: How files of HDF5 begin, those of MATLAB behind its own header of 512 bytes.
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 #: Time (s), north, east and altitude (m) of one aircraft.
 Track = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 #: Tracks of one file, and where their origin is if that is known.
@@ -130,10 +132,17 @@ def read_track_matrices(path: Path) -> Tracks:
 
     try:
         file = read_input_bytes(path)
+        if file.startswith(b"MATLAB 7.3") or _HDF5 in (file[:8], file[512:520]):
+            raise EncounterSetError(
+                f"{path}: is a MATLAB 7.3 file (HDF5), which is not read: save it in MATLAB with "
+                "the option -v7"
+            )
         _refuse_cut_off(file)
         content = loadmat(io.BytesIO(file))
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None
+    except EncounterSetError:
+        raise
     except Exception as error:  # SciPy raises whatever comes of bytes that it does not check
         raise EncounterSetError(
             f"{path}: is no MATLAB file of version 7 or less: {str(error)[:200]}"

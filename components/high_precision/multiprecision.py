@@ -15,6 +15,4 @@ def multiprecision() -> Any:
     try:
         return importlib.import_module("mpmath")
     except ImportError as error:
-        raise ImportError(
-            "the references need the library mpmath: pip install 'dsa-des[test]'"
-        ) from error
+        raise ImportError("the references need the library mpmath: pip install mpmath") from error

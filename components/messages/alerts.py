@@ -1,12 +1,15 @@
 """The messages of alerting: the alert level of each target, and the bands of guidance."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.columns import target_names
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Producer
 from dsa_des.block.message import Column, Message, Text, column, columns, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
@@ -20,7 +23,10 @@ _TIMES = {
     )
     for level in range(1, MOST_LEVELS + 1)
 }  # fmt: skip
-_TRACK = {"track": Column("", "", "the tracker's number; null where tracks have none", "int64")}
+_TRACK = {
+    "track": Column("", "", "the tracker's number; null where tracks have none", "int64"),
+    "track_age_s": Column("s", "", "time since the last measurement of that track, if it has one"),
+}
 
 
 @dataclass(eq=False)
@@ -34,7 +40,8 @@ class AlertLevels(Message):
         to, for evaluation.
     times, numbers : dict of (entries,)
         Columns that are recorded where they are known: NaN is a level that is not met within the
-        lookahead; ``track`` is the tracker's own number.
+        lookahead; ``track`` is the tracker's own number, and ``track_age_s`` how old its last
+        measurement is.
     deviations : dict of (entries,)
         Standard deviations of the state, where they are known: ``position_m``, ``height_m``,
         ``velocity_mps``, ``climb_mps``.
@@ -59,7 +66,7 @@ class AlertLevels(Message):
     )
     closest_horizontal_m: FloatArray = column("m", "", "projected horizontal distance there")
     closest_vertical_m: FloatArray = column("m", "", "projected least difference in height")
-    numbers: dict[str, IntArray] = columns(_TRACK)
+    numbers: dict[str, AnyArray] = columns(_TRACK)
     deviations: dict[str, FloatArray] = per_entry()
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
@@ -87,6 +94,21 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
     if contact < 0:
         return ""
     return names[contact] if contact < len(names) else None
+
+
+class AlertsOffered(NamedTuple):
+    """What a block says of the alerts that it sends."""
+
+    levels: int  # Of the alerter, which is the highest that may come
+    period_s: float  # Between its scans
+
+
+def never_reached(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
+    """Say that no alert reaches the level of a key, of who is fed by such producers."""
+    offered = [p.offer.levels for p in producers if isinstance(p.offer, AlertsOffered)]
+    if not offered or level <= max(offered):
+        return []
+    return [f"{key} is {level}: the alerts it gets have {max(offered)} levels, so it does nothing"]
 
 
 #: What bands are of, and the regions they are painted with.

@@ -166,6 +166,10 @@ class SensorOffer:
     unstated_across_m2 : float
         Variance of the ownship's own position across the line of sight that its angles' variances
         leave out, as it knows no range: who knows one adds it over the range squared.
+    promises : tuple of (float, float)
+        Where it does not report every target at every look: up to which range, m, it reports one
+        again within which time, s, 19 times in 20; ascending, the last one holds beyond too. Less
+        than that is no miss. Where it looks less often than every 2 s: that time, at any range.
     tells : bool
         Whether its detections may have something that is `told_by_target`.
     told_errors : tuple of ToldError
@@ -188,8 +192,26 @@ class SensorOffer:
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
     unstated_across_m2: float = 0.0
+    promises: tuple[tuple[float, float], ...] = ()
     tells: bool = False
     told_errors: tuple[ToldError, ...] = ()
+
+
+#: A sensor that looks at least so often promises no time: it reports at every look, s.
+_OFTEN_S = 2.0
+
+
+def promises_of_looks(
+    period_s: float, promises: Iterable[tuple[float, float]] = ()
+) -> tuple[tuple[float, float], ...]:
+    """Return what a sensor promises (`SensorOffer`) that looks so often, s.
+
+    `promises` are those that it makes whatever its looks. Of a sensor that looks often nothing is
+    said of its looks, so that replicas may differ in their rates.
+    """
+    if period_s <= _OFTEN_S:
+        return tuple(promises)
+    return tuple((far, max(s, period_s)) for far, s in promises) or ((math.inf, period_s),)
 
 
 def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:

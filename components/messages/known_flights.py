@@ -43,6 +43,9 @@ class AllFlights(Protocol):
         asked: where positions are published at a rate of their own, after the last publication.
         """
 
+    def own_states(self, run: IntArray, known: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of the ownships of runs (n,), likewise, each at a time (n,) of its own."""
+
 
 class KnownFlights:
     """The flights known at each row of a message, all of one traffic.
@@ -82,6 +85,10 @@ class KnownFlights:
         """
         run, known = self.run[row][np.newaxis], self.known[row][np.newaxis]
         return _flat(self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis]))
+
+    def own_at(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return the states of the ownship as some rows (n,) know it, at a time (n,) of each."""
+        return self.flights.own_states(self.run[row], self.known[row], time_s)
 
     def _states(self, *asked: Any) -> Any:
         states: Any = self.flights.states(*asked)

@@ -14,6 +14,9 @@ from dsa_des.block.message import Column, Message, Text, column, columns, static
 #: What a track may be, in the order of its numbers.
 STATUSES = ("tentative", "confirmed", "coasted", "deleted")
 TENTATIVE, CONFIRMED, COASTED, DELETED = range(4)
+#: Who acts on a track refuses it when its last detection is older than this, s: its tracker no
+#: longer reports, or its reports no longer come.
+STALE_S = 30.0
 #: Statuses of tracks that are believed in.
 HELD = STATUSES[CONFIRMED], STATUSES[COASTED]
 

@@ -348,19 +348,13 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
     """
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
-    flights = targets.revisit.take_rows(row)
-    # Where the ownship is does not depend on the target that is asked for with it.
-    anyone = np.zeros(1, dtype=np.int64)
-    own = [
-        {name: values[:, 0] for name, values in flights(anyone, at[:, np.newaxis])["own"].items()}
-        for at in (time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S)
-    ]
-    here = [own[0][name] for name in POSITION_FIELDS]
-    moved, span_s = [], np.zeros(len(row))
-    for there in own[1:]:
-        ends = [there[name] for name in POSITION_FIELDS]
-        way = np.stack(line_of_sight_ned(*here, *ends, validate=False))
-        moved.append(np.where(there["present"], way, 0.0))
-        span_s = span_s + np.where(there["present"], _OWN_STEP_S, 0.0)
+    at_s = np.concatenate([time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S])
+    own = targets.revisit.own_at(np.tile(row, 3), at_s)
+    place = [getattr(own, name) for name in POSITION_FIELDS]
+    here = [np.tile(values[: len(row)], 2) for values in place]
+    there = own.present[len(row) :]
+    way = np.stack(line_of_sight_ned(*here, *(v[len(row) :] for v in place), validate=False))
+    before, after = np.hsplit(np.where(there, way, 0.0), 2)
+    span_s = np.where(there, _OWN_STEP_S, 0.0).reshape(2, -1).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray((moved[1] - moved[0]) / span_s)
+        return np.asarray((after - before) / span_s)

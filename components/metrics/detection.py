@@ -1,7 +1,7 @@
 """First detections, declarations of m in n scans, and shares of looks of each sensor
 (``first_detection``, ``declaration``, ``detection_share``)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -13,9 +13,12 @@ from components.metrics.rows import (
     SensorMetricParameters,
     TargetMetric,
     at_start,
-    first_rows,
+    columns_at,
+    earliest,
+    first_of_targets,
     is_named,
     of_target,
+    picked,
     scan_time_s,
     sensors_of,
     start_or_never,
@@ -90,7 +93,7 @@ class FirstDetection(TargetMetric):
         """Return whether a replica's first fused report is of what a sensor's first scan saw."""
         columns: Any = group.tables[FUSED]
         rows = np.flatnonzero(of_target(columns, self.p.target))
-        first = first_rows(columns, rows, len(group))
+        first = first_row(columns, rows, len(group))
         sensors = columns["sensors"]
         code = np.where(first >= 0, sensors.codes[first], -1) if len(rows) else first
         result = np.zeros(len(group), dtype=bool)
@@ -113,8 +116,16 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
     rows = of_target(columns, target)
     if name != FUSED:
         rows &= is_named(columns["block"], name)
-    first = first_rows(columns, np.flatnonzero(rows), len(group))
+    first = first_row(columns, np.flatnonzero(rows), len(group))
     return [taken(columns, "time_s", first), taken(columns, "true_range_m", first)]
+
+
+def first_row(columns: Any, rows: IntArray, count: int) -> IntArray:
+    """Return the row of each replica's first report of any target, -1 where it has none."""
+    each = first_of_targets(columns, rows, count)
+    when_s, range_m = (taken(columns, name, each) for name in ("time_s", "true_range_m"))
+    which = earliest(when_s, range_m)
+    return np.where(which < 0, -1, picked(each, which))
 
 
 class DetectionShare(TargetMetric):
@@ -214,7 +225,8 @@ class Declaration(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return the first declaration of every replica."""
         values: dict[str, AnyArray] = {}
-        for name, first in declarations(group, self.p, self.sensors).items():
+        for name, each in declarations(group, self.p, self.sensors).items():
+            first = each.of(earliest(each.time_s, each.range_m))
             values[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
             values[f"declaration_time_s.{name}"] = first.time_s
             values[f"declaration_range_m.{name}"] = first.range_m
@@ -236,9 +248,10 @@ class Declaration(TargetMetric):
 
 
 class Declared(NamedTuple):
-    """The first declaration of a target by a sensor, and its first detection, (replicas,) each.
+    """The first declaration of each target by a sensor, and its first detection.
 
-    NaN where there is none; ``at_start`` where it is as early as the start of the run lets it.
+    Of (replicas, targets), or of one target of each replica. NaN where there is none; ``at_start``
+    where it is as early as the start of the run lets it.
     """
 
     time_s: FloatArray
@@ -247,13 +260,32 @@ class Declared(NamedTuple):
     seen_s: FloatArray
     seen_at_start: BoolArray
 
+    def of(self, target: IntArray) -> "Declared":
+        """Return what is known of one target of each replica (index, -1 for none)."""
+        return Declared(*(picked(values, target) for values in self))
+
 
 def declarations(
-    group: Group, parameters: DeclarationParameters, sensors: list[str]
+    group: Group,
+    parameters: DeclarationParameters,
+    sensors: list[str],
+    targets: Sequence[str] | None = None,
 ) -> dict[str, Declared]:
-    """Return sensor (or "any") → its first declarations."""
+    """Return sensor (or "any") → its first declarations of each target.
+
+    Targets are those named, or those of the recorded column in its order.
+    """
     key = ("declarations", parameters.m, parameters.n, parameters.target, tuple(sensors))
-    return group.once(key, lambda: _declarations(group, parameters, sensors))
+    known = group.once(key, lambda: _declarations(group, parameters, sensors))
+    if targets is None:
+        return known
+    columns: Any = group.tables["detections"]
+    index = {name: k for k, name in enumerate(columns["target"].names)}
+    wanted = np.array([index.get(name, -1) for name in targets], dtype=np.int64)
+    return {
+        name: Declared(*(columns_at(values, wanted) for values in each))
+        for name, each in known.items()
+    }
 
 
 def _declarations(
@@ -275,9 +307,9 @@ def _declarations(
                 parameters.m,
                 parameters.n,
             )
-        first = first_rows(columns, rows[declared], count)
+        first = first_of_targets(columns, rows[declared], count)
         time_s = taken(columns, "time_s", first)
-        seen_s = taken(columns, "time_s", first_rows(columns, rows, count))
+        seen_s = taken(columns, "time_s", first_of_targets(columns, rows, count))
         scans = needed(parameters.m, group.scene, name)
         result[name] = Declared(
             time_s,
@@ -286,7 +318,7 @@ def _declarations(
             seen_s,
             at_start(group, name, seen_s),
         )
-    result[ANY] = _earliest(list(result.values()), count)
+    result[ANY] = _earliest(list(result.values()))
     return result
 
 
@@ -295,17 +327,15 @@ def needed(m: int | None, scene: Scene, name: str) -> int:
     return int(m or getattr(scene.blocks[name].parameters, "declare_m", None) or 1)
 
 
-def _earliest(each: list[Declared], count: int) -> Declared:
-    """Return the first declaration, and the first detection, of any sensor."""
+def _earliest(each: list[Declared]) -> Declared:
+    """Return the first declaration, and the first detection, of each target by any sensor."""
     time_s, range_m, at_start, seen_s, seen_at_start = map(np.array, zip(*each, strict=True))
 
-    def first(time_s: AnyArray) -> Any:
-        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0), np.arange(count)
+    def of_first(time_s: AnyArray, *values: AnyArray) -> Iterator[AnyArray]:
+        sensor = np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0)[np.newaxis]
+        return (np.take_along_axis(one, sensor, axis=0)[0] for one in (time_s, *values))
 
-    declared, seen = first(time_s), first(seen_s)
-    return Declared(
-        time_s[declared], range_m[declared], at_start[declared], seen_s[seen], seen_at_start[seen]
-    )
+    return Declared(*of_first(time_s, range_m, at_start), *of_first(seen_s, seen_at_start))
 
 
 def _m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:

@@ -19,8 +19,9 @@ from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
     SCANS,
     TargetParameters,
+    earliest,
     is_named,
-    of_target,
+    picked,
     sensors_of,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
@@ -112,7 +113,8 @@ class _Encounter(FlownMetric):
 class ClosestApproach(_Encounter):
     """Closest approach, and how long before it the target was detected and declared.
 
-    Where there are several targets, the one that comes closest counts.
+    Where there are several targets, the one that comes closest counts, with its own detection and
+    declaration.
     """
 
     def results(self) -> list[Result]:
@@ -136,7 +138,10 @@ class ClosestApproach(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        distance, time_s, code = self.of_flights(group, each_alone(_closest), to_the_end=True)
+        names, each = self.of_each_flight(group, each_alone(_closest), to_the_end=True)
+        nearest = earliest(each[0], each[0])
+        distance, time_s = picked(each[0], nearest), picked(each[1], nearest)
+        code = np.where(nearest < 0, 0.0, picked(each[2], nearest))
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
         values: dict[str, AnyArray] = {
@@ -144,7 +149,8 @@ class ClosestApproach(_Encounter):
             "closest_approach_time_s": time_s,
             _CUT_OFF: said(at, distance),
         }
-        for name, first in declarations(group, self.p, self.sensors).items():
+        for name, known in declarations(group, self.p, self.sensors, names).items():
+            first = known.of(nearest)
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
                 value = time_s - when_s
@@ -154,7 +160,11 @@ class ClosestApproach(_Encounter):
 
 
 class WellClear(_Encounter):
-    """Loss of well clear and near mid-air collision, and the warning before the loss."""
+    """Loss of well clear and near mid-air collision, and the warning before the loss.
+
+    Where well clear of several targets is lost, each loss is set against the declaration of the
+    same target, and the shortest warning counts; there is none where one of them is not declared.
+    """
 
     Parameters = WellClearParameters
 
@@ -183,20 +193,32 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, to_the_end=True)
+        names, each = self.of_each_flight(group, self.p.losses_s, to_the_end=True)
+        lost_s, collision_s, begun_s = each
         lost_at_start = in_scan(lost_s, begun_s)
         values: dict[str, AnyArray] = {
-            "well_clear_lost": (~np.isnan(lost_s)).astype(float),
-            "nmac": (~np.isnan(collision_s)).astype(float),
-            "well_clear_loss_time_s": lost_s,
-            _LOSS_CUT_OFF: said(np.where(lost_at_start, START, "")),
+            "well_clear_lost": (~np.isnan(lost_s)).any(axis=1).astype(float),
+            "nmac": (~np.isnan(collision_s)).any(axis=1).astype(float),
+            "well_clear_loss_time_s": _least(lost_s),
+            _LOSS_CUT_OFF: said(np.where(lost_at_start.any(axis=1), START, "")),
         }
-        for name, first in declarations(group, self.p, self.sensors).items():
+        for name, first in declarations(group, self.p, self.sensors, names).items():
             warning_s = lost_s - first.time_s
-            values[f"warning_time_s.{name}"] = warning_s
-            cut = (first.at_start | lost_at_start) & ~np.isnan(warning_s)
-            values[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
+            worst = _least(warning_s, ~np.isnan(lost_s))
+            at_start = (first.at_start | lost_at_start) & (warning_s == worst[:, np.newaxis])
+            values[f"warning_time_s.{name}"] = worst
+            values[f"warning_cut_off.{name}"] = said(np.where(at_start.any(axis=1), START, ""))
         return values
+
+
+def _least(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
+    """Return the least value of each replica's targets (replicas, targets); NaN without any.
+
+    Of those that count it is NaN if one of them has none.
+    """
+    result = np.where(~np.isnan(values) if counts is None else counts, values, np.inf)
+    least: FloatArray = result.min(axis=1, initial=np.inf)
+    return np.where(np.isposinf(least), np.nan, least)
 
 
 def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
@@ -210,11 +232,11 @@ def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
 
 
 def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
-    """Return smallest range (m), its time (s), and the number in `_ENDS` of how it is censored."""
-    best = min((closest(flight) for flight in flights), default=_NOWHERE)
-    if not np.isfinite(best[0]):
+    """Return a flight's smallest range (m), its time (s), and its number in `_ENDS`."""
+    range_m, time_s, end = closest(flights[0]) if flights else _NOWHERE
+    if not np.isfinite(range_m):
         return float("nan"), float("nan"), 0.0
-    return best[0], best[1], float(_ENDS.index(best[2]))
+    return range_m, time_s, float(_ENDS.index(end))
 
 
 class AlertTimeParameters(TargetParameters, SizeParameters):
@@ -241,9 +263,11 @@ class AlertTimes(FlownMetric):
     that was heeded is no nuisance.
 
     Of each block that records alerts, so that one fed by the truth and one fed by tracks stand side
-    by side. An alert is *missed* if well clear is lost and none came before, *late* if it came less
-    than `late_s` before the loss or is missed, a *nuisance* if well clear is never lost, and a
-    *surprise* if the level below had not been on for `surprise_s` when it came.
+    by side. An alert of an aircraft is *missed* if well clear of that aircraft is lost and none
+    came before, *late* if it came less than `late_s` before the loss or is missed, a *nuisance* if
+    well clear of it is never lost, and a *surprise* if the level below had not been on for
+    `surprise_s` when it came. A run has what any of its aircraft has; of several times to a loss
+    the shortest counts, and there is none where one was missed.
     """
 
     Parameters = AlertTimeParameters
@@ -275,21 +299,25 @@ class AlertTimes(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, nmac_s, _ = self.of_flights(group, self.p.losses_s, to_the_end=self._as_flown)
+        names, (lost_s, nmac_s, _) = self.of_each_flight(
+            group, self.p.losses_s, to_the_end=self._as_flown
+        )
         columns = group.tables["alerts"]
-        counts = of_target(columns, self.p.target)
+        lost, met = ~np.isnan(lost_s), ~np.isnan(nmac_s)
         values: dict[str, AnyArray] = {}
         for name in self._blocks:
-            mine = counts & is_named(columns["block"], name)
-            first_s = _first_s(columns, mine & (columns["level"] >= self.p.level), len(group))
-            below_s = _first_s(columns, mine & (columns["level"] >= self.p.level - 1), len(group))
-            alerted, lost = ~np.isnan(first_s), ~np.isnan(lost_s)
+            mine = is_named(columns["block"], name)
+            first_s, below_s = (
+                _first_s(columns, mine & (columns["level"] >= level), len(group), names)
+                for level in (self.p.level, self.p.level - 1)
+            )
+            alerted = ~np.isnan(first_s)
             before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
-            values[f"first_alert_time_s.{name}"] = first_s
-            values[f"alert_to_loss_s.{name}"] = lead_s
-            values[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
+            values[f"first_alert_time_s.{name}"] = _least(first_s)
+            values[f"alert_to_loss_s.{name}"] = _least(lead_s, lost)
+            values[f"alert_to_nmac_s.{name}"] = _least(nmac_s - first_s, met)
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
             for what, event in {
                 "missed": missed,
@@ -297,12 +325,22 @@ class AlertTimes(FlownMetric):
                 "nuisance": alerted & ~lost,
                 "surprise": sudden,
             }.items():
-                values[f"alert_{what}.{name}"] = event.astype(float)
+                values[f"alert_{what}.{name}"] = event.any(axis=1).astype(float)
         return values
 
 
-def _first_s(columns: Mapping[str, Any], rows: BoolArray, replicas: int) -> FloatArray:
-    """Return the time of each replica's first row of those chosen, NaN without one."""
-    first = np.full(replicas, np.inf)
-    np.minimum.at(first, columns["replica"][rows], columns["time_s"][rows])
-    return np.where(np.isfinite(first), first, np.nan)
+def _first_s(
+    columns: Mapping[str, Any], rows: BoolArray, replicas: int, targets: Sequence[str]
+) -> FloatArray:
+    """Return the time of the first of some rows of each target, NaN without one.
+
+    Of each replica and target, (replicas, targets).
+    """
+    index = {name: number for number, name in enumerate(targets)}
+    of_name = [index.get(name, -1) for name in columns["target"].names]
+    target = np.array([*of_name, -1], dtype=np.int64)[columns["target"].codes]
+    rows = rows & (target >= 0)
+    first = np.full(replicas * len(targets), np.inf)
+    of = columns["replica"][rows] * len(targets) + target[rows]
+    np.minimum.at(first, of, columns["time_s"][rows])
+    return np.where(np.isfinite(first), first, np.nan).reshape(replicas, len(targets))

@@ -16,7 +16,7 @@ from components.metrics.separation import (
     separations,
     traffic_block,
 )
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
 
@@ -84,9 +84,32 @@ class FlownMetric(TargetMetric):
         self, group: Group, read: "Read", *, steered: bool = True, to_the_end: bool = False
     ) -> FloatArray:
         """Return what `read` makes of every replica's flights, (values, replicas)."""
+        runs, run_of = self._flights(group, steered, to_the_end)
+        return read(runs)[:, run_of]
+
+    def of_each_flight(
+        self, group: Group, read: "Read", *, to_the_end: bool = False
+    ) -> tuple[list[str], FloatArray]:
+        """Return names of targets, and what `read` makes of each by itself.
+
+        Values are (values, replicas, targets), NaN where a replica has no such target.
+        """
+        runs, run_of = self._flights(group, True, to_the_end)
+        alone = [[flight] for run in runs for flight in run]
+        names = sorted({flight.name for (flight,) in alone})
+        index = {name: number for number, name in enumerate(names)}
+        values = read(alone or [[]])
+        result = np.full((len(values), len(runs), len(names)), np.nan)
+        run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+        result[:, run, [index[flight.name] for (flight,) in alone]] = values[:, : len(alone)]
+        return names, result[:, run_of]
+
+    def _flights(
+        self, group: Group, steered: bool, to_the_end: bool
+    ) -> tuple[list[list[RelativeFlight]], IntArray]:
         steering = self.manoeuvres(group) if steered else None
         target = getattr(self.p, "target", None)
-        return read_flights(group, self.p.step_s, target, read, steering, to_the_end=to_the_end)
+        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end)
 
 
 #: What is read of runs, each a list of its flights: (values, runs).
@@ -98,16 +121,15 @@ def each_alone(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Rea
     return lambda runs: np.array([read(flights) for flights in runs]).T
 
 
-def read_flights(
+def flights_of(
     group: Group,
     step_s: float | None,
     target: str | None,
-    read: Read,
     steering: Mapping[int, Steering] | None = None,
     *,
     to_the_end: bool = False,
-) -> FloatArray:
-    """Return what `read` makes of every replica's flights, shape (values, replicas).
+) -> tuple[list[list[RelativeFlight]], IntArray]:
+    """Return the flights of runs that differ, and which of these each replica is.
 
     Flights are computed once for all replicas that share them. Distances are taken every `step_s`;
     None looks between them for losses. A target of None is all of them. The ownship of a replica
@@ -143,4 +165,4 @@ def read_flights(
     )
     for number, own in zip(steered, flown, strict=True):
         runs[run_of[number]] = [flight.flown_by(own) for flight in runs[run_of[number]]]
-    return read(runs)[:, run_of]
+    return runs, run_of

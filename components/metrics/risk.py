@@ -63,13 +63,20 @@ class Mitigated(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        read = self.p.losses_s
-        values: dict[str, AnyArray] = {}
-        for which, steered in (("nominal", False), ("mitigated", True)):
-            lost_s, collision_s, _ = self.of_flights(group, read, steered=steered)
-            values[f"well_clear_lost_{which}"] = (~np.isnan(lost_s)).astype(float)
-            values[f"nmac_{which}"] = (~np.isnan(collision_s)).astype(float)
-        return values
+        return {**self.losses(group, steered=False), **self.losses(group, steered=True)}
+
+    def losses(self, group: Group, *, steered: bool) -> Mapping[str, AnyArray]:
+        """Return both events of every replica's flights, nominal or as steered."""
+        which = "mitigated" if steered else "nominal"
+        lost_s, collision_s, _ = self.of_flights(group, self.p.losses_s, steered=steered)
+        return {
+            f"well_clear_lost_{which}": (~np.isnan(lost_s)).astype(float),
+            f"nmac_{which}": (~np.isnan(collision_s)).astype(float),
+        }
+
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return what happens without manoeuvres."""
+        return self.losses(group, steered=False)
 
 
 class SeverityParameters(TargetParameters, SizeParameters):

@@ -90,36 +90,56 @@ def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
     return result
 
 
-def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
-    """Return the row of each replica's first report, -1 where it has none.
+def first_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
+    """Return the row of each replica's first report of each target, (count, names), -1 for none.
 
-    Rows to look at and columns are in recorded order; of several rows of one instant the one with
-    the smallest true range counts.
+    Names are those of the column; rows to look at and columns are in recorded order.
     """
     table: Any = columns
-    if len(rows) == 0:
-        return np.full(count, -1, dtype=np.int64)
-    replica = table["replica"][rows]
-    starts = np.flatnonzero(np.append(True, replica[1:] != replica[:-1]))
-    tick, index, together = table["tick"], starts, [starts]
-    while len(index := index[index + 1 < len(rows)]):  # those of the same instant follow
-        ahead = rows[index + 1]
-        same = (replica[index + 1] == replica[index]) & (tick[ahead] == tick[rows[index]])
-        index = index[same] + 1
-        together.append(index)
-    rows = rows[np.sort(np.concatenate(together))]
-    ranges = table["true_range_m"][rows]
-    order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
-    numbers, first = np.unique(table["replica"][rows][order], return_index=True)
-    result = np.full(count, -1, dtype=np.int64)
-    result[numbers] = rows[order][first]
-    return result
+    many = len(table["target"].names)
+    result = np.full(count * many, -1, dtype=np.int64)
+    of = table["replica"][rows] * many + table["target"].codes[rows]
+    of, first = np.unique(of, return_index=True)
+    result[of] = rows[first]
+    return result.reshape(count, many)
+
+
+def earliest(time_s: FloatArray, range_m: FloatArray) -> IntArray:
+    """Return which target comes first in each replica, of several at one instant the nearest.
+
+    Times and ranges (replicas, targets) are NaN for what does not happen; -1 where nothing does.
+    """
+    none = np.isnan(time_s)
+    if none.shape[1] == 0:
+        return np.full(len(none), -1, dtype=np.int64)
+    first_s = np.where(none, np.inf, time_s)
+    at_once = first_s == first_s.min(axis=1, keepdims=True)
+    nearest = np.where(at_once & ~np.isnan(range_m), range_m, np.inf)
+    # One without a range comes after those with one, and before those of another instant.
+    nearest = np.where(at_once, np.minimum(nearest, np.finfo(float).max), np.inf)
+    return np.where(none.all(axis=1), -1, nearest.argmin(axis=1))
+
+
+def picked(values: AnyArray, target: IntArray) -> AnyArray:
+    """Return the value (replicas, targets) of one target of each replica; of one of -1 none."""
+    return _and_none(values)[np.arange(len(values)), target]
+
+
+def columns_at(values: AnyArray, target: IntArray) -> AnyArray:
+    """Return values (replicas, targets) of some targets; of one that is -1 there are none."""
+    return _and_none(values)[:, target]
+
+
+def _and_none(values: AnyArray) -> AnyArray:
+    """Return values (replicas, targets) with those of no target last: NaN, or 0 and False."""
+    none = np.full((len(values), 1), np.nan if values.dtype.kind == "f" else 0, values.dtype)
+    return np.concatenate([values, none], axis=1)
 
 
 def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
-    """Return a column at some rows, NaN where the row is -1."""
+    """Return a column at some rows, of any shape, NaN where the row is -1."""
     values: Any = columns[name]
-    result = np.full(len(rows), np.nan)
+    result = np.full(rows.shape, np.nan)
     result[rows >= 0] = values[rows[rows >= 0]]
     return result
 
@@ -161,8 +181,11 @@ def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
 
 
 def at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
-    """Return whether what takes so many scans of a sensor was seen as early as a start lets it."""
-    return in_scan(time_s, scan_time_s(group, name, scans))
+    """Return whether what takes so many scans of a sensor was seen as early as a start lets it.
+
+    Times are those of replicas, or of replicas and their targets.
+    """
+    return in_scan(time_s.T, scan_time_s(group, name, scans)).T
 
 
 def start_or_never(cut: BoolArray, values: FloatArray) -> AnyArray:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.flights.closest_approach import (
+    STEP_S,
     SampleTimes,
     present_together_s,
     regular_count,
@@ -28,8 +29,6 @@ from dsa_des.time.randomness import Streams
 
 #: Times looked at together: it bounds the memory, however long the run.
 MOST_AT_ONCE = 65_536
-#: Spacing of the grid where none is given, s.
-STEP_S = 0.1
 # Times of a flight that are kept for metrics that ask for them again.
 _KEPT = 4096
 # The speeds of turns and long legs hold to 2e-4, and the ownship's level plane turns with it.

@@ -1,12 +1,12 @@
 """How wrong tracks are at which range (``track_errors_by_range``), against bounds such as DO-365's.
 
-Of every run there is one sample at each range: the instant at which the target is nearest to it,
-while a sensor covers it. So samples of different runs are independent, and the quantile of an error
-over runs has an interval by order statistics.
+Of every run there is one sample at each range: the instant at which a target is nearest to it,
+while a sensor covers it, and the track of that target. So samples of different runs are
+independent, and the quantile of an error over runs has an interval by order statistics.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import held
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
@@ -102,24 +102,26 @@ class ErrorsByRange(Metric):
         own, targets = coverage.aircraft
         time_s = np.arange(self.p.from_s, end_s + 1e-9, self.p.step_s)
         values: dict[str, float] = {}
-        if len(targets) != 1 or not len(time_s):
-            return values  # whose sample it would be is not known
-        (target,) = targets
+        if not len(targets) or not len(time_s):
+            return values
         state = own.at(time_s)
         origin = np.stack([np.broadcast_to(v, time_s.shape) for v in
                            (state.lat_deg, state.lon_deg, state.alt_m)])  # fmt: skip
-        position, there = position_in_frame(target, time_s, origin)
-        range_m = np.sqrt((position**2).sum(axis=0))
-        seen = coverage.holds(target, time_s) & there
-        error, of_rows, first_m = self._errors(columns, rows, own, target)
+        error, rows, of, first_m = self._errors(columns, rows, own, targets)
         if math.isfinite(first_m):
             values["first_track_range_nmi"] = first_m / NAUTICAL_MILE_M
+        told_s = columns["time_s"][rows]
+        range_m = np.full((len(targets), len(time_s)), np.inf)
+        for number, target in enumerate(targets):
+            position, there = position_in_frame(target, time_s, origin)
+            seen = coverage.holds(target, time_s) & there
+            range_m[number, seen] = np.sqrt((position[:, seen] ** 2).sum(axis=0))
         for r in self.p.ranges_nmi:
-            k = _nearest(range_m, r * NAUTICAL_MILE_M, seen)
+            target, k = _nearest(range_m, r * NAUTICAL_MILE_M)
             if k < 0:
                 continue
-            told_s = columns["time_s"][of_rows]
             inside = (told_s <= time_s[k] + 1e-9) & (told_s > time_s[k] - 2.0 * self.p.step_s)
+            inside &= of == target
             values[f"tracked.{r:g}"] = float(inside.any())
             if inside.any():
                 last = int(np.flatnonzero(inside)[-1])
@@ -127,17 +129,24 @@ class ErrorsByRange(Metric):
         return values
 
     def _errors(
-        self, columns: Any, rows: IntArray, own: Any, target: Any
-    ) -> tuple[dict[str, FloatArray], IntArray, float]:
-        """Return errors of rows that are the target's, these rows, and the range of the first."""
+        self, columns: Any, rows: IntArray, own: Any, targets: Sequence[Any]
+    ) -> tuple[dict[str, FloatArray], IntArray, IntArray, float]:
+        """Return errors of rows that are a target's, the rows, whose, and the first one's range.
+
+        A row is of the target that is nearest to it.
+        """
         origin = np.stack([columns[name][rows] for name in ORIGIN])
         estimate = np.stack([columns[name][rows] for name in STATE])
-        true, there = states_in_frame([target], columns["state_s"][rows], origin)
-        apart = estimate - true[0]
-        mine = there[0] & (np.sqrt((apart[:3] ** 2).sum(axis=0)) < self.p.within_m)
-        apart, rows = apart[:, mine], rows[mine]
-        seen_from, _ = position_in_frame(own, columns["state_s"][rows], origin[:, mine])
-        sight = true[0][:3, mine] - seen_from
+        true, there = states_in_frame(targets, columns["state_s"][rows], origin)
+        away_m = np.sqrt(((estimate[:3] - true[:, :3]) ** 2).sum(axis=1))
+        away_m = np.where(there, away_m, np.inf)
+        of = away_m.argmin(axis=0)
+        mine = away_m.min(axis=0) < self.p.within_m
+        rows, of, origin = rows[mine], of[mine], origin[:, mine]
+        true = true[of, :, np.flatnonzero(mine)].T
+        apart = estimate[:, mine] - true
+        seen_from, _ = position_in_frame(own, columns["state_s"][rows], origin)
+        sight = true[:3] - seen_from
         with np.errstate(invalid="ignore", divide="ignore"):
             level = np.hypot(sight[0], sight[1])
             across = np.abs(apart[0] * sight[1] - apart[1] * sight[0]) / level
@@ -150,11 +159,14 @@ class ErrorsByRange(Metric):
             )
         )  # fmt: skip
         first = float(np.sqrt((sight[:, 0] ** 2).sum())) if len(rows) else math.nan
-        return error, rows, first
+        return error, rows, of, first
 
 
-def _nearest(range_m: FloatArray, wanted_m: float, seen: BoolArray) -> int:
-    """Return the first instant nearest to a range, within half a mile of it, or -1."""
-    apart = np.where(seen, np.abs(range_m - wanted_m), np.inf)
-    k = int(np.argmin(apart))
-    return k if apart[k] <= 0.5 * NAUTICAL_MILE_M else -1
+def _nearest(range_m: FloatArray, wanted_m: float) -> tuple[int, int]:
+    """Return which target (targets, instants) is first nearest to a range, and when.
+
+    Within half a mile of it, or -1; ranges of who is not seen are infinite.
+    """
+    target, k = np.unravel_index(np.argmin(np.abs(range_m - wanted_m)), range_m.shape)
+    near = abs(range_m[target, k] - wanted_m) <= 0.5 * NAUTICAL_MILE_M
+    return (int(target), int(k)) if near else (-1, -1)

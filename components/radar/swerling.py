@@ -21,6 +21,7 @@ from components.radar.rcs import (
     LastingFluctuation,
     ModelsOfCells,
     RcsFluctuation,
+    fades_drawn_too_often,
     models_of,
     scan_rcs,
     steady,
@@ -183,6 +184,10 @@ class SwerlingRadar(LinkBudgetRadar):
         """Say which method of Pd was picked, and why, if the scene asks for that."""
         said = [*super().left_out(), *noise_at_targets(self.p)]
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
+
+    def warnings(self) -> list[str]:
+        """Say besides where scans come faster than fades end."""
+        return [*super().warnings(), *fades_drawn_too_often(self)]
 
     def range_slack(self) -> float:
         """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.

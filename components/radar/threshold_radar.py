@@ -258,8 +258,15 @@ class LinkBudgetRadar(Radar):
         return float(10.0 * np.log10(snr))
 
     def left_out(self) -> list[str]:
-        """Say what the air would take that the scene leaves out."""
-        return [*super().left_out(), *gas_left_out(self)]
+        """Say what the air would take that the scene leaves out, and where echoes are ambiguous."""
+        said = [*super().left_out(), *gas_left_out(self)]
+        if self.p.prf_hz is not None and self.p.range_km is None:
+            range_km = self.stated_reach.range_max_m / 1000.0
+            said.append(
+                f"targets beyond {range_km:.4g} km: not looked at, their echoes come after the "
+                f"next pulse (prf_hz is {self.p.prf_hz:g})"
+            )
+        return said
 
     def warnings(self) -> list[str]:
         """Say which values no radar has, and what its false alarm probability comes to."""

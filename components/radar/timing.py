@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
+from components.messages.reach import Reach
 from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.resolution import ResolutionParameters, steps_across
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -33,9 +34,14 @@ def pulses_in(dwell_s: float, prf_hz: float) -> int:
     return math.floor(dwell_s * prf_hz * (1.0 + _ROUNDING))
 
 
+def unambiguous_range_m(prf_hz: float) -> float:
+    """Return the range from beyond which echoes come after the next pulse has left, m."""
+    return SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
+
+
 def check_unambiguous(prf_hz: float, range_km: float) -> None:
     """Raise ValueError if echoes from a range come after the next pulse has left."""
-    reach_m = SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
+    reach_m = unambiguous_range_m(prf_hz)
     if range_km * 1000.0 > reach_m:
         highest_hz = 1.0 / round_trip_s(range_km * 1000.0)
         raise ValueError(
@@ -89,7 +95,12 @@ class TimeBudgetParameters(ResolutionParameters):
         "scan's beam positions, and the mean over a sweep. The link budget, and a range that "
         "calibrates it, are of a target amid the beam.",
     )
-    prf_hz: float | None = Field(default=None, gt=0, description="Pulse repetition frequency, Hz.")
+    prf_hz: float | None = Field(
+        default=None,
+        gt=0,
+        description="Pulse repetition frequency, Hz; targets whose echo comes after the next pulse "
+        "are not looked at.",
+    )
     dwell_s: float | None = Field(
         default=None,
         gt=0,
@@ -185,6 +196,13 @@ class TimeBudgetParameters(ResolutionParameters):
         if self.integration == "noncoherent":
             return LookEnergy(beams, dwell_s, pulses, 1.0, pulses)
         return LookEnergy(beams, dwell_s, pulses, pulses / self.stated_pulses, 1)
+
+    def reach(self) -> Reach:
+        """Return the reach, which ends where echoes come after the next pulse."""
+        reach = super().reach()
+        if self.prf_hz is None or self.range_km is not None:
+            return reach
+        return replace(reach, range_max_m=unambiguous_range_m(self.prf_hz))
 
     def _check_pulse_interval(self) -> None:
         if self.prf_hz is None:

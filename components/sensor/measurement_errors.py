@@ -39,6 +39,8 @@ class QuantityError:
         self._deviation, self._bias = stated.deviation, stated.bias
         self._drawn = stated.drawn_bias
         self._biases, self._looks = stream(f"bias of {name}"), stream(f"error of {name}")
+        #: The biases of the first runs, as far as they were asked for.
+        self._known = np.empty(0)
         self._lasting: GaussMarkov | None = None
         if stated.correlation_time_s is not None:
             lasting = stream(f"lasting error of {name}")
@@ -66,10 +68,12 @@ class QuantityError:
     def _bias_of(self, run: IntArray) -> FloatArray:
         if not self._drawn:
             return np.full(len(run), self._bias)
-        runs, index = np.unique(run, return_inverse=True)
-        keys, scan = np.full(len(runs), _NO_TARGET), np.zeros(len(runs), dtype=np.int64)
-        drawn = self._biases.of_runs(runs).uniform(keys, scan)
-        return (self._bias * (2.0 * drawn - 1.0))[index]
+        if len(run) and run.max() >= len(self._known):  # the others' are as they were
+            runs = np.arange(len(self._known), int(run.max()) + 1)
+            keys, scan = np.full(len(runs), _NO_TARGET), np.zeros(len(runs), dtype=np.int64)
+            drawn = self._biases.of_runs(runs).uniform(keys, scan)
+            self._known = np.append(self._known, self._bias * (2.0 * drawn - 1.0))
+        return self._known[run]
 
 
 # A range that comes out below this, a millimetre, is no range.

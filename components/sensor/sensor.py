@@ -14,7 +14,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.messages.cues import CueCones
-from components.messages.detections import REPORT, Detections, LastingError, Reporting, SensorOffer
+from components.messages.detections import (
+    REPORT,
+    Detections,
+    LastingError,
+    Reporting,
+    SensorOffer,
+    promises_of_looks,
+)
 from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
@@ -185,7 +192,8 @@ class Sensor(Measuring):
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
-            lasting=lasting, clock=self.p.clock_spec, unstated_across_m2=unstated_m2, **constant,
+            lasting=lasting, clock=self.p.clock_spec, unstated_across_m2=unstated_m2,
+            promises=promises_of_looks(float(1 / self.p.scan_rate_hz)), **constant,
         )  # fmt: skip
 
     @cached_property

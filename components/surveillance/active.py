@@ -12,8 +12,14 @@ from pydantic import AfterValidator, Field, model_validator
 from components.arguments.units import FOOT_M
 from components.estimation.carried_errors import BEARING, RANGE
 from components.geometry import wrap_pi_unchecked
-from components.messages.detections import LastingError, LastingPart, SensorOffer, ToldError
-from components.messages.reach import Reach
+from components.messages.detections import (
+    LastingError,
+    LastingPart,
+    SensorOffer,
+    ToldError,
+    promises_of_looks,
+)
+from components.messages.reach import EVALUATE, Reach
 from components.navigation.errors import navigation_noise
 from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
@@ -26,6 +32,7 @@ from components.surveillance.cooperative import (
     CooperativeSensor,
     velocity_of,
 )
+from components.surveillance.extended_squitter import altitude_step_ft
 from components.surveillance.interrogation import (
     CUT,
     IN_1_S,
@@ -200,17 +207,31 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
+            promises=self._promises(),
             tells=self._errs, told_errors=_TOLD_ERRORS if self._errs else (),
         )  # fmt: skip
 
+    def _promises(self) -> tuple[tuple[float, float], ...]:
+        """Return in which time an aircraft is asked again that is far: in as many scans."""
+        period_s = float(1 / self.p.scan_rate_hz)
+        every = self.p.far_every
+        return promises_of_looks(period_s, [(math.inf, every * period_s)] if every > 1 else ())
+
     def answer_probability(self, cells: Cells) -> FloatArray:
         """Return the probability that each cell's aircraft answers if it is asked."""
-        equipage = cells.roster.equipage
-        mode_s, mode_c = equipage.mode_s[cells.craft], equipage.mode_c[cells.craft]
-        within = cells.range_m <= reach_m(cells.body_azimuth_rad, mode_s)
+        every = np.arange(len(cells))
+        return self._answer_probability(cells, every, cells.range_m, cells.body_azimuth_rad)
+
+    def _answer_probability(
+        self, cells: Cells, which: AnyArray, range_m: FloatArray, azimuth_rad: FloatArray
+    ) -> FloatArray:
+        """Return the same of some cells, at ranges and bearings of some instant."""
+        equipage, craft = cells.roster.equipage, cells.craft[which]
+        mode_s, mode_c = equipage.mode_s[craft], equipage.mode_c[craft]
+        within = range_m <= reach_m(azimuth_rad, mode_s)
         in_1_s = np.where(mode_s, self.p.mode_s_in_1_s, self.p.mode_c_in_1_s)
         if self.p.replies == "certain":
-            in_1_s = np.ones(len(cells))
+            in_1_s = np.ones(len(range_m))
         return np.where(within & (mode_s | mode_c), in_1_s, 0.0)
 
     def look(self, cells: Cells) -> Look:
@@ -221,12 +242,16 @@ class Active(CooperativeSensor):
         detected[asked] = self._is_asked(cells, asked)
         asked = np.flatnonzero(detected)
         if self.p.replies == "rounds":
-            detected[asked] = self._answer(cells, asked, probability[asked])
+            instant_ns = cells.state_ns[asked]
+            detected[asked] = self._answer(cells, asked, probability[asked], instant_ns)
         answered = np.flatnonzero(detected)
+        now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
+        # An altitude that no code has is not available: such an answer places nobody.
+        detected[answered] = np.isfinite(now)
+        answered, now = answered[np.isfinite(now)], now[np.isfinite(now)]
         extras = unreported(len(cells))
         equipage, craft = cells.roster.equipage, cells.craft[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
-        now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
         if len(answered):
@@ -236,7 +261,8 @@ class Active(CooperativeSensor):
     def _is_asked(self, cells: Cells, which: AnyArray) -> BoolArray:
         """Return which cells are asked at this scan: near or new ones, and others each in turn.
 
-        Near ones are known by the ranges measured at an aircraft's own last two turns.
+        Near ones are known by the ranges measured at an aircraft's own last two turns, new ones by
+        that it did not answer at one of them: it was not there, out of reach, or not heard.
         """
         if self.p.far_every == 1 or not len(which):
             return np.ones(len(which), dtype=bool)
@@ -251,15 +277,33 @@ class Active(CooperativeSensor):
             for ago_s in (since_s, since_s + every * period_s):
                 then = cells.seen_at(rest, -ago_s)
                 instant_ns = cells.state_ns[rest] - np.rint(ago_s * NANOSECONDS).astype(np.int64)
-                known &= then["present"] & (instant_ns >= 0)
+                known &= self._answered(cells, rest, then, instant_ns)
                 ranges.append(self._ranged(cells, rest, then["range_m"], instant_ns))
             rate = (ranges[0] - ranges[1]) / (every * period_s)
             due[~due] = ~known | is_near(ranges[0] + rate * since_s, rate, self.p.near_s)
         return np.asarray(due)
 
-    def _answer(self, cells: Cells, which: AnyArray, in_1_s: FloatArray) -> BoolArray:
-        """Return which answered in the last ten rounds; a run begins with ten that are over."""
-        last = cells.state_ns[which] // round(ROUND_S * NANOSECONDS)
+    def _answered(
+        self, cells: Cells, which: AnyArray, then: Any, instant_ns: IntArray
+    ) -> BoolArray:
+        """Return which answered at a turn of theirs, as everything was `then`."""
+        azimuth, elevation = then["body_azimuth_rad"], then["body_elevation_rad"]
+        there = then["present"] & (instant_ns >= 0)
+        hidden = then.get("hidden")
+        reason = self._reach_from_body.decide(azimuth, elevation, then["range_m"], there, hidden)
+        probability = self._answer_probability(cells, which, then["range_m"], azimuth)
+        heard = np.asarray((reason == EVALUATE) & (probability > 0.0))
+        if self.p.replies == "rounds":
+            some = np.flatnonzero(heard)
+            now_ns = instant_ns[some]
+            heard[some] = self._answer(cells, which[some], probability[some], now_ns)
+        return heard
+
+    def _answer(
+        self, cells: Cells, which: AnyArray, in_1_s: FloatArray, instant_ns: IntArray
+    ) -> BoolArray:
+        """Return which answered in the ten rounds before; a run begins with ten that are over."""
+        last = instant_ns // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
         run = np.repeat(cells.run[which], ROUNDS)
         keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
@@ -271,7 +315,7 @@ class Active(CooperativeSensor):
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
         """Return what some cells' transponders report of true altitudes, m."""
-        step_ft = self._step_ft(cells, which) if self._errs else 0.0
+        step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.of(cells, which)
         return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
 
@@ -334,17 +378,21 @@ class Active(CooperativeSensor):
         position_m, attitude_rad = navigation_noise(self.context)
         own = velocity_of(cells, detected, none, cells.seen_at(detected, none), "own")
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
+        step_ft = self._step_ft(cells, detected, altitude_m)
         return unstated_errors(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
             "height_deviation": np.sqrt(altimetry_ft2) * FOOT_M,
-            "rounding_deviation": self._step_ft(cells, detected) * FOOT_M / math.sqrt(12.0),
+            "rounding_deviation": step_ft * FOOT_M / math.sqrt(12.0),
             "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
             "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),
             "range_deviation": none + RANGE_ERROR_M,
             "white_variance": none + _WHITE_M2 + max(position_m) ** 2,
         }  # fmt: skip
 
-    def _step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
+    def _step_ft(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
+        return altitude_step_ft(altitude_m / FOOT_M, self._mode_step_ft(cells, which))
+
+    def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
         mode_s = cells.roster.equipage.mode_s[cells.craft[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
 
@@ -366,6 +414,6 @@ class Active(CooperativeSensor):
         place_m2 = max(position_m[:2]) ** 2
         across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
         along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
-        step_ft = self._step_ft(cells, detected)
+        step_ft = self._step_ft(cells, detected, altitude_m)
         feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + step_ft**2 / 12.0
         return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2

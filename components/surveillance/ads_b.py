@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -12,7 +13,7 @@ from pydantic import Field, model_validator
 from components.aircraft.known_targets import known_targets
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
-from components.messages.detections import Detections, SensorOffer
+from components.messages.detections import Detections, SensorOffer, promises_of_looks
 from components.messages.reach import Reach
 from components.navigation.errors import displaced_position
 from components.sensor.ladder_values import measure_cells
@@ -23,14 +24,25 @@ from components.surveillance.believed_line import (
     towards,
     variances_in_body,
 )
-from components.surveillance.broadcast import Broadcasts, Sent, Transponders
+from components.surveillance.broadcast import (
+    Broadcasts,
+    Sent,
+    Transponders,
+    turned_by_meridians,
+)
 from components.surveillance.cooperative import (
     STEP_S,
     CooperativeParameters,
     CooperativeSensor,
     velocity_of,
 )
-from components.surveillance.reception import LAWS
+from components.surveillance.reception import (
+    AIRCRAFT_AROUND,
+    AIRPORTS_AROUND,
+    LAWS,
+    fitted,
+    time_to_receive_s,
+)
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import (
@@ -44,6 +56,8 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
+#: Of so many ranges it is told how long a message takes to come.
+_PROMISED_RANGES = 40
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
 
@@ -55,6 +69,20 @@ class AdsBParameters(CooperativeParameters):
         default="fitted",
         description="Probability over range that a squitter is received: 1; the steps of DO-365 to "
         "20 nmi; the law fitted to 23 receivers, to 290 nmi.",
+    )
+    aircraft_around: float = Field(
+        default=AIRCRAFT_AROUND,
+        ge=0,
+        le=300,
+        description="Aircraft that a receiver of the fitted law hears besides, whose messages "
+        "garble each other; the median of the 23 receivers is 95.",
+    )
+    airports_around: float = Field(
+        default=AIRPORTS_AROUND,
+        ge=20,
+        le=100,
+        description="Airports around a receiver of the fitted law, which stand for the aircraft "
+        "that are low.",
     )
     position_errors: Literal["none", "white", "gauss_markov"] = Field(
         default="gauss_markov",
@@ -82,6 +110,14 @@ class AdsBParameters(CooperativeParameters):
                 f"reception '{self.reception}'; it must be at most that"
             )
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a law of reception that is not taken."""
+        said = super().without_effect()
+        if self.reception != "fitted":
+            around = "aircraft_around", "airports_around"
+            said += self.idle(*around, because=f"reception is {self.reception!r}")
+        return said
 
     def reach(self) -> Reach:
         """Return the reach: that of the law of reception, where none is given."""
@@ -133,6 +169,21 @@ ERRORS = Ladder(
 )  # fmt: skip
 
 
+def _in_axes_at(
+    position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
+) -> FloatArray:
+    """Return velocities in the axes of positions that are later than they are, (3, n).
+
+    North turns with the meridians, within a mile of a pole by degrees from message to message.
+    """
+    turned = north_east_down
+    for _ in range(3):
+        back = np.nan_to_num(turned * -later_s)
+        lat, lon, _ = displaced_position(*position, *back)
+        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+    return turned
+
+
 class AdsB(CooperativeSensor):
     """Reports equipped aircraft by the last position and velocity messages received of each.
 
@@ -155,6 +206,10 @@ class AdsB(CooperativeSensor):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.law = LAWS[parameters.reception][0]
+        if parameters.reception == "fitted":
+            self.law = partial(
+                fitted, aircraft=parameters.aircraft_around, airports=parameters.airports_around
+            )
         #: Scan of each cell of the last look, and the ownship's velocity then.
         self._rows: tuple[IntArray, FloatArray] | None = None
         #: When the scan before each of the last look was, in ns of its run.
@@ -179,8 +234,19 @@ class AdsB(CooperativeSensor):
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
+            promises=self._promises(),
             tells=True, told_errors=told,
         )  # fmt: skip
+
+    def _promises(self) -> tuple[tuple[float, float], ...]:
+        """Return in which time an aircraft's next position has come, 19 times in 20, by range."""
+        reach_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
+        ranges_m = np.array([math.inf])
+        if math.isfinite(reach_m):
+            ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]
+        within_s = time_to_receive_s(self.law(ranges_m))
+        promises = zip(ranges_m.tolist(), within_s.tolist(), strict=True)
+        return promises_of_looks(float(1 / self.p.scan_rate_hz), promises)
 
     @property
     def steps(self) -> dict[str, float]:
@@ -203,6 +269,9 @@ class AdsB(CooperativeSensor):
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
+            # An altitude that no code has is not available, and there is no place without one.
+            placed = np.isfinite(extras["reported_alt_m"][reported])
+            detected[reported], reported = placed, reported[placed]
             own_velocity[:, reported] = self._own_velocity(cells, reported)
         moves = {f"own_{axis}": own_velocity[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, own_velocity
@@ -321,6 +390,7 @@ class AdsB(CooperativeSensor):
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
         position = [said[f"reported_{name}"] for name in POSITION_FIELDS]
+        velocity = _in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
         carried = np.nan_to_num(velocity)
         ned = towards(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.

@@ -17,11 +17,9 @@ from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
-    HIGHEST_FT,
-    LOWEST_FT,
     quantised_altitude_ft,
     quantised_climb_ft_min,
-    quantised_speed_kt,
+    quantised_velocity_kt,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -31,6 +29,8 @@ from dsa_des.time.randomness import Streams
 CORRELATION_TIME_S = 300.0
 #: Scale of the Laplace distribution of vertical rates, new with each message (the same source).
 CLIMB_SCALE_M_S = 2.02 * FOOT_M
+#: Nearer to a pole meridians turn by more than a milliradian over an error of 100 m.
+_NEAR_A_POLE_DEG = 89.0
 #: Draws are those of aircraft, not of the block that looks.
 _OWNER = "[equipage]"
 
@@ -50,6 +50,19 @@ class Transponders:
         return cls(keys, cells.run[which], cells.craft[which])
 
 
+def turned_by_meridians(
+    north_east_up: FloatArray,
+    here_deg: tuple[FloatArray, FloatArray],
+    there_deg: tuple[FloatArray, FloatArray],
+) -> FloatArray:
+    """Return vectors (3, n) in north and east of a place near by: latitudes and longitudes."""
+    angle = np.radians((there_deg[1] - here_deg[1] + 180.0) % 360.0 - 180.0)
+    angle = angle * np.sin(np.radians(0.5 * (here_deg[0] + there_deg[0])))
+    north, east, up = north_east_up
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([cosine * north - sine * east, sine * north + cosine * east, up])
+
+
 class Altimeters:
     """The altimeters of all aircraft."""
 
@@ -63,7 +76,10 @@ class Altimeters:
         step_ft: npt.ArrayLike,
         errs: bool = True,
     ) -> FloatArray:
-        """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing."""
+        """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing.
+
+        NaN where no code has them.
+        """
         altitude = altitude_m / FOOT_M
         if errs:
             stream = self._stream.of_runs(transponders.run)
@@ -110,18 +126,31 @@ class Broadcasts:
         transponders: Transponders,
         message: IntArray,
         instant_ns: IntArray,
+        lat_deg: npt.ArrayLike = 0.0,
+        lon_deg: npt.ArrayLike = 0.0,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the errors north and east of the position or the velocity at instants (n,)."""
+        """Return the errors north and east of the position or the velocity at instants (n,).
+
+        They last along three axes that are fixed to the Earth, of which north and east at a place
+        are combinations with the same deviation, independent of each other: near a pole, where
+        north turns about, the error does not.
+        """
         keys, run = transponders.keys, transponders.run
         if self._errors == "none":
             return np.zeros(len(deviation)), np.zeros(len(deviation))
         if self._errors == "white":
             stream = self._streams[name].of_runs(run)
-            draws = [stream.normal(keys, message, axis + 60_000) for axis in (0, 1)]
+            draws = [stream.normal(keys, message, axis + 60_000) for axis in range(3)]
         else:
             # What is sent before the run begins is of instants before 0.
-            draws = [self._lasting[name](keys, instant_ns, axis, run) for axis in (0, 1)]
-        return deviation * draws[0], deviation * draws[1]
+            draws = [self._lasting[name](keys, instant_ns, axis, run) for axis in range(3)]
+        # The Earth's axis, east of Greenwich at the equator, and outwards there.
+        axis, sideways, outward = draws
+        lat, lon = np.radians(lat_deg), np.radians(lon_deg)
+        east = np.cos(lon) * sideways - np.sin(lon) * outward
+        level = np.cos(lon) * outward + np.sin(lon) * sideways
+        north = np.cos(lat) * axis - np.sin(lat) * level
+        return deviation * north, deviation * east
 
     def _climb_errors(self, transponders: Transponders, message: IntArray) -> FloatArray:
         """Return the errors of vertical rates, m/s, of messages (n,)."""
@@ -134,28 +163,49 @@ class Broadcasts:
         """Return velocities north, east and up as decoded, (3, n), m/s."""
         deviation = equipage.velocity_deviation_m_s[transponders.craft]
         messages = transponders, sent.message
-        level = self.level_errors("velocity", deviation, *messages, sent.instant_ns)
+        level = self.level_errors(
+            "velocity", deviation, *messages, sent.instant_ns, sent.lat_deg, sent.lon_deg
+        )
         moved = sent.north_east_up_m_s + np.stack([*level, self._climb_errors(*messages)])
+        near = np.flatnonzero(np.abs(sent.lat_deg) > _NEAR_A_POLE_DEG)
+        if len(near):
+            moved[:, near] = self._in_own_axes(equipage, transponders, sent, near, moved[:, near])
         if not self._quantised:
             return np.asarray(moved)
-        return np.stack([
-            quantised_speed_kt(moved[0] / KNOT_M_S) * KNOT_M_S,
-            quantised_speed_kt(moved[1] / KNOT_M_S) * KNOT_M_S,
-            quantised_climb_ft_min(moved[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S,
-        ])  # fmt: skip
+        north, east = quantised_velocity_kt(moved[0] / KNOT_M_S, moved[1] / KNOT_M_S)
+        climb = quantised_climb_ft_min(moved[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S
+        return np.stack([north * KNOT_M_S, east * KNOT_M_S, climb])
+
+    def _in_own_axes(
+        self, equipage: Equipage, transponders: Transponders, sent: Sent, which: IntArray,
+        moved: FloatArray,
+    ) -> FloatArray:  # fmt: skip
+        """Return velocities in north and east of where aircraft believe to be."""
+        some = Transponders(
+            transponders.keys[which], transponders.run[which], transponders.craft[which]
+        )
+        true = sent.lat_deg[which], sent.lon_deg[which]
+        errors = self.level_errors(
+            "position", equipage.position_deviation_m[some.craft], some, sent.message[which],
+            sent.instant_ns[which], *true,
+        )  # fmt: skip
+        none = np.zeros_like(errors[0])
+        lat, lon, _ = displaced_position(*true, sent.alt_m[which], *errors, none)
+        return turned_by_meridians(moved, true, (lat, lon))
 
     def position(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return latitudes, longitudes and altitudes as decoded (deg, deg, m).
 
-        Latency is compensated by the aircraft's own velocity.
+        Latency is compensated by the aircraft's own velocity. An altitude that no code has is NaN.
         """
         craft = transponders.craft
         deviation = equipage.position_deviation_m[craft]
         errors = self.level_errors(
-            "position", deviation, transponders, sent.message, sent.instant_ns
-        )
+            "position", deviation, transponders, sent.message, sent.instant_ns,
+            sent.lat_deg, sent.lon_deg,
+        )  # fmt: skip
         spoofed, ahead_s = equipage.spoofed_m[:, craft], equipage.compensated_s[craft]
         north, east, up = errors[0] + spoofed[0], errors[1] + spoofed[1], spoofed[2]
         if ahead_s.any():
@@ -171,4 +221,4 @@ class Broadcasts:
         odd: BoolArray = sent.message % 2 == 1
         y, x = encode(lat, lon, odd)
         lat, lon = decode_near(y, x, odd, lat, lon)
-        return lat, lon, np.clip(feet, LOWEST_FT, HIGHEST_FT) * FOOT_M
+        return lat, lon, feet * FOOT_M

@@ -16,8 +16,12 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Steps of altitude, of each part of a velocity, and of a vertical rate.
 ALTITUDE_STEP_FT, SPEED_STEP_KT, CLIMB_STEP_FT_MIN = 25, 1, 64
+#: What is coded in steps of 25 ft; lower and higher ones are in Gillham's code, of 100 ft.
 LOWEST_FT, HIGHEST_FT = -1000, 50_175
+GILLHAM_STEP_FT, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT = 100, -1200, 126_700
 _FASTEST_KT, _STEEPEST = 1022, 510
+#: The step of the supersonic velocity, kt, which is sent where a part is 1021.5 kt or more.
+_SUPERSONIC = 4
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -53,15 +57,45 @@ def is_intact(messages: Bytes) -> BoolArray:
 
 
 def quantised_altitude_ft(altitude_ft: npt.ArrayLike, step_ft: npt.ArrayLike = 25) -> FloatArray:
-    """Return altitudes on the grid that a transponder reports on, 25 or 100 ft."""
-    step = np.asarray(step_ft, np.float64)
-    return np.asarray(np.floor(np.asarray(altitude_ft, np.float64) / step + 0.5) * step)
+    """Return altitudes on the grid that a transponder reports on, 25 or 100 ft.
+
+    NaN where no code has them: "not available", below -1,200 and above 126,700 ft.
+    """
+    altitude = np.asarray(altitude_ft, np.float64)
+    step = altitude_step_ft(altitude, step_ft)
+    grid = np.floor(altitude / step + 0.5) * step
+    coded = (grid >= GILLHAM_LOWEST_FT) & (grid <= GILLHAM_HIGHEST_FT)
+    return np.asarray(np.where(coded, grid, np.nan))
 
 
-def quantised_speed_kt(speed_kt: npt.ArrayLike) -> FloatArray:
-    """Return parts of velocities in whole knots, up to 1022, which says 1021.5 or more."""
-    size = np.minimum(np.floor(np.abs(speed_kt) + 0.5), _FASTEST_KT)
-    return np.asarray(np.copysign(size, speed_kt))
+def altitude_step_ft(altitude_ft: FloatArray, step_ft: npt.ArrayLike) -> FloatArray:
+    """Return the step that altitudes are reported in: 100 ft where no code of 25 ft has them."""
+    half = 0.5 * ALTITUDE_STEP_FT
+    fine = (altitude_ft >= LOWEST_FT - half) & (altitude_ft < HIGHEST_FT + half)
+    return np.where(fine, step_ft, np.maximum(step_ft, GILLHAM_STEP_FT))
+
+
+def quantised_velocity_kt(
+    north_kt: npt.ArrayLike, east_kt: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Return both parts of velocities in whole knots, or in steps of 4 where one is that fast.
+
+    From 1021.5 kt on in either part the supersonic subtype is sent, whose largest part is 4088 kt.
+    """
+    step = speed_step_kt(north_kt, east_kt)
+    north, east = (
+        np.asarray(np.copysign(
+            np.minimum(np.floor(np.abs(one) / step + 0.5), _FASTEST_KT) * step, one
+        ))
+        for one in (north_kt, east_kt)
+    )  # fmt: skip
+    return north, east
+
+
+def speed_step_kt(north_kt: npt.ArrayLike, east_kt: npt.ArrayLike) -> FloatArray:
+    """Return the step of both parts of velocities, 1 or 4 kt."""
+    fastest = np.maximum(np.abs(north_kt), np.abs(east_kt))
+    return np.where(fastest >= _FASTEST_KT - 0.5, float(_SUPERSONIC), float(SPEED_STEP_KT))
 
 
 def quantised_climb_ft_min(climb_ft_min: npt.ArrayLike) -> FloatArray:
@@ -87,7 +121,8 @@ def position_messages(
     lat_deg, lon_deg : (n,)
         Degrees on WGS 84.
     altitude_ft : (n,)
-        Pressure altitude, -1000 to 50175 ft, sent in steps of 25 ft.
+        Pressure altitude, -1200 to 126700 ft, sent in steps of 25 ft from -1000 to 50175 ft, and of
+        100 ft beyond, in Gillham's code.
     odd : (n,) of bool
     nic : (n,) of int
         Navigation integrity category, 0 to 11: the type code says it.
@@ -98,13 +133,16 @@ def position_messages(
         With the quantity, its value and what is allowed.
     """
     y, x = encode(lat_deg, lon_deg, odd)
-    address, steps, category, odd, y, x = np.broadcast_arrays(
+    address, feet, category, odd, y, x = np.broadcast_arrays(
         _within("address", address, 0, 0xFFFFFF),
-        _within("altitude_ft", altitude_ft, LOWEST_FT, HIGHEST_FT + 12.5),
+        quantised_altitude_ft(
+            _within("altitude_ft", altitude_ft, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT)
+        ),
         _within("nic", nic, 0, 11).astype(np.int64), np.asarray(odd, bool), y, x,
     )  # fmt: skip
-    steps = np.floor((steps - LOWEST_FT) / ALTITUDE_STEP_FT + 0.5).astype(np.int64)
-    altitude = (steps >> 4) << 5 | 1 << 4 | (steps & 15)
+    steps = ((feet - LOWEST_FT) // ALTITUDE_STEP_FT).astype(np.int64)
+    fine = (feet >= LOWEST_FT) & (feet <= HIGHEST_FT)
+    altitude = np.where(fine, (steps >> 4) << 5 | 1 << 4 | (steps & 15), _gillham(feet))
     return _squitters(address, [
         (_TYPE_CODES[category], 5), (0, 2), (_SUPPLEMENTS[category], 1), (altitude, 12), (0, 1),
         (odd, 1), (y, 17), (x, 17),
@@ -118,20 +156,22 @@ def velocity_messages(
     climb_ft_min: npt.ArrayLike,
     nacv: npt.ArrayLike = 1,
 ) -> Bytes:
-    """Return airborne velocity messages, subtype 1: over ground, up to 1022 kt each; (n, 14) bytes.
+    """Return airborne velocity messages over ground, (n, 14) bytes.
 
-    `nacv` is the navigation accuracy category of velocity, 0 to 4; the vertical rate is barometric.
+    Of subtype 1, or 2, the supersonic one, where a part is 1021.5 kt or more. `nacv` is the
+    navigation accuracy category of velocity, 0 to 4; the vertical rate is barometric.
     """
-    address, north, east, climb, category = np.broadcast_arrays(
+    level = _within("north_kt", north_kt, -1e5, 1e5), _within("east_kt", east_kt, -1e5, 1e5)
+    address, step, north, east, climb, category = np.broadcast_arrays(
         _within("address", address, 0, 0xFFFFFF),
-        quantised_speed_kt(_within("north_kt", north_kt, -1e5, 1e5)),
-        quantised_speed_kt(_within("east_kt", east_kt, -1e5, 1e5)),
+        speed_step_kt(*level), *quantised_velocity_kt(*level),
         quantised_climb_ft_min(_within("climb_ft_min", climb_ft_min, -1e7, 1e7)),
         _within("nacv", nacv, 0, 4),
-    )
+    )  # fmt: skip
     return _squitters(address, [
-        (_VELOCITY_TYPE, 5), (1, 3), (0, 1), (0, 1), (category, 3),
-        (east < 0, 1), (np.abs(east) + 1, 10), (north < 0, 1), (np.abs(north) + 1, 10),
+        (_VELOCITY_TYPE, 5), (np.where(step == 1, 1, 2), 3), (0, 1), (0, 1), (category, 3),
+        (east < 0, 1), (np.abs(east) / step + 1, 10),
+        (north < 0, 1), (np.abs(north) / step + 1, 10),
         (1, 1), (climb < 0, 1), (np.abs(climb) / CLIMB_STEP_FT_MIN + 1, 9), (0, 2), (0, 1), (0, 7),
     ])  # fmt: skip
 
@@ -156,8 +196,9 @@ def position_fields(messages: Bytes) -> PositionFields:
         nic[(code == both[0]) & (supplement == both[1])] = category
     bits = _field(messages, 40, 12)
     steps = (bits >> 5) << 4 | (bits & 15)
+    fine = steps * float(ALTITUDE_STEP_FT) + LOWEST_FT
     return PositionFields(
-        _field(messages, 8, 24), nic, np.asarray(steps * float(ALTITUDE_STEP_FT) + LOWEST_FT),
+        _field(messages, 8, 24), nic, np.where(bits >> 4 & 1, fine, _of_gillham(bits)),
         _field(messages, 53, 1) == 1, _field(messages, 54, 17), _field(messages, 71, 17),
     )  # fmt: skip
 
@@ -165,12 +206,49 @@ def position_fields(messages: Bytes) -> PositionFields:
 def velocity_fields(messages: Bytes) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Return north and east in kt, vertical rate in ft/min and NACv of velocity messages."""
 
+    step = np.where(_field(messages, 37, 3) == 2, float(_SUPERSONIC), 1.0)
+
     def signed(sign: int, first: int, count: int) -> FloatArray:
         size = _field(messages, first, count) - 1.0
         return np.where(_field(messages, sign, 1) == 1, -size, size)
 
     climb = signed(68, 69, 9) * CLIMB_STEP_FT_MIN
-    return signed(56, 57, 10), signed(45, 46, 10), climb, _field(messages, 42, 3)
+    return step * signed(56, 57, 10), step * signed(45, 46, 10), climb, _field(messages, 42, 3)
+
+
+#: Bits of the 12 of an altitude, from the left, C1 A1 C2 A2 C4 A4 B1 Q B2 D2 B4 D4: those of the
+#: steps of 500 ft, D2 D4 A1 A2 A4 B1 B2 B4, and of 100 ft, C1 C2 C4, in Gray's code.
+_OF_500, _OF_100 = (9, 11, 1, 3, 5, 6, 8, 10), (0, 2, 4)
+
+
+def _gillham(altitude_ft: FloatArray) -> IntArray:
+    """Return the 12 bits of altitudes on the grid of 100 ft: ICAO Annex 10, volume IV, appendix."""
+    whole = np.clip(altitude_ft, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT).astype(np.int64) + 1300
+    coarse = (whole - GILLHAM_STEP_FT) // 500
+    rest = (whole - 500 * coarse) // GILLHAM_STEP_FT
+    # Steps of 100 ft run up and down by turns, and 5 is sent as 7.
+    rest = np.where(coarse % 2 == 1, 6 - rest, rest)
+    rest = np.where(rest == 5, 7, rest)
+    bits = np.zeros_like(whole)
+    for number, places in ((coarse, _OF_500), (rest, _OF_100)):
+        gray = number ^ number >> 1
+        for index, place in enumerate(places):
+            bits |= (gray >> len(places) - 1 - index & 1) << 11 - place
+    return bits
+
+
+def _of_gillham(bits: IntArray) -> FloatArray:
+    """Return the altitudes of 12 bits in Gillham's code, ft."""
+    coarse, rest = np.zeros_like(bits), np.zeros_like(bits)
+    for number, places in ((coarse, _OF_500), (rest, _OF_100)):
+        last = np.zeros_like(bits)
+        for place in places:
+            last = last ^ (bits >> 11 - place & 1)
+            number <<= 1
+            number |= last
+    rest = np.where(rest == 7, 5, rest)
+    rest = np.where(coarse % 2 == 1, 6 - rest, rest)
+    return np.asarray(500.0 * coarse + GILLHAM_STEP_FT * rest - 1300.0)
 
 
 def _within(name: str, values: npt.ArrayLike, low: float, high: float) -> FloatArray:

@@ -9,9 +9,16 @@ import numpy as np
 from components.arguments.units import NAUTICAL_MILE_M
 from dsa_des.arrays.types import FloatArray
 
-#: Farthest reception of the fitted law, and its coefficients of 1st to 4th order.
+#: Farthest reception of the fitted law, and its coefficients of 1st to 4th order: amid 50 aircraft
+#: and 50 airports, and how they change with each aircraft more and with each airport more.
 FITTED_RANGE_M = 290.0 * NAUTICAL_MILE_M
 FITTED_COEFFICIENTS = (-1.80, 11.96, -23.27, 20.30)
+BY_AIRCRAFT = (-0.0212, 0.0743, -0.1534, 0.0978)
+BY_AIRPORT = (0.1617, -0.9155, 2.1353, -1.5650)
+_FITTED_AT = 50.0
+#: Aircraft and airports around a receiver, where a scene says nothing: the median of the 23
+#: receivers' aircraft, and the airports amid which their regressions mean most.
+AIRCRAFT_AROUND, AIRPORTS_AROUND = 95.0, 50.0
 #: Ranges up to which the two steps of DO-365's law hold, and probabilities of a report in 1 s:
 #: 95 % within 3 s and within 7 s.
 DO_365_RANGES_M = (10.0 * NAUTICAL_MILE_M, 20.0 * NAUTICAL_MILE_M)
@@ -20,18 +27,25 @@ DO_365_IN_1_S = (1.0 - 0.05 ** (1.0 / 3.0), 1.0 - 0.05 ** (1.0 / 7.0))
 _PER_SECOND = 2.0
 
 
-def fitted(range_m: FloatArray) -> FloatArray:
+def fitted(
+    range_m: FloatArray, aircraft: float = AIRCRAFT_AROUND, airports: float = AIRPORTS_AROUND
+) -> FloatArray:
     """Return the probability that a receiver on the ground receives a message.
 
     ``p = exp(-3 x²) (1 + a₁ x + a₂ x² + a₃ x³ + a₄ x⁴)`` with x the range over that of the farthest
     message received, 290 nmi, cut at 0 and 1, and 0 beyond: the form of Nakagami fading in which
-    F. Rahman published regressions of 23 receivers (adsb_reception_model_opensky, 2025). The
-    four numbers are ours, fitted to the median of those 23 curves at 50 aircraft and 50 airports
-    around: 18 receivers lie within 2.5 % of it (rms over range), the other five within 18 to 41 %,
-    all together 13 %. The regressions themselves err by 6.9 to 22.4 % of receivers not fitted.
+    F. Rahman published regressions of 23 receivers (adsb_reception_model_opensky, 2025), linear in
+    the aircraft and the airports around. The numbers are ours, fitted to the median of those 23
+    curves amid 10 to 250 aircraft and 20 to 80 airports, and exactly to that at 50 of both. There
+    18 receivers lie within 2.5 % of it (rms over range), the other five within 18 to 41 %, all
+    together 13 %. The regressions themselves err by 6.9 to 22.4 % of receivers not fitted.
     """
     x = np.asarray(range_m, np.float64) / FITTED_RANGE_M
-    a, b, c, d = FITTED_COEFFICIENTS
+    more = aircraft - _FITTED_AT, airports - _FITTED_AT
+    a, b, c, d = (
+        at + more[0] * one + more[1] * other
+        for at, one, other in zip(FITTED_COEFFICIENTS, BY_AIRCRAFT, BY_AIRPORT, strict=True)
+    )
     law = np.exp(-3.0 * x**2) * (1.0 + x * (a + x * (b + x * (c + x * d))))
     return np.where(x <= 1.0, np.clip(law, 0.0, 1.0), 0.0)
 
@@ -44,6 +58,14 @@ def do_365(range_m: FloatArray) -> FloatArray:
     near, far = (1.0 - (1.0 - p) ** (1.0 / _PER_SECOND) for p in DO_365_IN_1_S)
     inner, outer = DO_365_RANGES_M
     return np.where(range_m <= inner, near, np.where(range_m <= outer, far, 0.0))
+
+
+def time_to_receive_s(probability: FloatArray) -> FloatArray:
+    """Return in which time one of two messages a second has come 19 times in 20, s; 60 at most."""
+    missed = np.log1p(-np.clip(probability, 1e-9, 1.0 - 1e-9))
+    messages = np.maximum(np.ceil(np.log(0.05) / missed - 1e-6), 1.0)
+    # Messages are up to 0.6 s apart, and a tracker heeds a look a tenth of the time before it.
+    return np.minimum(messages / _PER_SECOND + 0.2, 60.0)
 
 
 def certain(range_m: FloatArray) -> FloatArray:

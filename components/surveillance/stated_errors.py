@@ -22,11 +22,15 @@ from components.messages.columns import TOLD
 from components.messages.detections import LastingError, LastingPart, ToldError
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.broadcast import CLIMB_SCALE_M_S, CORRELATION_TIME_S
+from components.surveillance.extended_squitter import (
+    ALTITUDE_STEP_FT,
+    altitude_step_ft,
+    speed_step_kt,
+)
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
-_ALTITUDE_STEP_M2 = (25.0 * FOOT_M) ** 2 / 12.0
 #: What an aircraft without a velocity may have, a deviation; and how much another one changes its
 #: own on the way from a message to a scan, where no filter says so by its own motion.
 _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
@@ -92,7 +96,21 @@ class StatedByAircraft:
         """Mean square error of each horizontal axis of velocities, (n,)."""
         square = self.equipage.velocity_deviation_m_s[self.craft] ** 2
         speed = np.where(self.errs, square, _LEAST_M2)
-        return speed + KNOT_M_S**2 / 12.0 if self.rounds else speed
+        return speed + self._speed_rounding_m2_s2
+
+    @property
+    def _speed_rounding_m2_s2(self) -> FloatArray:
+        if not self.rounds:
+            return np.zeros(len(self.craft))
+        north, east = (self.said[f"reported_{axis}_m_s"] / KNOT_M_S for axis in ("north", "east"))
+        rounding: FloatArray = (speed_step_kt(north, east) * KNOT_M_S) ** 2 / 12.0
+        return rounding
+
+    @property
+    def _height_rounding_m2(self) -> FloatArray:
+        step = altitude_step_ft(self.said["reported_alt_m"] / FOOT_M, ALTITUDE_STEP_FT)
+        rounding: FloatArray = self.rounds * (step * FOOT_M) ** 2 / 12.0
+        return rounding
 
     @property
     def late_s(self) -> FloatArray:
@@ -121,7 +139,7 @@ class StatedByAircraft:
         high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
         if self.rounds:
             level = level + _COMPACT_M2
-            high = high + _ALTITUDE_STEP_M2
+            high = high + self._height_rounding_m2
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         moving = ~np.isnan(self.said["reported_north_m_s"])
         level = (
@@ -141,11 +159,11 @@ class StatedByAircraft:
         # Where errors are stated, filters know how targets move on the way.
         turned = np.where(tells, 0.0, _MANOEUVRE_M_S2 * (velocity_age_s + latency_s)) ** 2
         # Whole knots last while a flight is steady and are new while it is not: counted as both.
-        new = turned + _LEAST_M2 + (KNOT_M_S**2 / 12.0 if self.rounds else 0.0)
+        new = turned + _LEAST_M2 + self._speed_rounding_m2_s2
         variances = new, new, turned + _LEAST_M2
         velocity = dict(zip(TOLD[:6], (*north_east_down_m_s, *variances), strict=True))
         known = ~np.isnan(north_east_down_m_s[0])
-        rounding_m2 = _ALTITUDE_STEP_M2 if self.rounds else 0.0
+        rounding_m2 = self._height_rounding_m2
         _, _, high = self.position_m2(none)
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * carried_s
@@ -154,7 +172,7 @@ class StatedByAircraft:
         told = unstated_errors(len(age_s)) | {
             "place_deviation": position,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
-            "rounding_deviation": none + math.sqrt(rounding_m2),
+            "rounding_deviation": np.sqrt(rounding_m2),
             "climb_deviation": none + math.sqrt(climb),
             "speed_deviation": np.sqrt(self.speed_m2_s2),
             "latency_deviation": self.late_s,

@@ -5,7 +5,8 @@ Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): t
 odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every
 misdetection by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the
 sensor, and only of sensors that see it: one that never hit it, or that has missed it for a while
-where another one hits, may be too far away, and says nothing.
+where another one hits, may be too far away, and says nothing. Nor does one that has reported the
+track, or was counted as missing it, within the time in which it promises a report.
 """
 
 from typing import Any
@@ -32,6 +33,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Odds are kept within this: a track of an hour must not take an hour to be doubted.
 LARGEST_SCORE = 20.0
+#: Looks come a little before their time where a clock jitters.
+_NEARLY = 0.9
 #: After so many misdetections a sensor is taken not to see a track that another one sees.
 BLIND_AFTER = 5
 
@@ -52,6 +55,8 @@ def judged(
         new = np.where(tentative & ~confirm & hopeless, DELETED, new)
     held = (new == CONFIRMED) | (new == COASTED)
     new = np.where(held, np.where(misses > 0, COASTED, CONFIRMED), new)
+    if rules.p.delete_misses is None:
+        return new
     return np.where(held & (misses >= rules.p.delete_misses), DELETED, new)
 
 
@@ -140,12 +145,16 @@ def initiated(
     within = np.arange(count) - (np.cumsum(counts) - counts)[of]
     tick, mask, ones = scans.tick[looks][of], scans.contributors[detection], np.ones(count)
     whole = ones.astype(np.int64)
+    by = (mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1).astype(bool)
+    range_m = np.where(ranged, measured[2], np.inf)
     born = TrackStore(
         replica=replica[of],
         number=next_number[of] + within,
         tick=tick,
         born_tick=tick,
         updated_tick=tick,
+        life_ticks=rules.life_ticks(by, range_m),
+        updated_m2=0.0 * ones,
         history=whole,
         looks=whole,
         misses=0 * whole,
@@ -156,15 +165,18 @@ def initiated(
         ranged=ranged,
         nis=0.0 * ones,
         freedom=0 * whole,
-        misdetections=np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
+        misdetections=np.where(by, 0, NEVER),
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
+        counted_tick=np.broadcast_to(tick, by.shape),
         **estimate_columns(
             Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
         ),
     )
     status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
-    born = born.with_columns(status=status, **now_seen(rules, born, pose, mask))
+    born = born.with_columns(
+        status=status, updated_m2=position_variance(born), **now_seen(rules, born, pose, mask)
+    )
     return born, next_number + counts
 
 
@@ -176,7 +188,10 @@ def expected_looks(
     pose: SensorPose,
     direction: FloatArray | None,
 ) -> BoolArray:
-    """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
+    """Return which sensors looked where the tracks are that they see, and when they were due.
+
+    (sensors, tracks)
+    """
     scans = batch.scans
     sensors = np.where(scans.tells_misses[batch.look], scans.sensors[batch.look], 0)
     used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
@@ -190,12 +205,15 @@ def expected_looks(
         if not used >> i & 1:
             continue
         looked[i] = (mine >> i & 1).astype(bool) & sees[i]
+        if rules.promises is not None:
+            promised = _NEARLY * rules.promises.ticks(i, range_of(part, pose))
+            looked[i] &= part.tick - part.counted_tick[i] >= promised
         if field is None:
             continue
         if where is None:
             if direction is None:
                 direction = expected(Kind(False), part.state0, pose)
-            away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
+            away = range_of(part, pose)
             where = (*direction, np.where(part.ranged, away, 0.0))
         inside = np.ones(len(part), dtype=bool)
         looked[i] &= field.decide(*where, inside) == EVALUATE
@@ -228,13 +246,29 @@ def managed(
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = judged(rules, part.status, history, count, misses, score)
     updated_tick = np.where(hit, changed.tick, changed.updated_tick)
-    ended = changed.ranged & (position_variance(changed) > rules.p.delete_above_m**2)
-    ended |= changed.tick - updated_tick > rules.delete_after_ticks
+    spread_m2, life_ticks = position_variance(changed), part.life_ticks
+    updated_m2 = np.where(hit, spread_m2, part.updated_m2)
+    if hit.any():
+        sees = misdetections < BLIND_AFTER
+        life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
+    ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
+    ended |= changed.tick - updated_tick > life_ticks
+    counted_tick = part.counted_tick
+    if rules.promises is not None:
+        counts = looked | (by >> np.arange(len(looked))[:, np.newaxis] & 1).astype(bool)
+        counted_tick = np.where(counts, np.maximum(counted_tick, changed.tick), counted_tick)
     return changed.with_columns(
         history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
         updated_tick=updated_tick, status=np.where(ended, DELETED, status),
+        life_ticks=life_ticks, updated_m2=updated_m2, counted_tick=counted_tick,
         **now_seen(rules, changed, pose, by),
     )  # fmt: skip
+
+
+def range_of(part: TrackStore, pose: SensorPose) -> FloatArray:
+    """Return how far away tracks are that have a range, m; infinite for others."""
+    away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
+    return np.where(part.ranged, away, np.inf)
 
 
 def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:

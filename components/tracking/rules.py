@@ -118,6 +118,33 @@ def _of_cells(values: FloatArray, at: IntArray) -> FloatArray:
     return values.reshape(len(values), values[0].size).take(at, axis=1)
 
 
+@dataclass(frozen=True, eq=False)
+class Promises:
+    """In which time sensors report a target again that they see (`SensorOffer.promises`)."""
+
+    steps: tuple[tuple[tuple[float, float], ...], ...]  # Of each sensor
+    ticks_per_s: int
+
+    @classmethod
+    def of(
+        cls, offers: Mapping[str, Any], sensors: tuple[str, ...], ticks_per_s: int
+    ) -> "Promises | None":
+        """Return those of the sensors, or None where all report at every look."""
+        known = (offers.get(name) for name in sensors)
+        steps = tuple(one.promises if isinstance(one, SensorOffer) else () for one in known)
+        return cls(steps, ticks_per_s) if any(steps) else None
+
+    def ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
+        """Return the time of targets at some ranges, (n,); 0 at every look."""
+        if not (steps := self.steps[sensor]):
+            return np.zeros(len(range_m))
+        far, within_s = np.array(steps).T
+        step = np.minimum(np.searchsorted(far, range_m), len(far) - 1)
+        return np.asarray(within_s[step] * self.ticks_per_s)
+
+
+# A track lives without a detection for so long, s, and for so many promises of its sensors.
+_LIVES_S, _LIVES_PROMISES = 6.0, 3.0
 #: Looks that a track's history can hold.
 LONGEST_WINDOW = 62
 # What a sensor that states no reach is taken to see: all around, as far as this.
@@ -201,18 +228,21 @@ class TrackerParameters(Parameters):
         description="Whether range rates, and velocities that aircraft tell, are used where a "
         "sensor states them with a variance; not those that fold, or that are exact.",
     )
-    delete_misses: int = Field(
-        default=10,
-        ge=1,
+    delete_misses: int | None = Field(
+        default=None, ge=1,
         description="Misdetections (expected looks without a detection) in a row that end a "
-        "confirmed track.",
-    )
-    delete_after_s: float = Field(
-        default=6.0, gt=0, description="Time without a detection after which any track ends, s."
-    )
+        "confirmed track. By default no number of them: looks come as often as sensors look, and "
+        "time decides.",
+    )  # fmt: skip
+    delete_after_s: float | None = Field(
+        default=None, gt=0,
+        description="Time without a detection after which any track ends, s. By default 6 s, or "
+        "three times as long as a sensor that sees it promises to report it in, if that is more.",
+    )  # fmt: skip
     delete_above_m: float = Field(
         default=3000.0, gt=0,
-        description="Standard deviation of a position that ends a track with a range, m.",
+        description="How much a position may become less certain since the last detection, as a "
+        "standard deviation, before a track with a range ends, m.",
     )  # fmt: skip
 
     late: Literal["drop", "one_step", "rerun"] = Field(
@@ -269,6 +299,7 @@ class TrackerRules:
     lasting: LastingErrors | None  # what of the sensors' errors is not new at every look
     unstated_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
     carried: CarriedErrors | None  # what of it the filter carries as states
+    promises: Promises | None  # where sensors do not report at every look
 
     @classmethod
     def of(
@@ -294,6 +325,7 @@ class TrackerRules:
             (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
             LastingErrors.of(offers, sensors), np.array(unstated) if any(unstated) else None,
             CarriedErrors.of(offers, sensors) if estimator.errors else None,
+            Promises.of(offers, sensors, ticks_per_s),
         )  # fmt: skip
 
     @property
@@ -306,10 +338,16 @@ class TrackerRules:
         """Probability of the gate outside of which a track has no say."""
         return max(self.p.gate_probability, self.p.start_gate_probability)
 
-    @property
-    def delete_after_ticks(self) -> int:
-        """Time without a detection after which a track is deleted."""
-        return int(self.p.delete_after_s * self.ticks_per_s)
+    def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
+        """Return how long tracks live without a detection; `sees` (sensors, n) is who sees them."""
+        after_s = _LIVES_S if self.p.delete_after_s is None else self.p.delete_after_s
+        life = np.full(len(range_m), int(after_s * self.ticks_per_s))
+        if self.promises is None or self.p.delete_after_s is not None:
+            return life
+        for sensor, mine in enumerate(sees):
+            promised = _LIVES_PROMISES * self.promises.ticks(sensor, range_m)
+            life = np.maximum(life, np.where(mine, promised, 0.0).astype(np.int64))
+        return life
 
     def start_deviation(self, size: int) -> float:
         """Standard deviation, in a new track, of what a model has besides position and velocity."""

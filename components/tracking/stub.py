@@ -1,5 +1,6 @@
 """A stand-in for a tracker: it holds the last fused measurement (``tracking.stub``)."""
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from components.sensor.marks import TRACKER
 from components.tracking.reported_errors import unknown_latency
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
 
+#: How often what has grown too old is looked for, s.
+_ACTS_EVERY_S = Fraction(1, 2)
 _HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "measured_tick")
 
 
@@ -37,10 +39,11 @@ class StubParameters(Parameters):
 class TrackerStub(Component):
     """Holds the last fused measurement of each target, its age, and which sensors gave it.
 
-    Tracks are sent at every instant at which at least one target was updated: that is when the
-    measurement has come. Ages count from when it was made, however long it was on its way. Of a
-    target's measurements the last one to come is held. A false alarm belongs to no target and is
-    left out: a stub does not start tracks.
+    Tracks are sent at every instant at which at least one target was updated, that is when the
+    measurement has come, and within half a second of one being dropped, though nothing comes. Ages
+    count from when it was made, however long it was on its way. Of a target's measurements the last
+    one to come is held. A false alarm belongs to no target and is left out: a stub does not start
+    tracks.
     """
 
     mark = TRACKER
@@ -63,8 +66,14 @@ class TrackerStub(Component):
     def setup(self) -> None:
         """Start with no tracks."""
         types: dict[str, type] = {"replica": int, "target": int, **dict.fromkeys(_HELD, float)}
+        #: A message without rows: who the targets and the sensors are.
+        self._nothing: FusedDetections | None = None
         #: What each run holds of each target.
         self._held = KeyedTable.empty(types)
+
+    def acts_every_s(self) -> Fraction | None:
+        """Return how often what has grown too old is looked for, s."""
+        return None if self.p.drop_after_s is None else _ACTS_EVERY_S
 
     def warnings(self) -> list[str]:
         """Say whose measurements lie behind their targets."""
@@ -72,12 +81,10 @@ class TrackerStub(Component):
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
-        fused = wake["fused"]
+        fused, counts = self._measured(wake)
         if fused is None:
             return None
-        fused = true_entries(fused)
-        counts = fused.offsets[1:] - fused.offsets[:-1]
-        updated = counts.nonzero()[0]
+        updated = (counts if self.p.drop_after_s is None else counts + wake.idle).nonzero()[0]
         if len(updated) == 0:
             return None
         counts = counts.take(updated)
@@ -93,7 +100,7 @@ class TrackerStub(Component):
             last[first_row, column.take(before.target)] = held
         last[rows, column.take(fused.target)] = new
         last = np.maximum.accumulate(last, axis=0)
-        first = new.take(np.cumsum(counts) - counts)
+        first = np.append(new, len(pool["range_m"])).take(np.cumsum(counts) - counts)
         if replica[0] != replica[-1]:
             # What each row holds of replicas before its own is not its own's.
             own_from = first.copy()
@@ -106,18 +113,37 @@ class TrackerStub(Component):
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
         self._held = self._held.after(replica[begins], table, wake.first_run)
-        return self._tracks(fused, wake.instants.part(updated), targets, last, pool, first)
+        return self._tracks(fused, wake, updated, targets, last, pool, first)
+
+    def _measured(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
+        """Return what was measured of targets, and how many entries each row of the wake has."""
+        busy = wake.without_idle()
+        fused = self._nothing if busy is None else busy["fused"]
+        counts = np.zeros(len(wake), dtype=np.int64)
+        if fused is None:
+            return None, counts
+        fused = true_entries(fused)
+        if self.p.drop_after_s is not None:
+            self._nothing = fused.take(slice(0, 0))
+        if busy is not None:
+            counts[~wake.idle] = np.diff(fused.offsets)
+        return fused, counts
 
     def _tracks(
         self,
         fused: FusedDetections,
-        instants: RunTicks,
+        wake: Wake,
+        rows: IntArray,
         targets: IntArray,
         last: IntArray,
         pool: dict[str, Any],
         first: IntArray,
-    ) -> Tracks:
-        """Return the tracks of each row; `first` is the first of its own entries in the pool."""
+    ) -> Tracks | None:
+        """Return the tracks at rows of the wake; `first` is each one's first entry in the pool.
+
+        At an idle row there are some where something has just grown too old.
+        """
+        instants = wake.instants.part(rows)
         row, column = cells_of(last >= 0)
         entry = last.ravel().take(row * len(targets) + column)
         measured = pool["measured_tick"].take(entry)
@@ -127,6 +153,13 @@ class TrackerStub(Component):
         )
         if self.p.drop_after_s is not None:
             kept = age_s < self.p.drop_after_s
+            shown = ~wake.idle[rows]
+            shown[row[~kept & (age_s < self.p.drop_after_s + float(_ACTS_EVERY_S))]] = True
+            if not shown.any():
+                return None
+            kept &= shown[row]
+            instants, first = wake.instants.part(rows[shown]), first[shown]
+            row = (np.cumsum(shown) - 1)[row]
             row, column, entry, measured, age_s = (
                 values[kept] for values in (row, column, entry, measured, age_s)
             )
@@ -169,7 +202,8 @@ def _pool(
     if start == 0:
         return new, before.replica, np.arange(count)
     pool = {name: np.concatenate([before.columns[name], new[name]]) for name in new}
-    if replica[0] == replica[-1]:
+    alike = count == 0 or bool(before.replica[0] == before.replica[-1] == replica[0] == replica[-1])
+    if alike:
         return pool, np.arange(start), np.arange(start, start + count)
     order = np.argsort(np.concatenate([before.replica, replica]), kind="stable")
     index = np.empty(start + count, dtype=np.int64)

@@ -7,7 +7,6 @@ import numpy as np
 
 from components.estimation.batched import is_everything, selected
 from components.estimation.estimator import Estimates, combined
-from components.estimation.frame import SensorPose
 from components.estimation.measurement import direction, range_share
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import COVARIANCE, StateTracks
@@ -28,7 +27,8 @@ class TrackStore(KeyedTable):
     ``misdetections`` (sensors, n) are those of each sensor since its last hit, from `NEVER` where
     it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth, elevation and
     range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that was; NaN and
-    -1 where it did not, or where all its errors are new at every look.
+    -1 where it did not, or where all its errors are new at every look. ``counted_tick`` (sensors,
+    n) is when each sensor last hit it or was last counted as missing it.
     """
 
     #: Columns beside states, with their types.
@@ -38,6 +38,10 @@ class TrackStore(KeyedTable):
         "tick": np.int64,  # that the state speaks of
         "born_tick": np.int64,
         "updated_tick": np.int64,
+        # How long it lives without a detection, and how uncertain its position (m²) was, both as of
+        # the last one.
+        "life_ticks": np.int64,
+        "updated_m2": np.float64,
         "history": np.int64,  # a bit for each expected look, 1 for a hit; the last look lowest
         "looks": np.int64,
         "misses": np.int64,  # misdetections since the last hit
@@ -61,9 +65,10 @@ class TrackStore(KeyedTable):
             "misdetections": np.int64,
             "seen": float,
         }
-        types["seen_tick"] = np.int64
+        types |= {"seen_tick": np.int64, "counted_tick": np.int64}
         shapes: dict[str, tuple[int, ...]] = {"weights": (len(sizes),), "misdetections": (sensors,)}
         shapes |= {"seen": (3, sensors), "seen_tick": (sensors,)}
+        shapes["counted_tick"] = (sensors,)
         for i, size in enumerate(sizes):
             types |= {f"state{i}": float, f"covariance{i}": float}
             shapes |= {f"state{i}": (size,), f"covariance{i}": (size, size)}
@@ -105,13 +110,19 @@ def estimate_columns(estimates: Estimates) -> dict[str, AnyArray]:
 
 
 def records_of(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
-    """Return what is kept of each run beside its tracks, where it starts at its first look."""
+    """Return what is kept of each run beside its tracks, where it starts at its first look.
+
+    ``own`` is where the ownship was at the last one, in the frame with that ``origin``, and
+    ``worked_tick`` is when that came.
+    """
     replicas, first = np.unique(replica, return_index=True)
     return KeyedTable(
         replica=replicas,
         next_number=np.ones(len(replicas), dtype=np.int64),
         tick=np.full(len(replicas), np.iinfo(np.int64).min),
         origin=position_deg_m[:, first],
+        own=np.zeros((3, len(replicas))),
+        worked_tick=np.zeros(len(replicas), dtype=np.int64),
     )
 
 
@@ -124,21 +135,25 @@ _MODELS = {
 }  # fmt: skip
 
 
-def tracks_after(
-    store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
-) -> TrackStore:
-    """Return the tracks of some replicas (ascending) after their looks.
+def tracks_after(store: TrackStore, records: KeyedTable, rows: IntArray) -> TrackStore:
+    """Return the tracks of some replicas as they are to be reported.
 
-    Columns ``look`` and ``row`` are the last look that was worked on, and the row of the wake.
+    ``row`` is the row of the wake of each replica's report, as given; ``own`` and ``origin`` are
+    where the ownship was, as the records of these replicas have it.
     """
-    index = np.minimum(replica.searchsorted(store.replica), len(replica) - 1)
-    mine = replica[index] == store.replica
+    index = np.minimum(records.replica.searchsorted(store.replica), len(rows) - 1)
+    mine = records.replica[index] == store.replica
     index = index[mine]
-    return store.take(mine).with_columns(look=looks[index], row=rows[index])
+    return store.take(mine).with_columns(
+        row=rows[index], own=selected(records.own, index), origin=selected(records.origin, index)
+    )
 
 
 #: Columns that no message shows.
-_UNSHOWN = {"history", "looks", "misses", "misdetections", "seen", "seen_tick"}
+_UNSHOWN = {
+    "history", "looks", "misses", "misdetections", "seen", "seen_tick", "counted_tick",
+    "life_ticks", "updated_m2",
+}  # fmt: skip
 
 
 def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
@@ -160,8 +175,6 @@ def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
 
 def state_tracks(
     reported: Sequence[TrackStore],
-    poses: SensorPose,
-    origin: FloatArray,
     rows: IntArray,
     wake: Wake,
     sensors: tuple[str, ...],
@@ -177,7 +190,7 @@ def state_tracks(
         return empty
     tracks = _by_row(reported)
     state, covariance = combined(tracks.estimates())
-    own, origin = selected(poses.position_m, tracks.look), selected(origin, tracks.look)
+    own, origin = tracks.own, tracks.origin
     away = state[:3] - own
     seen = direction(away, covariance)
     unknown = ~tracks.ranged

@@ -31,6 +31,7 @@ from components.tracking.out_of_sequence import (
 from components.tracking.reported_errors import reported_errors, unknown_latency
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
+from components.tracking.silence import Silence
 from components.tracking.step import late_step, step
 from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_after
 from dsa_des.arrays.keyed_table import KeyedTable, turns
@@ -39,6 +40,9 @@ from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
 
+_NO_ROWS = np.empty(0, dtype=np.int64)
+#: How often tracks are looked through that nothing comes of, s.
+_ACTS_EVERY_S = Fraction(1, 2)
 #: Bits of a mask of sensors.
 MOST_SENSORS = 62
 # What makes a measured quantity exact, by the variance that then is 0.
@@ -53,8 +57,9 @@ class Tracker(Component):
     """Estimates where targets are and how they move, from measured values alone.
 
     Tracks bear numbers of their own. Every look of every sensor is processed at its own instant;
-    tracks are reported at every instant at which something came. States are in a fixed frame:
-    north, east, down where the ownship believed to be at the first look (`StateTracks`).
+    tracks are reported at every instant at which something came, and when one ends because nothing
+    does. States are in a fixed frame: north, east, down where the ownship believed to be at the
+    first look (`StateTracks`).
     """
 
     mark = TRACKER
@@ -107,9 +112,15 @@ class Tracker(Component):
         self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
+        producers = self.context.producers
+        self._late_ticks = int(latest_s(offers, producers) * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
         self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
+
+    def acts_every_s(self) -> Fraction | None:
+        """Return how often tracks are looked through that nothing comes of, s."""
+        return _ACTS_EVERY_S
 
     def _lag_s(self) -> Fraction:
         if self.p.lag_s is not None:
@@ -155,10 +166,35 @@ class Tracker(Component):
         return TrackStore.of_models([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what came, look by look, and report all tracks."""
-        fused = wake["fused"]
-        if fused is None:
+        """Take in what came, look by look, end what fell silent, and report all tracks."""
+        busy = wake.without_idle()
+        reported, worked = list[TrackStore](), _NO_ROWS
+        if busy is not None:
+            reported, worked = self._looked(busy, wake)
+        silence = self._silence(wake, worked)
+        if len(self._store) and len(silence):
+            spans = silence.after(self._records.replica, self._records.worked_tick)
+            self._store, more = silence.ended(self._store, self._records, *spans)
+            reported += more
+        rows = np.unique(np.concatenate([worked, *(part.row[:1] for part in reported)]))
+        if len(rows) == 0:
             return None
+        share, errors = self.p.passive_range_share, self._estimator.errors
+        return state_tracks(reported, rows, wake, self._sensors, share, errors)
+
+    def _silence(self, wake: Wake, worked: IntArray) -> Silence:
+        """Return the rows of a wake beside those that bring work."""
+        rows = np.delete(np.arange(len(wake)), worked)
+        return Silence(wake.instants, rows, self._late_ticks, self.context.ticks_per_s)
+
+    def _looked(self, busy: Wake, wake: Wake) -> tuple[list[TrackStore], IntArray]:
+        """Work on the looks that came; return what is reported, and the rows that brought work.
+
+        `busy` are the rows of the wake at which something came.
+        """
+        fused = busy["fused"]
+        if fused is None:
+            return [], _NO_ROWS
         if self.rules is None or fused.sensors != self._sensors:
             self._sensors = fused.sensors
             self.rules = TrackerRules.of(
@@ -167,10 +203,10 @@ class Tracker(Component):
             )  # fmt: skip
             self._store = self._no_tracks(len(fused.sensors))
         came = scans_of(fused)
-        self._early += int((came.tick > wake.ticks[came.row]).sum())
-        scans, self._ahead = when_made(came, self._ahead, wake)
+        self._early += int((came.tick > busy.ticks[came.row]).sum())
+        scans, self._ahead = when_made(came, self._ahead, busy)
         if len(scans) == 0:
-            return None
+            return [], _NO_ROWS
         records = self._records.continued(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         begin, before, waiting = 0, dict[int, Snapshot](), None
@@ -194,7 +230,18 @@ class Tracker(Component):
         turned = scans.in_frame(origin)
         reported: list[TrackStore] = []
         reports = plan.reports
+        # The row of the wake that each work is of.
+        row = plan.row if busy is wake else np.flatnonzero(~wake.idle)[plan.row]
+        rows = np.unique(row)
+        silence, first, last = self._silence(wake, rows), row, row - 1
+        if len(silence):
+            first, last = silence.before(row, records.worked_tick[plan.of])
+        records.worked_tick[plan.of] = wake.ticks[row]
         for works in turns(plan.of):
+            if len(store) and bool((first[works] <= last[works]).any()):
+                asked = records.take(plan.of[works])
+                store, more = silence.ended(store, asked, first[works], last[works])
+                reported += more
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
                 of_late = plan.of[late]
@@ -218,21 +265,15 @@ class Tracker(Component):
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]
             shown = works[reports[works]]
+            if len(shown):
+                records.own[:, plan.of[shown]] = poses.position_m[:, plan.seen_from[shown]]
             if len(store) and len(shown):
-                replicas = records.replica[plan.of[shown]]
-                reported.append(
-                    tracks_after(store, replicas, plan.seen_from[shown], plan.row[shown])
-                )
+                reported.append(tracks_after(store, records.take(plan.of[shown]), row[shown]))
         self._records = self._records.after(records.replica, records, wake.first_run)
         self._store = store
         if self._remembers:
             self._past = Past.of(scans, kept, before, waiting)
-        if len(plan.look) == 0:
-            return None
-        rows = np.unique(plan.row)
-        share = self.p.passive_range_share
-        errors = self._estimator.errors
-        return state_tracks(reported, poses, origin, rows, wake, self._sensors, share, errors)
+        return reported, rows
 
     def _remember(
         self,

@@ -179,8 +179,8 @@ class CsvParameters(FileParameters):
     altitude: Altitude | None = Field(
         default=None,
         description="Which altitude is read, of a file with both. By default of CSV the column "
-        "that the list of names has first, of ASTERIX the barometric one; aircraft that report "
-        "none of that kind fly at the other, as a note says.",
+        "that the list of names has first, of ASTERIX and receivers' logs the barometric one; "
+        "aircraft that report none of that kind fly at the other, as a note says.",
     )
 
 
@@ -271,7 +271,10 @@ class DaaFile(RecordedTraffic):
 
 
 class CsvFile(RecordedTraffic):
-    """Traffic from a CSV file with time, id, latitude, longitude and altitude (ADS-B-like)."""
+    """Traffic from a CSV file with time, id, latitude, longitude and altitude, or a receiver's log.
+
+    Logs are `aircraft.json` and traces of readsb, SBS-1 lines and OpenSky's states in JSON.
+    """
 
     Parameters = CsvParameters
     lockstep = True

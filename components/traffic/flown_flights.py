@@ -99,10 +99,7 @@ class FlownFlights:
         ahead_s: FloatArray | float,
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return states of ownships and of targets; see `messages.known_flights.AllFlights`."""
-        if self.rates_hz is not None:
-            rate = self.rates_hz[run]
-            time_s = np.floor(time_s * rate) / rate
-        time_s = time_s + ahead_s
+        time_s = self._published_s(run, time_s) + ahead_s
         runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, known))
         own = self.own_at(runs, time_s.reshape(-1), counts).reshaped(time_s.shape)
         target = run * self.width + columns
@@ -113,6 +110,18 @@ class FlownFlights:
             near = self.intervals.holds(target, times.reshape(-1), times.reshape(-1))
             others = replace(others, present=others.present & near)
         return own, others.reshaped(times.shape)
+
+    def own_states(self, run: IntArray, known: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of ownships; see `messages.known_flights.AllFlights`."""
+        return self.own_at(run, self._published_s(run, time_s), known)
+
+    def _published_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return the times of the last publications."""
+        if self.rates_hz is None:
+            return time_s
+        rate = self.rates_hz[run]
+        published: FloatArray = np.floor(time_s * rate) / rate
+        return published
 
 
 class Coming(NamedTuple):

@@ -22,10 +22,13 @@ from components.flights.bounds import (
     traffic_envelope,
 )
 from components.flights.closest_approach import (
+    STEP_S,
     Approaches,
+    RegularTimes,
     SampleTimes,
     censored_approaches,
     closest_approaches,
+    look_between,
     present_together_s,
 )
 from components.flights.culling import SteeredCulling, near_intervals
@@ -354,7 +357,7 @@ class TrafficSource(Component):
         end_s = float(self.context.duration_s)
         names = self.roster.names
         best = self._closest_approaches(end_s)
-        where = censored_approaches(self, best.time_s, end_s)
+        where = censored_approaches(self, self._compared_at(end_s), best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         return {
             "targets": {
@@ -375,12 +378,25 @@ class TrafficSource(Component):
         best = Approaches.none(len(self.targets))
         speeds = self.targets.max_speeds_mps
         present_s = present_together_s(self.own, self.targets.intervals_present_s, end_s)
-        for times in self.sample_times():
+        flights = (lambda _, time_s: self.own.at(time_s)), self.targets.each
+        for times in self._compared_at(end_s):
             closest_approaches(
-                lambda _, time_s: self.own.at(time_s), self.targets.each, times,
+                *flights, times,
                 closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
             )  # fmt: skip
+        if not self._seeks_at_samples:
+            look_between(*flights, np.full(len(speeds), STEP_S), present_s, best)
         return best
+
+    @property
+    def _seeks_at_samples(self) -> bool:
+        """Whether a scene says at which spacing closest approaches are sought."""
+        return hasattr(self.p, "sample_interval_s")
+
+    def _compared_at(self, end_s: float) -> list[SampleTimes]:
+        """Return the times at which distances are compared; a file's may be minutes apart."""
+        grid = [] if self._seeks_at_samples else [RegularTimes(STEP_S, end_s)]
+        return [*self.sample_times(), *grid]
 
 
 def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:

@@ -104,7 +104,12 @@ def run_picture(folder: Path) -> RunPicture:
         tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
     if "bands" in run.tables:
         columns = ("time_s", "low_rad", "high_rad", "low_m", "high_m")
-        tables["bands"] = {name: run.values("bands", name) for name in columns}
+        tables["bands"] = {name: run.numbers("bands", name) for name in columns}
+        # Directions of bands are from the north of where the ownship then was.
+        pose = _pose_at(own_s, own, tables["bands"]["time_s"])
+        turned = np.nan_to_num(plane.turned_rad(pose))
+        for name in ("low_rad", "high_rad"):
+            tables["bands"][name] = tables["bands"][name] + turned
         tables["bands"]["region"] = _codes(run.texts("bands", "region"), BAND_REGIONS)
     return picture
 
@@ -195,7 +200,7 @@ def _own_columns(time_s: FloatArray, own: FloatArray, plane: TangentPlane) -> di
         "east_m": east,
         "north_m": north,
         "alt_m": own[2],
-        "heading_rad": np.unwrap(own[3]) if len(east) else east,
+        "heading_rad": np.unwrap(own[3] + plane.turned_rad(own)) if len(east) else east,
     }
 
 
@@ -224,7 +229,7 @@ def _estimates(
     own: FloatArray,
     plane: TangentPlane,
 ) -> dict[str, AnyArray]:
-    """Return estimated states of tracks that live; their frames are turned like the plane."""
+    """Return estimated states of tracks that live, along the plane's axes."""
     status = np.array(run.texts("state_tracks", "track_status"), dtype=object)
     keep = np.flatnonzero(status != "deleted")
 
@@ -236,6 +241,10 @@ def _estimates(
     ends = offset_positions(run.stacked("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
     from_east, from_north = plane.east_north_m(*_pose_at(own_s, own, time_s)[:3])
+    turned = plane.turned_rad(origin)
+    c, s = np.cos(turned), np.sin(turned)
+    v_north, v_east = column("north_m_s"), column("east_m_s")
+    nn, ne, ee = (column(f"covariance_{k}_m2") for k in ("00", "01", "11"))
     return {
         "time_s": time_s,
         "number": np.asarray(run.values("state_tracks", "track"))[keep],
@@ -247,15 +256,15 @@ def _estimates(
         "tentative": status[keep] == "tentative",
         "from_east_m": from_east,
         "from_north_m": from_north,
-        "bearing_rad": column("azimuth_rad"),
+        "bearing_rad": column("azimuth_rad") + turned,
         "east_m": east,
         "north_m": north,
         "alt_m": ends[2],
-        "east_mps": column("east_m_s"),
-        "north_mps": column("north_m_s"),
-        "variance_north_m2": column("covariance_00_m2"),
-        "covariance_m2": column("covariance_01_m2"),
-        "variance_east_m2": column("covariance_11_m2"),
+        "east_mps": s * v_north + c * v_east,
+        "north_mps": c * v_north - s * v_east,
+        "variance_north_m2": c * c * nn - 2.0 * s * c * ne + s * s * ee,
+        "covariance_m2": s * c * (nn - ee) + (c * c - s * s) * ne,
+        "variance_east_m2": s * s * nn + 2.0 * s * c * ne + c * c * ee,
     }
 
 
@@ -279,7 +288,7 @@ def _seen(
     return {
         "from_east_m": from_east,
         "from_north_m": from_north,
-        "bearing_rad": bearing,
+        "bearing_rad": bearing + plane.turned_rad(pose),
         "elevation_rad": line[1],
         "range_m": line[2],
         "east_m": east_m,
@@ -301,7 +310,8 @@ def encounter_picture(path: Path) -> RunPicture:
     columns = []
     for number, table in enumerate(samples.values()):
         east, north = plane.east_north_m(table["lat"], table["lon"], table["alt"])
-        track = np.unwrap(np.arctan2(table["ve"], table["vn"]))
+        turned = plane.turned_rad((table["lat"], table["lon"]))
+        track = np.unwrap(np.arctan2(table["ve"], table["vn"]) + turned)
         common = {"time_s": table["time"] - first, "east_m": east, "north_m": north}
         if number == 0:
             picture.tables["own"] = {**common, "alt_m": table["alt"], "heading_rad": track}

@@ -35,7 +35,7 @@ PAGE, ROWS = "performance.md", "performance.json"
 _BLOCK = "<!-- {name} -->\n{body}\n<!-- end of {name} -->"
 _TRACKS = ("track_updates", "track_updates_alone")
 _RATES = ("pair_alerts", "bands")
-_ENCOUNTERS = ("replicas", "replicas_all", "flights", "loop", "risk")
+_ENCOUNTERS = ("replicas", "replicas_all", "flights", "loop", "risk", "risk_tracked")
 
 
 def commit() -> str:

@@ -74,7 +74,9 @@ def page() -> str:
         "`position` holds latitude and longitude in one cell, `date` the day of a clock. Columns "
         "of readsb, FlightRadar24 and BaseStation are in ft, kt and ft/min unless the header says "
         "another. Rows without a time or a position are left out, a velocity or attitude with gaps "
-        "is not used; `check` says so.\n"
+        "is not used; `check` says so. The file may be a log as well: `aircraft.json` (one, or "
+        "one in each line) or a trace of readsb, SBS-1 lines, OpenSky's states in JSON. Any may be "
+        "packed (`.gz`).\n"
     )
     parts += ["### DAIDALUS (`traffic.daa_file`, `.daa` and `.xyz`)\n"]
     parts.append(_table((*names, "unit unless the row of units says another"), daa_columns()))

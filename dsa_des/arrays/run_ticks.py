@@ -143,8 +143,14 @@ class RunTicks:
         """Return for each the latest instant so far of its run; ticks need be in no order."""
         if self.one_run:
             return RunTicks(self.run, np.maximum.accumulate(self.tick))
-        firsts = self.first_of_each
-        parts = np.split(self.tick, firsts[1:])
+        # As one number, a tick of a later run is larger than all of the runs before.
+        first, span = int(self.tick.min()), int(self.tick.max()) - int(self.tick.min()) + 1
+        if span * (int(self.run[-1]) - int(self.run[0]) + 1) < 2**63:
+            of_run = (self.run - self.run[0]) * span
+            return RunTicks(
+                self.run, np.maximum.accumulate(self.tick - first + of_run) - of_run + first
+            )
+        parts = np.split(self.tick, self.first_of_each[1:])
         return RunTicks(self.run, np.concatenate([np.maximum.accumulate(p) for p in parts]))
 
     def before(self, run: int, tick: int) -> int:

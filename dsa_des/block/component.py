@@ -150,6 +150,8 @@ class Context:
         The tables that somebody reads of what is recorded; None for all that there are.
     tolerance : mapping
         What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
+    rewinds : bool
+        Whether the engine may take blocks of this run back to an instant before.
     """
 
     streams: Streams
@@ -163,6 +165,7 @@ class Context:
     recorded_runs: int = 1
     recorded_tables: Collection[str] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
+    rewinds: bool = False
 
 
 class Component:
@@ -268,6 +271,14 @@ class Component:
         """Return how long this block's data lasts, for scenes that give no ``duration_s``."""
         return None
 
+    def acts_every_s(self) -> Fraction | None:
+        """Return how often the block is woken though nothing comes, s; None for never.
+
+        For a block that is triggered and must act in time all the same: `Wake.idle` says at which
+        rows nothing came. Asked once, after `setup`; the same of all runs in lock step.
+        """
+        return None
+
     @property
     def width(self) -> int:
         """Number of targets per row this block emits, for sizing windows."""
@@ -304,6 +315,13 @@ class Component:
         One sentence each, which names the parameter; the engine adds the block's name.
         """
         return []
+
+    def undone(self) -> Mapping[str, tuple[int, int]]:
+        """Return how often this block could not do its work: by what lacked, times, of how many.
+
+        Asked after it has run; counts are over every row of every run that it has seen.
+        """
+        return {}
 
     def left_out(self) -> list[str]:
         """Say, after `setup`, what work this block spares itself and why results allow it."""

@@ -37,9 +37,14 @@ class Hook(str, Generic[Built]):
         hook.contract, hook.meaning = contract, meaning
         return hook
 
+    @property
+    def is_called(self) -> bool:
+        """Whether effects build something to call, not a value."""
+        return any("__call__" in vars(base) for base in self.contract.__mro__)
+
     def sentence(self) -> str:
         """Return, for example, ``(cells) -> factor of each cell's SNR``."""
-        if not any("__call__" in vars(base) for base in self.contract.__mro__):
+        if not self.is_called:
             return self.meaning
         _, *names = inspect.signature(self.contract.__call__).parameters
         return f"({', '.join(names)}) -> {self.meaning}"

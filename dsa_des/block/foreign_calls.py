@@ -35,6 +35,20 @@ def raised_in(trace: TracebackType | None) -> str:
     return name
 
 
+#: What a block raises, before anything runs, because of what its table says: nothing it can be
+#: made of, or nothing that can be computed or held in memory.
+REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
+
+
+def why_refused(error: BaseException) -> str:
+    """Return what an exception says, with its kind where its text alone says little."""
+    if isinstance(error, ArithmeticError):
+        return f"its numbers are too large or too small to be computed with ({error})"
+    if isinstance(error, MemoryError):
+        return f"needs more memory than there is ({error})" if str(error) else "needs more memory"
+    return str(error)
+
+
 #: The exit code of what another program's failure ends.
 _A_FOREIGN_PART = 3
 

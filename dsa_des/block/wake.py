@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 
 
@@ -59,6 +59,9 @@ class Wake:
     clock : callable, optional
         Given scan numbers and their runs, returns when the scan before each was
         (`RunClock.before`).
+    idle : ndarray of bool, shape (rows,), optional
+        At which rows nothing came and no scan is: the block is woken as it asked to be
+        (`Component.acts_every_s`). By default none.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class Wake:
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
         first_run: int = 0,
         clock: Callable[[IntArray, IntArray], IntArray] | None = None,
+        idle: BoolArray | None = None,
     ) -> None:
         self.instants = instants
         self.run, self.ticks = instants.run, instants.tick
@@ -81,6 +85,7 @@ class Wake:
         self._demand = demand
         self.first_run = first_run
         self._clock = clock
+        self._idle = idle
 
     def __len__(self) -> int:
         return len(self.ticks)
@@ -89,6 +94,25 @@ class Wake:
     def demand(self) -> Mapping[str, IntArray]:
         """The rows at which each clocked block downstream scans."""
         return {} if self._demand is None else self._demand()
+
+    @property
+    def idle(self) -> BoolArray:
+        """Whether nothing came at each row, which the block asked for all the same."""
+        return np.zeros(len(self), dtype=bool) if self._idle is None else self._idle
+
+    def without_idle(self) -> "Wake | None":
+        """Return the rows that are not idle as a wake of their own; None without any."""
+        if self._idle is None or not self._idle.any():
+            return self
+        rows = np.flatnonzero(~self._idle)
+        if len(rows) == 0:
+            return None
+        held = {port: (message, of[rows]) for port, (message, of) in self._held.items()}
+        instants = self.instants.part(rows)
+        return Wake(
+            instants, self.scans[rows], self.ticks_per_s, held, self._arrived,
+            first_run=self.first_run, clock=self._clock,
+        )  # fmt: skip
 
     @cached_property
     def scans_before(self) -> IntArray:

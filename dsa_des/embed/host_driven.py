@@ -34,6 +34,11 @@ from dsa_des.time.clock import MAX_TICK, ScanCursor, parse_rational
 
 EMBED = "dsa_des.embed"
 
+#: A host may add up so many steps of its own from one call to the next.
+_SUBSTEPS = 16
+#: What a time may be off a scan that is meant: never more than this part of the host's step.
+_NEAR = 100
+
 _FIRST_ROW = np.zeros(1, dtype=np.int64)
 _NO_ROW = np.empty(0, dtype=np.int64)
 _NO_SCAN = np.full(1, -1, dtype=np.int64)
@@ -113,6 +118,7 @@ class _Runner:
         component = self.component = node.component
         self.name, self.cursor = component.name, cursor
         self.before = None if node.clock is None else node.clock.before
+        self.pulse = None if node.pulse is None else ScanCursor(node.pulse.first)
         self.demands = [] if cursor else [demand.block for demand in node.demands]
         into: dict[str, list[_Wire]] = {}
         for wire in wires:
@@ -155,6 +161,7 @@ class HostDriven:
         self.components = self.simulation.components
         #: Tick of the last call, -1 before the first.
         self.last_tick = -1
+        self._calls = 0
         names = set(scene.blocks) if wanted is None else set(wanted)
         self._runners = self._make_runners(names.union(*(ancestors(scene.graph, n) for n in names)))
         self._cursors = {r.name: r.cursor for r in self._runners if r.cursor is not None}
@@ -176,10 +183,16 @@ class HostDriven:
     def tick_of(self, time_s: object) -> int:
         """Return the tick nearest to a time: a number, or a text such as "1/3".
 
-        ValueError if it is not finite and from 0 on, or too large for 64-bit ticks.
+        A number that lies as near to a scan as its own rounding, and that of all calls added up,
+        may have led it means that scan. ValueError if it is not finite and from 0 on, or too large
+        for 64-bit ticks.
         """
-        if isinstance(time_s, float):  # numpy.float64 as well: the usual case, without a Fraction
-            ticks = float(time_s) * self.ticks_per_s
+        ulp_s = 0.0
+        if isinstance(time_s, float | np.floating):
+            ulp_s = float(np.spacing(time_s)) if math.isfinite(time_s) else 0.0
+            time_s = float(time_s)
+        if isinstance(time_s, float):  # the usual case, without a Fraction
+            ticks = time_s * self.ticks_per_s
             if not math.isfinite(time_s):
                 raise ValueError(f"time_s is {time_s}: it must be a finite number of seconds")
             # A float of seconds is meant as the decimal it was written as; above 2^53 ticks the
@@ -198,7 +211,17 @@ class HostDriven:
             raise ValueError(
                 f"time_s is {time_s}: it must lie from 0 to {MAX_TICK / self.ticks_per_s:g}"
             )
-        return tick
+        drift = int((1 + _SUBSTEPS * self._calls) * ulp_s * self.ticks_per_s)
+        return self._meant(tick, drift) if drift else tick
+
+    def _meant(self, tick: int, drift: int) -> int:
+        """Return the instant of the next scan of a block that lies so near, or the tick itself."""
+        if self.last_tick - drift <= tick < self.last_tick:
+            return self.last_tick  # that scan was made already
+        drift = min(drift, (tick - self.last_tick) // _NEAR)
+        scans = [cursor.after(tick - drift - 1) for cursor in self._cursors.values()]
+        scan = min(scans, key=lambda at: abs(at - tick), default=tick)
+        return scan if abs(scan - tick) <= drift else tick
 
     def next_scan_s(self, after_s: object = None) -> float:
         """Return the time of the first scan of any block after a time, s.
@@ -229,6 +252,7 @@ class HostDriven:
             for cursor in self._cursors.values():
                 cursor.seek(tick)
         self.last_tick = tick
+        self._calls += 1
         scans: dict[str, int] = {}
         missed: dict[str, int] = {}
         for name, cursor in self._cursors.items():
@@ -258,11 +282,17 @@ class HostDriven:
                     triggered = triggered or wire.trigger
                     wire.push(tick, new)
             scan = scans.get(runner.name)
+            idle = None
+            if runner.pulse is not None:
+                # It acts at the first call at or after each of its instants.
+                acts = runner.pulse.due(tick) is not None
+                idle = np.array([scan is None and not triggered])
+                triggered = triggered or acts
             if scan is None and not triggered:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before)
+            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before, idle=idle)
             if wake is None:
                 continue
             try:

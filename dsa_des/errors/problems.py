@@ -205,8 +205,8 @@ class SetupFailure(BlockFailure):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a command that it ends."""
-        return 2
+        """Exit code of a command that it ends: 2, or 3 where a foreign part died."""
+        return 3 if super().exit_code == 3 else 2
 
 
 class RunRefused(Exception):

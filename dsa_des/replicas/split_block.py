@@ -115,7 +115,8 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
     def before(scans: IntArray, run: IntArray) -> IntArray:
         return wake.scans_before[rows]
 
-    return Wake(instants, scans, wake.ticks_per_s, held, arrived, demand, clock=before)
+    idle = wake.idle[rows]
+    return Wake(instants, scans, wake.ticks_per_s, held, arrived, demand, clock=before, idle=idle)
 
 
 def _arrivals(new: Arrivals, number: int) -> Arrivals | None:

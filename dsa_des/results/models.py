@@ -10,10 +10,10 @@ from typing import TypeVar
 
 from pydantic import ConfigDict, ValidationError
 
+from dsa_des.files.sealed_files import read_regular
 from dsa_des.record.version import __version__
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import StrictRecord
-from dsa_des.results.sealed_files import read_regular
 
 EXPLAINED, ERRORS = "explained.json", "errors.json"
 _PACKAGES = ("numpy", "scipy", "pyarrow", "simpy", "networkx", "pydantic", "numba")

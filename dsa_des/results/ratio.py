@@ -10,19 +10,17 @@ is that of a ratio of dependent sums (W. G. Cochran, "Sampling techniques", 3rd 
 chapter 6): with residuals w (m - R n) its variance is Σ w² (m - R n)² / (Σ w n)². Taking the
 denominator as known, as the usual tools do, is another number: `PairedRatio.unpaired_error`.
 
-The interval is made for few events of uneven weights (`gamma`). That R is below some R0 means that
-the terms y - R0 x, which are positive for a risk that stays and negative for one that went, sum to
-less than nothing. Either sum is one of independent weighted Poisson counts, whose interval is a
-gamma distribution's with the sum's mean and variance, and on the side that must be certain those of
-one event more (M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates",
-Statistics in Medicine 16, 1997; for a ratio of two, M. P. Fay, Communications in Statistics 28,
-1999). That event is one that nobody has seen. Above the line it weighs what those seen do, drawn in
-proportion to their weights, for that is how one enters the sum; on the other side as much as the
-heaviest nominal one. With equal weights and nothing induced the lower end is Clopper and Pearson's;
-the upper lies a little above theirs, because the event more may be an induced one.
+The interval is made for few events of uneven weights (`gamma`, `gamma_interval.py`).
 
 Runs that hang together (several of one encounter, or copies of it) are one *cluster*: their terms
 are added up first, and clusters are what is independent.
+
+Where all encounters are known without a remedy and only a sample of them is flown with it, each
+drawn with a probability π of its own, a flown one *stands for* 1/π encounters and one that is not
+for none (D. G. Horvitz & D. J. Thompson, "A generalization of sampling without replacement from a
+finite universe", Journal of the American Statistical Association 47, 1952). Then y = w m / π above
+the line and x = w n below it. Whether an encounter is drawn is as independent as all else of it, so
+the terms y - R x of single encounters have the whole error in them, that of the sample included.
 """
 
 import math
@@ -34,6 +32,8 @@ import numpy.typing as npt
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import shown_value
+from dsa_des.results.gamma_interval import gamma_interval, unseen_event
+from dsa_des.results.statistics import scaled
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
@@ -41,6 +41,10 @@ METHODS = ("gamma", "delta", "bootstrap")
 # Counts of drawn encounters that are in memory at once.
 _AT_ONCE = 2_000_000
 _FEW = 20.0
+#: What it costs to know an encounter's flights without a remedy, by what it costs to fly it with
+#: one (`radar_and_camera_risk`: 1.6 of 12 ms, most of it to make the encounter). A fixed number, so
+#: that bytes do not depend on the machine.
+FORESEEN_COST = 0.13
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,11 @@ class PairedRatio:
     few: bool = False
     #: Independent ones: clusters, or encounters where none hang together.
     clusters: int = 0
+    #: Those that were flown, of which the others know only what is nominal.
+    flown: int = 0
+    #: Cost of an interval as wide with every encounter flown, by the cost of this one: variances
+    #: times encounters flown, and `FORESEEN_COST` for each that is known. 1 where all are flown.
+    gain: float = 1.0
 
 
 def paired_ratio(
@@ -84,6 +93,7 @@ def paired_ratio(
     weight: npt.ArrayLike | None = None,
     *,
     cluster: npt.ArrayLike | None = None,
+    stands_for: npt.ArrayLike | None = None,
     confidence: float = 0.95,
     method: str = "gamma",
     resamples: int = 4000,
@@ -100,6 +110,9 @@ def paired_ratio(
         How often each happens in the airspace; not negative. Left out, all weigh the same.
     cluster : (encounters,), optional
         Which of them hang together: rows of the same cluster. Left out, none do.
+    stands_for : (encounters,), optional
+        For how many encounters each flown one stands, 1 by its probability to be flown; 0 for one
+        that was not flown, whose mitigated flag does not count. Left out, all are flown.
     confidence : float
         Of the interval.
     method : {"gamma", "delta", "bootstrap"}
@@ -123,8 +136,10 @@ def paired_ratio(
     ValueError
         Naming the first encounter (counted from 0) whose value cannot be used.
     """
-    n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
-    w = _weights(weight, len(n))
+    n = _flags("nominal", nominal)
+    s = None if stands_for is None else _expansions(stands_for, len(n))
+    m = _flown(mitigated, s)
+    w, _ = scaled(_weights(weight, len(n)))  # all that follows is of weights relative to each other
     if len(m) != len(n):
         raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
     if method not in METHODS:
@@ -133,21 +148,22 @@ def paired_ratio(
         raise ValueError(f"confidence = {confidence}: must lie between 0 and 1")
     if resamples < 2:
         raise ValueError(f"resamples = {resamples}: must be 2 or more")
-    terms = _terms(n, m, w, cluster)
+    ws = w if s is None else w * s
+    terms = _terms(w, w * n, ws * m, cluster)
     total, below = math.fsum(w), math.fsum(w * n)
     squares = math.fsum(terms[0] ** 2)
-    counts = len(n), *_counts(n, m)
+    counts = len(n), *_counts(n, m, s)
     sizes = total * total / squares if squares > 0.0 else 0.0
     if below == 0.0:
         nan = math.nan
         why = _why_none(n, total)
-        share = (0.0, math.fsum(w * m) / total) if total > 0.0 else (nan, nan)
+        share = (0.0, math.fsum(ws * m) / total) if total > 0.0 else (nan, nan)
         return PairedRatio(
             nan, nan, nan, nan, (nan, nan), nan, sizes, *counts, *share, method, why,
             clusters=len(terms[0]),
         )  # fmt: skip
-    left, added = math.fsum(w * np.minimum(m, n)), math.fsum(w * np.maximum(m - n, 0.0))
-    above = math.fsum(w * m)
+    left, added = math.fsum(ws * np.minimum(m, n)), math.fsum(ws * np.maximum(m - n, 0.0))
+    above = math.fsum(ws * m)
     ratio = above / below
     each, x, y = terms
     residual = y - ratio * x
@@ -158,7 +174,7 @@ def paired_ratio(
     # Rounding alone leaves residuals where m is R n throughout.
     certain = error <= 1e-12 * max(ratio, 1.0)
     if method == "gamma":
-        interval = _by_gammas(x, y, ratio, tail)
+        interval = gamma_interval(x, y, ratio, tail)
     elif certain:
         # The same number of events, of which none went otherwise, has this upper limit.
         possible = -math.log(tail) * math.fsum(x**2) / below**2
@@ -173,11 +189,25 @@ def paired_ratio(
 
         reach = math.exp(float(ndtri(1.0 - tail)) * error / ratio)
         interval = ratio / reach, ratio * reach
-    few = method != "gamma" and math.fsum(y**2) < _FEW * _unseen(np.maximum(x, y))[1]
+    few = method != "gamma" and math.fsum(y**2) < _FEW * unseen_event(np.maximum(x, y))[1]
     return PairedRatio(
         ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
-        below / total, above / total, method, "", few, len(each),
+        below / total, above / total, method, "", few, len(each), *_gain(n, m, w, s, ratio),
     )  # fmt: skip
+
+
+def _gain(
+    nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, stands_for: FloatArray | None,
+    ratio: float,
+) -> tuple[int, float]:  # fmt: skip
+    """Return how many were flown, and by how much that is cheaper than all at the same width."""
+    if stands_for is None:
+        return len(nominal), 1.0
+    flown = int(np.count_nonzero(stands_for))
+    plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
+    sampled = math.fsum((weight * (stands_for * mitigated - ratio * nominal)) ** 2)
+    cost = flown / len(nominal) + FORESEEN_COST
+    return flown, plain / (sampled * cost) if sampled > 0.0 else math.nan
 
 
 def ratios_by_class(
@@ -214,15 +244,21 @@ def ratios_by_class(
 
 
 def influences(
-    nominal: npt.ArrayLike, mitigated: npt.ArrayLike, weight: npt.ArrayLike | None, ratio: float
+    nominal: npt.ArrayLike,
+    mitigated: npt.ArrayLike,
+    weight: npt.ArrayLike | None,
+    ratio: float,
+    stands_for: npt.ArrayLike | None = None,
 ) -> FloatArray:
     """Return what each encounter adds to the error of a ratio: their squares sum to its variance.
 
     Values are those of `paired_ratio`.
     """
-    n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
-    w = _weights(weight, len(n))
-    result: FloatArray = w * (m - ratio * n) / math.fsum(w * n)
+    n = _flags("nominal", nominal)
+    s = None if stands_for is None else _expansions(stands_for, len(n))
+    m, (w, _) = _flown(mitigated, s), scaled(_weights(weight, len(n)))
+    expanded = m if s is None else s * m
+    result: FloatArray = w * (expanded - ratio * n) / math.fsum(w * n)
     return result
 
 
@@ -232,91 +268,15 @@ def unseen_variance(nominal: FloatArray) -> float:
     `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
     proportion to their weights.
     """
-    return _unseen(nominal)[1] / math.fsum(nominal) ** 2
-
-
-def _unseen(terms: FloatArray) -> tuple[float, float]:
-    """Return what one event more adds to a weighted sum, on average, and to its variance."""
-    once = math.fsum(terms)
-    return math.fsum(terms**2) / once, math.fsum(terms**3) / once
-
-
-def _by_gammas(
-    below: FloatArray, above: FloatArray, ratio: float, tail: float
-) -> tuple[float, float]:
-    """Return the ends of an interval of which either errs with a probability of at most `tail`.
-
-    `below` and `above` are the clusters' terms below and above the line.
-    """
-    # In order of above/below, the terms y - R x that are negative are the first ones, for any R.
-    some = (below > 0.0) | (above > 0.0)
-    x, y = below[some], above[some]
-    with np.errstate(divide="ignore"):
-        each = y / x
-    order = np.argsort(each, kind="stable")
-    each, x, y = each[order], x[order], y[order]
-    moments = np.stack([x, y, x * x, x * y, y * y])
-    first = np.concatenate([np.zeros((5, 1)), np.cumsum(moments, axis=1)], axis=1)
-    last = np.concatenate([np.cumsum(moments[:, ::-1], axis=1)[:, ::-1], np.zeros((5, 1))], axis=1)
-
-    def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the terms that went and those that stay: their sums and their squares'."""
-        index = int(np.searchsorted(each, limit))
-        went, stay = (part[:, index].tolist() for part in (first, last))
-        return (
-            (limit * went[0] - went[1], limit**2 * went[2] - 2.0 * limit * went[3] + went[4]),
-            (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
-        )
-
-    more, heaviest = _unseen(np.maximum(x, y)), float(x.max())
-
-    def below_it(limit: float) -> float:
-        """Return how sure it is that the ratio is below a limit."""
-        went, stay = sums(limit)
-        return _surely_more(went, (stay[0] + more[0], stay[1] + more[1]))
-
-    def above_it(limit: float) -> float:
-        went, stay = sums(limit)
-        had = limit * heaviest
-        return _surely_more(stay, (went[0] + had, went[1] + had * had))
-
-    sure = 1.0 - tail
-    low = 0.0 if ratio == 0.0 else _where(above_it, sure, ratio, 0.5)
-    return low, _where(below_it, sure, ratio or 1.0 / len(x), 2.0)
-
-
-def _surely_more(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return the probability that a gamma variable is larger than another: means and variances."""
-    from scipy.special import betainc
-
-    if not (one[0] > 0.0 and one[1] > 0.0):
-        return 0.0
-    scales = one[1] / one[0], other[1] / other[0]
-    shapes = one[0] / scales[0], other[0] / scales[1]
-    return float(betainc(shapes[1], shapes[0], scales[0] / (scales[0] + scales[1])))
-
-
-def _where(certainty: Callable[[float], float], sure: float, start: float, factor: float) -> float:
-    """Return the ratio from which on a limit further out is sure, by halving its logarithm."""
-    inner = outer = start
-    while certainty(outer) < sure:
-        if not 1e-300 < outer < 1e300:
-            return 0.0 if factor < 1.0 else math.inf
-        inner, outer = outer, outer * factor
-    for _ in range(60):
-        middle = math.sqrt(inner * outer)
-        if certainty(middle) < sure:
-            inner = middle
-        else:
-            outer = middle
-    return outer
+    part, _ = scaled(nominal)
+    return unseen_event(part)[1] / math.fsum(part) ** 2
 
 
 def _terms(
-    nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, cluster: npt.ArrayLike | None
+    weight: FloatArray, below: FloatArray, above: FloatArray, cluster: npt.ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the weight, and the terms below and above the line, of every independent cluster."""
-    each = weight, weight * nominal, weight * mitigated
+    each = weight, below, above
     if cluster is None:
         return each
     names = np.asarray(cluster)
@@ -345,9 +305,29 @@ def _weights(weight: npt.ArrayLike | None, count: int) -> FloatArray:
     return weights
 
 
-def _counts(nominal: FloatArray, mitigated: FloatArray) -> tuple[int, int, int]:
+def _expansions(stands_for: npt.ArrayLike, count: int) -> FloatArray:
+    result = np.asarray(stands_for, dtype=np.float64)
+    if result.shape != (count,):
+        raise ValueError(f"stands_for has the shape {result.shape}: {count} encounters have one")
+    bad = ~(np.isfinite(result) & ((result == 0.0) | (result >= 1.0)))
+    _refuse("stands_for", result, bad, "must be 0, or 1 or more")
+    return result
+
+
+def _flown(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
+    """Return the mitigated flags, 0 of those that were not flown."""
+    if stands_for is None:
+        return _flags("mitigated", mitigated)
+    return _flags("mitigated", np.where(stands_for > 0.0, mitigated, 0.0))
+
+
+def _counts(
+    nominal: FloatArray, mitigated: FloatArray, stands_for: FloatArray | None
+) -> tuple[int, int, int]:
     """Count encounters with the event nominally, mitigated, and mitigated more than nominally."""
     induced = mitigated > nominal
+    if stands_for is not None:
+        induced &= stands_for > 0.0
     return (
         int(np.count_nonzero(nominal)),
         int(np.count_nonzero(mitigated)),

@@ -35,6 +35,8 @@ NUMBER, FRACTION, EVENT, SHARE = "number", "fraction", "event", "share"
 RATIO, CLASS, KEY = "ratio", "class", "key"
 #: What is put behind the name of a share for the column of its trials.
 TRIALS = ".trials"
+#: The column that says for how many runs each one stands, where only a sample is flown.
+STANDS_FOR = "stands_for"
 
 
 class Told(NamedTuple):
@@ -255,6 +257,8 @@ class StudyRecord(StudyHead):
     figures: list[FigureRecord]
     requirements: list[Requirement] = []
     compare_weight: str | None = None
+    #: The numbers by which runs are told apart before they are flown; none where all are flown.
+    geometry: list[str] = []
     #: The command line that runs the study again; empty in folders of versions that kept none.
     repeat: str = ""
 
@@ -296,6 +300,7 @@ class StudyRecord(StudyHead):
             [(axis.column, axis.numeric) for axis in self.axes],
             [(draw.column, draw.numeric) for draw in self.draws],
             self.results,
+            self.geometry,
         )
 
     @property
@@ -324,11 +329,18 @@ def columns_of(
     axes: Sequence[tuple[str, bool]],
     draws: Sequence[tuple[str, bool]],
     results: Sequence[Result],
+    geometry: Sequence[str] = (),
 ) -> "pa.Schema":
-    """Return the columns of a part; axes and draws are (column, whether it holds numbers)."""
+    """Return the columns of a part; axes and draws are (column, whether it holds numbers).
+
+    Where only a sample of the runs is flown, each says for how many it stands, and by which
+    geometry it was chosen.
+    """
     import pyarrow as pa
 
     fields = [("cell", pa.int64()), ("replica", pa.int64()), ("seed", pa.int64())]
+    fields += [(STANDS_FOR, pa.float64())] * bool(geometry)
+    fields += [(geometry_column(name), pa.float64()) for name in geometry]
     fields += [
         (name, pa.float64() if numeric else pa.string()) for name, numeric in [*axes, *draws]
     ]
@@ -344,6 +356,11 @@ def columns_of(
             fields.append((result.cut_off, pa.string()))
     fields += [("status", pa.string()), ("error", pa.string()), ("command", pa.string())]
     return pa.schema(fields)
+
+
+def geometry_column(name: str) -> str:
+    """Return the column of a number by which runs are told apart before they are flown."""
+    return f"geometry.{name}"
 
 
 def draw_column(key: str) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from dsa_des.files.sealed_files import read_regular
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
 from dsa_des.results.models import (
@@ -26,7 +27,6 @@ from dsa_des.results.models import (
 )
 from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, rounded
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO, run_command
-from dsa_des.results.sealed_files import read_regular
 from dsa_des.results.summary import Answer, Line, one_sided
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.text.safe_text import printable, shortened
@@ -124,6 +124,7 @@ def page_environment() -> Environment:
     )
     environment.filters.update(
         verbatim=_verbatim,
+        filled=_filled,
         plain=Markup,
         axis=axis_label,
         models=_models,
@@ -138,6 +139,13 @@ def _text(value: Any) -> Markup:
     if isinstance(value, Markup):
         return value
     return Markup(escape(shortened(printable(str(value)), _LONGEST)))
+
+
+def _filled(table: tuple[Iterable[Any], Iterable[Any]]) -> tuple[list[Any], list[list[Any]]]:
+    """Return heads and rows of a table without the columns in which nothing stands."""
+    heads, rows = list(table[0]), [list(row) for row in table[1]]
+    kept = [k for k in range(len(heads)) if any(str(row[k]) for row in rows)]
+    return [heads[k] for k in kept], [[row[k] for k in kept] for row in rows]
 
 
 def _verbatim(lines: Iterable[str]) -> Markup:

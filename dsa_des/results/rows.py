@@ -16,7 +16,16 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
-from dsa_des.results.record import CRASHED, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
+from dsa_des.results.record import (
+    CRASHED,
+    EVENT,
+    FRACTION,
+    RATIO,
+    SHARE,
+    STANDS_FOR,
+    TRIALS,
+    Result,
+)
 from dsa_des.results.statistics import (
     Estimate,
     EstimatedDifference,
@@ -136,6 +145,10 @@ def _joined(pieces: list[Any]) -> AnyArray:
     return joined
 
 
+#: Below and above the line, weight, cluster, and for how many each stands.
+_Paired = tuple[FloatArray, FloatArray, FloatArray, AnyArray, FloatArray | None]
+
+
 class Rows:
     """The rows of a study as columns, and how they fall into places and units."""
 
@@ -159,6 +172,18 @@ class Rows:
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN."""
         return self.stored.column(name)
+
+    @cached_property
+    def stands_for(self) -> FloatArray | None:
+        """For how many runs each one stands, 0 for one not flown; None where all are flown."""
+        return self.column(STANDS_FOR) if STANDS_FOR in self.stored.names else None
+
+    def is_sampled(self, name: str) -> bool:
+        """Return whether only runs that were flown have a result."""
+        if self.stands_for is None:
+            return False
+        values = self.column(name)[self.stands_for == 0.0]
+        return values.dtype != object and bool(np.isnan(values.astype(float)).any())
 
     def row(self, number: int) -> dict[str, Any]:
         """Return a row as column → value."""
@@ -211,6 +236,8 @@ class Rows:
         if result.kind == RATIO:
             ratio, missing = self.ratio(result, rows, confidence, method)
             return estimate_of(ratio), missing
+        if self.is_sampled(result.name):
+            return self._sampled_share(result, rows, confidence)
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
@@ -229,6 +256,21 @@ class Rows:
         tried = np.bincount(index, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
+    def _sampled_share(
+        self, result: Result, rows: IntArray, confidence: float
+    ) -> tuple[Estimate, int]:
+        """Return how often an event happens of which only some runs, drawn for it, know."""
+        assert self.stands_for is not None
+        values, stands_for = self.column(result.name)[rows].astype(float), self.stands_for[rows]
+        known = ~np.isnan(values) | (stands_for == 0.0)
+        ratio = paired_ratio(
+            np.ones(int(known.sum())), values[known], cluster=self.units[rows][known],
+            stands_for=stands_for[known], confidence=confidence,
+        )  # fmt: skip
+        low, high = ratio.interval
+        ratio = replace(ratio, interval=(low, min(high, 1.0)))
+        return estimate_of(ratio), int((~known).sum())
+
     def ratio(
         self, result: Result, rows: IntArray, confidence: float, method: str
     ) -> tuple[PairedRatio, int]:
@@ -237,21 +279,19 @@ class Rows:
         Runs of the same encounter, and of the same unit, hang together.
         """
         matches, used, missing = self._paired(result, rows)
-        below, above, weight, cluster = matches
+        below, above, weight, cluster, stands_for = matches
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
-            below, above, weight, cluster=together, confidence=confidence, method=method,
-            resamples=_RESAMPLES,
+            below, above, weight, cluster=together, stands_for=stands_for,
+            confidence=confidence, method=method, resamples=_RESAMPLES,
         )  # fmt: skip
         if result.ratio is not None and result.ratio.share:
             low, high = ratio.interval
             ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing
 
-    def _paired(
-        self, result: Result, rows: IntArray
-    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray, AnyArray], IntArray, int]:
+    def _paired(self, result: Result, rows: IntArray) -> tuple["_Paired", IntArray, int]:
         """Return the columns of a ratio over the rows that have all of them, and those rows."""
         of = result.ratio
         assert of is not None
@@ -263,13 +303,16 @@ class Rows:
             weight = self.column(of.weight)[rows].astype(float)
         units = self.units[rows]
         cluster = units if of.cluster is None else self.column(of.cluster)[rows]
-        known = ~(np.isnan(below) | np.isnan(above) | np.isnan(weight))
+        stands_for = None if self.stands_for is None else self.stands_for[rows]
+        flown = np.ones(len(rows), dtype=bool) if stands_for is None else stands_for > 0.0
+        known = ~(np.isnan(below) | (flown & np.isnan(above)) | np.isnan(weight))
         if of.cluster is not None:
             known &= ~np.isnan(cluster.astype(float))
             if self.over:  # one encounter's number means another in another file
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
-        columns = below[known], above[known], weight[known], cluster[known]
+        some = None if stands_for is None else stands_for[known]
+        columns = below[known], above[known], weight[known], cluster[known], some
         return columns, rows[known], int((~known).sum())
 
     def ratio_difference(
@@ -289,12 +332,14 @@ class Rows:
         parts, ratios, cluster = [], [], sides[0][0][3][here]
         for (columns, _, _), common in zip(sides, (here, there), strict=True):
             below, above, weight = (column[common] for column in columns[:3])
+            some = None if columns[4] is None else columns[4][common]
             ratio = paired_ratio(
-                below, above, weight, cluster=cluster, confidence=confidence, method="delta"
-            )
+                below, above, weight, cluster=cluster, stands_for=some, confidence=confidence,
+                method="delta",
+            )  # fmt: skip
             ratios.append(ratio)
             if not ratio.reason:
-                parts.append(influences(below, above, weight, ratio.ratio))
+                parts.append(influences(below, above, weight, ratio.ratio, some))
         alone = [len(side[1]) - len(here) for side in sides]
         if len(parts) < 2:
             none = Estimate(np.nan, np.nan, np.nan, 0, True)

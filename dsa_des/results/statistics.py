@@ -136,13 +136,14 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     count = len(values)
     if count == 0:
         return Estimate(math.nan, math.nan, math.nan, 0, True)
-    value = math.fsum(values) / count
+    part, exponent = scaled(values)
+    value = math.ldexp(math.fsum(part) / count, exponent)
     if count == 1:
         return Estimate(value, math.nan, math.nan, 1, True)
     error = standard_error(values)
     below = above = t_quantile(count - 1, confidence)
     if method == "bootstrap":
-        below, above = _bootstrap(values, confidence) or (below, above)
+        below, above = _bootstrap(part, confidence) or (below, above)
     low, high = value - below * error, value + above * error
     return Estimate(value, low, high, count, count < FEW)
 
@@ -201,8 +202,21 @@ def normal_error(estimate: Estimate, confidence: float) -> float:
 def standard_error(values: FloatArray) -> float:
     """Return the standard error of a mean."""
     count = len(values)
-    middle = math.fsum(values) / count
-    return math.sqrt(math.fsum((values - middle) ** 2) / (count - 1) / count)
+    part, exponent = scaled(values)
+    middle = math.fsum(part) / count
+    error = math.sqrt(math.fsum((part - middle) ** 2) / (count - 1) / count)
+    return math.ldexp(error, exponent)
+
+
+def scaled(values: FloatArray) -> tuple[FloatArray, int]:
+    """Return values divided by a power of two, the largest then below 1, and its exponent.
+
+    The division is exact, so what is computed of them has the same digits; but sums and squares of
+    values near the largest number there is are numbers then.
+    """
+    largest = float(np.abs(values).max(initial=0.0))
+    exponent = math.frexp(largest)[1] if math.isfinite(largest) else 0
+    return np.ldexp(values, -exponent), exponent
 
 
 def t_quantile(degrees: float, confidence: float) -> float:
@@ -331,12 +345,13 @@ def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimat
     count = len(first)
     if count < 2:
         return Estimate(math.nan, math.nan, math.nan, count, True)
-    value = math.fsum(changes) / count
-    one, other = standard_error(first) ** 2, standard_error(first + changes) ** 2
+    value = mean(changes, confidence).value
+    errors, exponent = scaled(np.array([standard_error(first), standard_error(first + changes)]))
+    one, other = (errors**2).tolist()
     if one + other == 0.0:
         return Estimate(value, value, value, count, count < FEW)
     degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
-    half = t_quantile(degrees, confidence) * math.sqrt(one + other)
+    half = t_quantile(degrees, confidence) * math.ldexp(math.sqrt(one + other), exponent)
     return Estimate(value, value - half, value + half, count, count < FEW)
 
 

@@ -97,6 +97,8 @@ def compare_axis(
         for result in results:
             if not result.summed_up or result.quantile is not None:
                 continue  # paired differences are of means
+            if result.kind != RATIO and rows.is_sampled(result.name):
+                continue  # other runs were flown here than there
             if result.kind == RATIO:
                 change = rows.ratio_difference(result, base, chosen, confidence)
             else:

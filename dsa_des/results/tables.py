@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dsa_des.files.sealed_files import parquet
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, short
 from dsa_des.results.record import FRACTION, NUMBER, StudyRecord
 from dsa_des.results.rows import Rows, StoredRows
-from dsa_des.results.sealed_files import parquet
 from dsa_des.results.summary import (
     Answer,
     Compared,
@@ -109,7 +109,7 @@ class Tables:
         names = (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
-            "mitigated_probability", "few", "reason",
+            "mitigated_probability", "few", "reason", "flown", "gain",
         )  # fmt: skip
         columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.foreign_calls import error_text, must_pass
+from dsa_des.block.foreign_calls import REFUSALS, error_text, must_pass, why_refused
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
@@ -14,10 +14,6 @@ from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK
-
-# What a block raises, before anything runs, because of what its table says: nothing it can be
-# made of, or nothing that can be computed or held in memory.
-_REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 
 
 class Assembly:
@@ -33,9 +29,11 @@ class Assembly:
         recorder: Recorder | None,
         simulate_everything: bool,
         wrap_effect: WrapEffect | None,
+        rewinds: bool,
     ) -> None:
         self._scene = scene
         self._everything = simulate_everything
+        self._rewinds = rewinds
         self._place = telling_order(scene.graph, scene.classes)
         self.components = self._build(timeline, recorder)
         self.duration_s = self._duration()
@@ -56,6 +54,7 @@ class Assembly:
                 simulate_everything=self._everything,
                 recorded_runs=runs,
                 recorded_tables=tables,
+                rewinds=self._rewinds,
             )
             with self._preparing(name, problems):
                 components[name] = block.cls(name, timeline.parameters(name), context)
@@ -129,8 +128,8 @@ class Assembly:
             yield
         except (SceneError, BlockFailure, RunRefused):
             raise
-        except _REFUSALS as error:
-            problems.append(self._scene.refused(name, reason_of(error)))
+        except REFUSALS as error:
+            problems.append(self._scene.refused(name, why_refused(error)))
         except BaseException as error:
             if must_pass(error):
                 raise
@@ -150,12 +149,3 @@ class Assembly:
 def _raise_any(problems: list[Problem]) -> None:
     if problems:
         raise SceneError(problems)
-
-
-def reason_of(error: BaseException) -> str:
-    """Return what an exception says, with its kind where its text alone says little."""
-    if isinstance(error, ArithmeticError):
-        return f"its numbers are too large or too small to be computed with ({error})"
-    if isinstance(error, MemoryError):
-        return f"needs more memory than there is ({error})" if str(error) else "needs more memory"
-    return str(error)

@@ -310,11 +310,12 @@ class Inputs:
         demand: Callable[[RunTicks], Mapping[str, IntArray]] | None = None,
         *,
         clock: Callable[[IntArray, IntArray], IntArray] | None = None,
+        idle: BoolArray | None = None,
         complete: bool = True,
     ) -> Wake | None:
         """Return what the block sees at some instants, or None if it cannot run at any.
 
-        `scans`, `clock` are as for `Wake`; `end` is the first tick that is no longer seen;
+        `scans`, `clock`, `idle` are as for `Wake`; `end` is the first tick that is no longer seen;
         `demand`, given the instants of the wake, returns what `Wake.demand` is. Where `complete`,
         instants are left out at which a required input holds nothing yet.
         """
@@ -332,6 +333,7 @@ class Inputs:
             if len(there) == 0:
                 return None
             asked, scans = asked.take(there), scans[there]
+            idle = None if idle is None else idle[there]
             held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
         arrived: dict[str, list[Arrivals]] = {}
         for port, wire in self._queued:
@@ -340,7 +342,7 @@ class Inputs:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         rows = None if demand is None else partial(demand, asked)
         first, per_s = self._runs.going.start, self._ticks_per_s
-        return Wake(asked, scans, per_s, held, arrived, rows, first, clock)
+        return Wake(asked, scans, per_s, held, arrived, rows, first, clock, idle)
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

@@ -14,6 +14,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.errors import shown_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import nanosecond_of
@@ -74,7 +75,7 @@ def build_effects(
 ) -> list[Planned]:
     """Decide which of a block's effects are built, as `plan`, and give them to its context."""
     planned = plan(block, tolerance, everything=everything)
-    built = {item: item.effect.build(block) for item in planned if item.built}
+    built = {item: _built(block, item.effect) for item in planned if item.built}
     if not everything:
         block.context.tolerance = unspent(planned, tolerance)
     block.context.effects = {
@@ -82,6 +83,19 @@ def build_effects(
         for item, effect in built.items()
     }
     return planned
+
+
+def _built(block: Component, effect: Effect[Any]) -> Any:
+    """Return what an effect builds; ValueError where the block could not use it."""
+    value = effect.build(block)
+    for hook in block.all_hooks():
+        if hook == effect.acts_on and hook.is_called != callable(value):
+            what = "something to call" if hook.is_called else "a value"
+            raise ValueError(
+                f"effect {effect.name!r} of {type(block).path()} builds {shown_value(value)}: "
+                f"{hook} needs {what}, {hook.sentence()}"
+            )
+    return value
 
 
 def unspent(planned: Sequence[Planned], tolerance: Mapping[str, float]) -> dict[str, float]:

@@ -21,7 +21,7 @@ from dsa_des.arrays.run_ticks import (
     says_no_runs,
     union,
 )
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message
@@ -80,6 +80,8 @@ class Node:
     windowed: bool
     priority: Callable[[], float]
     clock: RunClock | None = None
+    #: When it runs though nothing comes.
+    pulse: RunClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
     processor: Processor | None = None
@@ -96,6 +98,8 @@ class Node:
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
+        #: In which runs it has run.
+        self._ran: set[int] = set()
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
@@ -139,6 +143,16 @@ class Node:
                 raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
+
+    def undone(self) -> Mapping[str, tuple[int, int]]:
+        """Return in how many runs it never ran, where there are any."""
+        runs = self.simulation.runs.count
+        idle = 0 if self.component.process is not None else runs - len(self._ran)
+        if not idle:
+            return {}
+        ports = [name for name in self.channels if self.component.inputs[name].held]
+        why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
+        return {f"it never ran{why}": (idle, runs)}
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -187,6 +201,8 @@ class Node:
         elif self.on_demand:
             for tick in self._demanded(start, end).tick.tolist():
                 self.wake_at(tick)
+        for tick in self._pulses(start, end).tick.tolist():
+            self.wake_at(tick)
 
     def none_before(self, start: int, ahead: int) -> int:
         """Return a tick, at `start` or later, before which a block in windows does not run.
@@ -197,6 +213,8 @@ class Node:
         clocks = [] if self.clock is None else [(self.clock, 0)]
         if self.on_demand:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
+        if self.pulse is not None:
+            clocks.append((self.pulse, 0))
         ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.none_before() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
@@ -208,16 +226,24 @@ class Node:
     def _demanded(self, start: int, end: int) -> RunTicks:
         return _all_of([demand.between(start, end) for demand in self.demands])
 
+    def _pulses(self, start: int, end: int) -> RunTicks:
+        return RunTicks.none() if self.pulse is None else self.pulse.between(start, end)[1]
+
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
         runs = self.simulation.runs
         if runs.early and runs.over(tick):
             return
-        if self.processor is not None and self.processor.refuses(self.name):
-            return
         scan = self._scan_at.get(tick, -1)
-        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1)
+        idle = None
+        if self.pulse is not None and scan < 0:
+            came = any(len(wire.next_arrivals(tick + 1)) for wire in self._trigger_wires)
+            idle = np.array([not came])
+        waiting = idle is not None and bool(idle[0])
+        if not waiting and self.processor is not None and self.processor.refuses(self.name):
+            return
+        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -233,24 +259,42 @@ class Node:
             if len(own) and self.clock is not None:
                 scans = scans.copy()
                 scans[last_of_run(instants, own)] = numbers
+        idle = None
+        if len(pulses := self._pulses(start, end)):
+            busy = instants
+            instants = _all_of([busy, pulses])
+            idle = np.ones(len(instants), dtype=bool)
+            if len(busy):
+                rows = last_of_run(instants, busy)
+                scans, numbers = np.full(len(instants), -1), scans
+                scans[rows], idle[rows] = numbers, False
+            else:
+                scans = _no_scans(len(instants))
         runs = self.simulation.runs
         if runs.early:
             kept = runs.before_ends(instants)
             instants, scans = instants.take(kept), scans[kept]
+            idle = None if idle is None else idle[kept]
         if len(instants.tick):
-            self._run(instants, scans, end)
+            self._run(instants, scans, end, idle)
 
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
         return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.runs)
 
-    def _run(self, instants: RunTicks, scans: IntArray, end: int) -> None:
+    def _run(
+        self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
+    ) -> None:
         before = None if self.clock is None else self.clock.before
-        wake = self._inputs.seen(instants, scans, end, self._rows_asked_for, clock=before)
+        wake = self._inputs.seen(
+            instants, scans, end, self._rows_asked_for, clock=before, idle=idle
+        )
         if wake is None:
             return
         ticks = wake.ticks
+        if len(self._ran) < self.simulation.runs.count:
+            self._ran.update(wake.run[wake.instants.last_of_each].tolist())
         try:
             self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):

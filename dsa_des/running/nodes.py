@@ -43,6 +43,7 @@ def build_nodes(
         node = Node(run, component, windowed, _priority(base, by_name, shuffle))
         node.runner = timeline.runner(component)
         node.clock = timeline.clock(name, component)
+        node.pulse = timeline.pulse(component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
         node.ahead = name in grain.ahead
         node.on_demand = component.clocked == "demand" and node.clock is None

@@ -8,8 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
+from dsa_des.record.undone import Undone
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
@@ -20,6 +23,10 @@ from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
 from dsa_des.time.runs import Runs
+
+
+def _no_jitter(number: int) -> Callable[[IntArray], FloatArray]:
+    return lambda scans: np.zeros(len(scans))
 
 
 class Timeline:
@@ -56,6 +63,14 @@ class Timeline:
 
         everything = self._everything
         return RunClock(specs, self.scene.ticks_per_s, self.runs, jitter, always_draws=everything)
+
+    def pulse(self, component: Component) -> RunClock | None:
+        """Return when a block is woken though nothing comes, or None where it never is."""
+        every_s = component.acts_every_s()
+        if every_s is None:
+            return None
+        specs = [ClockSpec(1 / every_s, every_s)] * self.runs.count
+        return RunClock(specs, self.scene.ticks_per_s, self.runs, _no_jitter)
 
     def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
         """Return what each run says of a block's clock; none where it has none of its own."""
@@ -103,3 +118,7 @@ class Timeline:
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""
         return components
+
+    def undone(self, components: Mapping[str, Component]) -> Undone:
+        """Return what blocks could not do over all runs, once they are finished."""
+        return {name: component.undone() for name, component in components.items()}

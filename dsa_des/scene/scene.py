@@ -11,7 +11,8 @@ from typing import Any
 
 import networkx as nx
 
-from dsa_des.block.component import Component, Parameters, as_written
+from dsa_des.block.component import Component, Context, Parameters, as_written
+from dsa_des.block.foreign_calls import REFUSALS, must_pass, why_refused
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block, ProcessorParameters
@@ -40,6 +41,7 @@ from dsa_des.scene.overrides import (
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
+from dsa_des.time.randomness import Streams
 
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
 _TOLERANCE = "accuracy"
@@ -357,7 +359,6 @@ def check_scene(scene_file: SceneFile) -> Scene:
     check_effects(scene_file, blocks)
     if not unsure:
         check_activity(scene_file, blocks, clocks, wires)
-    scene_file.refuse()
     scene = Scene(
         Path(scene_file.path),
         title,
@@ -373,7 +374,28 @@ def check_scene(scene_file: SceneFile) -> Scene:
         notes=notes,
     )
     scene._tables = scene_file
+    if scene_file.problems and len(sections) == len(section_models()):
+        scene_file.problems += _refused_by_themselves(scene)
+    scene_file.refuse()
     return scene
+
+
+def _refused_by_themselves(scene: Scene) -> list[Problem]:
+    """Return what blocks would refuse next, once what is wrong elsewhere is right.
+
+    Each is made alone: a file that is not there, or two intruders of one name, show by that.
+    """
+    problems: list[Problem] = []
+    for name, block in scene.blocks.items():
+        context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
+        try:
+            block.cls(name, block.parameters, context)
+        except REFUSALS as error:
+            problems.append(scene.refused(name, why_refused(error)))
+        except BaseException as error:
+            if must_pass(error):
+                raise
+    return problems
 
 
 def described(scene: Scene) -> str:

@@ -7,7 +7,7 @@ a kill of all workers is its fault. Only then it has crashed.
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dsa_des.studies.chunk import Done, crashed_run, joined
 from dsa_des.studies.study import Chunk, Study
@@ -108,4 +108,4 @@ def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
         left -= cut - start
         first += [(cell, start, cut)] * (start < cut)
         second += [(cell, cut, end)] * (cut < end)
-    return Chunk(chunk.name, tuple(first)), Chunk(chunk.name, tuple(second))
+    return replace(chunk, runs=tuple(first)), replace(chunk, runs=tuple(second))

@@ -5,6 +5,7 @@ the same.
 """
 
 import gc
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,17 +18,22 @@ from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import SceneError
+from dsa_des.files.sealed_files import parquet
+from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
+from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
+from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
     DONE,
     FAILED,
+    STANDS_FOR,
     columns_of,
     draw_column,
 )
-from dsa_des.results.sealed_files import parquet
 from dsa_des.scene.scene import Scene
+from dsa_des.studies.allocation import Allocation
+from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
 from dsa_des.studies.metric import Group, Metric, wanted_by
 from dsa_des.studies.study import Chunk, Study, set_text
 
@@ -57,14 +63,18 @@ def schema_of(study: Study) -> pa.Schema:
         [(axis.column, axis.numeric) for axis in study.axes],
         [(draw_column(draw.key), draw.numeric) for draw in study.draws],
         [result for metric in metrics for result in metric.results()],
+        geometry_of(metrics) if study.allocate else (),
     )
 
 
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
-    tables = [_run_cell(study, schema, *part) for part in chunk.runs]
-    done = done_of(chunk.name, pa.concat_tables(tables))
+    undone: list[Undone] = []
+    tables = [
+        _run_cell(study, schema, *part, chunk.plans.get(part[0]), undone) for part in chunk.runs
+    ]
+    done = done_of(chunk.name, pa.concat_tables(tables), added(undone))
     del tables
     if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
         gc.collect()
@@ -80,22 +90,24 @@ def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
         rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
         rows["status"] = [CRASHED] * (end - start)
         tables.append(_table(study, schema, cell, rows, {}))
-    return done_of(chunk.name, pa.concat_tables(tables))
+    return done_of(chunk.name, pa.concat_tables(tables), {})
 
 
-def done_of(name: str, table: pa.Table) -> Done:
-    """Return rows as the result of a chunk."""
+def done_of(name: str, table: pa.Table, undone: Undone) -> Done:
+    """Return rows as the result of a chunk, with what blocks could not do in these runs."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
-    return Done(name, parquet(table), table.num_rows, failed, status.count(CRASHED))
+    about = json.dumps(undone).encode() if undone else b""
+    return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
 
 
 def joined(name: str, parts: Sequence[Done]) -> Done:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    order = [("cell", "ascending"), ("replica", "ascending")]
-    return done_of(name, pa.concat_tables(tables).sort_by(order))
+    undone = added(map(undone_of, tables))
+    rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
+    return done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
@@ -144,7 +156,19 @@ def _nothing(count: int, *, text: bool) -> AnyArray:
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
-def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) -> pa.Table:
+def _run_cell(
+    study: Study,
+    schema: pa.Schema,
+    cell: int,
+    start: int,
+    end: int,
+    plan: Allocation | None,
+    undone: list[Undone],
+) -> pa.Table:
+    """Return the rows of some replicas of a cell, of which those that a plan chooses are flown.
+
+    What blocks could not do in them is put to `undone`.
+    """
     numbers = range(start, end)
     rows = _leading(study, cell, numbers)
     try:
@@ -154,8 +178,64 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
+    key = str(study.path), cell
+    if not study.allocate:
+        values = _flown(scene, metrics, replicas, rows["error"], key, undone)
+        return _table(study, schema, cell, rows, values)
+    known, errors = _foreseen(scene, metrics, replicas)
+    for k, text in errors.items():
+        rows["error"][k] = text
+    results = [result for metric in metrics for result in metric.results()]
+    shares = stands_for(study, cell, numbers, plan, results, known)
+    chosen = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
+    wrong: list[str | None] = [None] * len(chosen)
+    flown = _flown(scene, metrics, [replicas[k] for k in chosen], wrong, key, undone)
+    for k, said in zip(chosen, wrong, strict=True):
+        rows["error"][k] = said
+    values = {}
+    for name, column in flown.items():
+        values[name] = _nothing(len(numbers), text=column.dtype == object)
+        values[name][chosen] = column
+    return _table(study, schema, cell, rows, values | known | {STANDS_FOR: shares})
+
+
+def _foreseen(
+    scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
+    """Return what is known of runs before they are flown, and the error of each that gave none."""
+    try:
+        return foresee(scene, metrics, replicas), {}
+    except BaseException as error:
+        if must_pass(error):
+            raise
+        if len(replicas) == 1:
+            return {}, {0: f"before it is flown: {error_text(error)}"}
+    result: dict[str, AnyArray] = {}
+    errors: dict[int, str] = {}
+    for k, replica in enumerate(replicas):
+        values, wrong = _foreseen(scene, metrics, [replica])
+        if wrong:
+            errors[k] = wrong[0]
+        for name, column in values.items():
+            nothing = _nothing(len(replicas), text=column.dtype == object)
+            result.setdefault(name, nothing)[k] = column[0]
+    return result, errors
+
+
+def _flown(
+    scene: Scene,
+    metrics: Sequence[Metric],
+    replicas: Sequence[Replica],
+    errors: list[str | None],
+    key: tuple[str, int],
+    undone: list[Undone],
+) -> dict[str, AnyArray]:
+    """Run replicas and return result → values.
+
+    What went wrong is put among `errors`, and to `undone` what blocks could not do.
+    """
     values: dict[str, AnyArray] = {}
-    done, key = 0, (str(study.path), cell)
+    done = 0
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
     while done < len(replicas):
@@ -165,21 +245,22 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         many = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
         part = replicas[done : done + many]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
+        undone.append(undone_in(outcomes))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded:
             _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)
         good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
-                rows["error"][done + k] = outcome.error
-        result, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+                errors[done + k] = outcome.error
+        result, wrong = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
         for name, column in result.items():
-            nothing = _nothing(len(numbers), text=column.dtype == object)
+            nothing = _nothing(len(replicas), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
-        for k, text in errors.items():
-            rows["error"][done + good[k]] = text
+        for k, text in wrong.items():
+            errors[done + good[k]] = text
         done += len(part)
-    return _table(study, schema, cell, rows, values)
+    return values
 
 
 #: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first

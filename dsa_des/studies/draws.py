@@ -56,7 +56,7 @@ class Draw:
         if self.kind == "sequence":
             first, step = self.values
             return first + step * replica
-        u = _uniform(seed, self.key, replica)
+        u = uniform(seed, self.key, replica)
         if self.stratified:
             block, index = divmod(replica, batch)
             u = (int(_strata(seed, self.key, block, batch)[index]) + u) / batch
@@ -81,7 +81,8 @@ def replica_seed(seed: int, replica: int) -> int:
     return key_of(seed, "study replica", replica) >> 1
 
 
-def _uniform(seed: int, key: str, replica: int) -> float:
+def uniform(seed: int, key: str, replica: int) -> float:
+    """Return a number from [0, 1) for a replica, by a seed and what it is drawn for."""
     return (key_of(seed, "study draw", key, replica) >> 11) * 2.0**-53
 
 

@@ -230,6 +230,12 @@ def _work(chunk: Chunk) -> Done:
         os._exit(1)
 
 
+_START_DASK = (
+    "one is started by `dask scheduler`, which prints its address, and each of its workers by "
+    "`dask worker ADDRESS`"
+)
+
+
 class Dask:
     """Runs chunks on a Dask cluster that is already there.
 
@@ -256,7 +262,7 @@ class Dask:
         except (OSError, ValueError, TimeoutError) as error:
             raise UsageError(
                 f"--scheduler {scheduler}: no Dask scheduler answers there within "
-                f"{_CONNECT_TIMEOUT_S} s ({type(error).__name__})"
+                f"{_CONNECT_TIMEOUT_S} s ({type(error).__name__}); {_START_DASK}"
             ) from error
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
@@ -299,7 +305,10 @@ def make_executor(kind: str, workers: int, scheduler: str | None) -> Executor:
     """Return the executor that a command line asks for."""
     if kind == "dask":
         if scheduler is None:
-            raise UsageError("--executor dask needs --scheduler, for example tcp://localhost:8786")
+            raise UsageError(
+                "--executor dask needs --scheduler, for example tcp://localhost:8786; "
+                + _START_DASK
+            )
         return Dask(scheduler)
     if scheduler is not None:
         raise UsageError("--scheduler belongs to --executor dask")

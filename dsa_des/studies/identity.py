@@ -21,6 +21,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import file_digest
+from dsa_des.studies.foreseen import geometry_of
 from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_tables import json_safe
 
@@ -45,6 +46,8 @@ def description_text(study: Study) -> str:
     }
     if study.over:  # each member of a sample has seeds and draws of its own
         identity["over"] = sorted(study.over)
+    if study.allocate:
+        identity["allocate"] = study.allocate
     try:
         files = files_of(study)
         identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
@@ -125,6 +128,12 @@ def _extended_by(files: set[Path]) -> set[Path]:
     return extended
 
 
+def geometry_of_study(study: Study) -> list[str]:
+    """Return the numbers by which runs of a study are chosen; none where all are flown."""
+    scene = study.scene(0)
+    return geometry_of([spec.build(scene) for spec in study.metrics]) if study.allocate else []
+
+
 def results_of(study: Study) -> list[Result]:
     """Return the results that a study's metrics give."""
     scene = study.scene(0)
@@ -195,6 +204,7 @@ def record_text(study: Study, digest: str) -> str:
         "swaps": study.swaps,
         "compare": study.baseline,
         "compare_weight": study.compare_weight,
+        "geometry": geometry_of_study(study),
         "stop_when": None if study.stop_when is None else vars(study.stop_when),
         "confidence": study.confidence,
         "interval": study.interval,

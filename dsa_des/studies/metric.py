@@ -40,8 +40,8 @@ from dsa_des.scene.scene import Scene
 #: What authors of metrics import from here.
 __all__ = [
     "CLASS", "EVENT", "FRACTION", "KEY", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
-    "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "find_metric",
-    "recorded_by", "wanted_by",
+    "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "expected_column",
+    "find_metric", "recorded_by", "wanted_by",
 ]  # fmt: skip
 
 METRICS = "dsa_des.metrics"
@@ -171,6 +171,9 @@ class Metric:
     Parameters: ClassVar[type[Parameters]] = Parameters
     #: Recorded tables it reads, and which of their columns.
     tables: Mapping[str, tuple[str, ...]] = {}
+    #: Names of numbers that tell runs apart before they are run, which `foresee` gives besides.
+    #: Those that `expected_column` names are the chances that it expects of an event.
+    geometry: tuple[str, ...] = ()
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         self.p = parameters
@@ -187,6 +190,13 @@ class Metric:
         """
         raise NotImplementedError
 
+    def foresee(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return what is known of every replica without running it: results, and `geometry`.
+
+        The group has recorded nothing. Results are those that `measure` would give, to the bit.
+        """
+        raise NotImplementedError
+
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Raise ValueError for what is wrong and only blocks that are set up can tell.
 
@@ -196,6 +206,11 @@ class Metric:
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return the analytic answer for a scene, for results that have one."""
         return {}
+
+
+def expected_column(event: str) -> str:
+    """Return the name in `Metric.geometry` of the chance that is expected of an event."""
+    return f"expected.{event}"
 
 
 def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:

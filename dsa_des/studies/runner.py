@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
 from dsa_des.studies.chunk import Done, done_of, joined
 from dsa_des.studies.executors import Executor
+from dsa_des.studies.foreseen import plans_of
 from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.models import keep_explained
 from dsa_des.studies.study import Chunk, Study
@@ -63,22 +64,23 @@ def run_study(
     """Run what is missing of a study into its open folder; `report` is called after every chunk."""
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(study.cells)
-    rounds = -(-study.replicas // study.batch)
+    starts = [0, *study.round_ends[:-1]]
     try:
         keep_explained(study, folder)
     except OSError as error:
         raise Stopped(f"results cannot be written: {error.strerror or error}") from error
     try:
-        for number in range(rounds):
+        for number, first in enumerate(starts):
             if number and study.stop_when is not None:
                 satisfied = _satisfied(study, folder, number)
                 left = [cell for cell in cells if cell not in satisfied]
                 done_with = len(cells) - len(left)
-                progress.total -= done_with * (study.replicas - number * study.batch)
+                progress.total -= done_with * (study.replicas - first)
                 cells = left
-            _run_round(study, folder, executor, list(study.chunks(number, cells)), number, report,
-                       progress)  # fmt: skip
-        _remove_rounds(folder, rounds)
+            plans = plans_of(study, folder, number, first, cells)
+            chunks = list(study.chunks(number, cells, plans))
+            _run_round(study, folder, executor, chunks, number, report, progress)
+        _remove_rounds(folder, len(starts))
     except KeyboardInterrupt:
         raise Stopped("interrupted") from None
     return progress
@@ -105,14 +107,15 @@ def _run_round(
         if rows is None or not _same_runs(rows, chunk):
             missing.append(chunk)
             continue
-        there = done_of(chunk.name, rows)
+        undone = folder.undone([chunk.name])
+        there = done_of(chunk.name, rows, undone)
         progress.failed += there.failed - there.crashed
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
-            missing.append(_chunk_of(chunk.name, rows.filter(crashed)))
+            missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed))))
             if there.crashed < there.runs:
-                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed))
+                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), undone)
     report(progress)
     for done in executor.run(study, missing):
         whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done
@@ -146,14 +149,14 @@ def _same_runs(rows: pa.Table, chunk: Chunk) -> bool:
     )
 
 
-def _chunk_of(name: str, rows: pa.Table) -> Chunk:
+def _runs_of(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
     runs: list[tuple[int, int, int]] = []
     for cell, replica in zip(rows["cell"].to_pylist(), rows["replica"].to_pylist(), strict=True):
         if runs and runs[-1][0] == cell and runs[-1][2] == replica:
             runs[-1] = (cell, runs[-1][1], replica + 1)
         else:
             runs.append((cell, replica, replica + 1))
-    return Chunk(name, tuple(runs))
+    return tuple(runs)
 
 
 def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:

@@ -21,6 +21,7 @@ from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text,
 from dsa_des.scene.overrides import SWAP, apply_changes, read_sets
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import SceneFile
+from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -50,12 +51,18 @@ class MetricSpec:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
 
 
+#: For the sake of all ratios.
+AUTO = "auto"
+
+
 @dataclass(frozen=True)
 class Chunk:
     """Some consecutive runs: for each cell, a range of replicas."""
 
     name: str
     runs: tuple[tuple[int, int, int], ...]
+    #: Of cells of which a sample of the runs is flown.
+    plans: Mapping[int, Allocation] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)
@@ -95,6 +102,8 @@ class Study:
     requirements: tuple[Requirement, ...] = ()
     #: The result that weighs units where events are compared.
     compare_weight: str | None = None
+    #: Names of the ratios for whose sake a sample of the runs is flown, or `AUTO`; none: all are.
+    allocate: tuple[str, ...] = ()
     #: The command line that runs it again, whatever was changed of its file.
     repeat: str = ""
 
@@ -119,6 +128,13 @@ class Study:
     def batch(self) -> int:
         """How many replicas of a cell are run before the results are looked at."""
         return self.stop_when.batch if self.stop_when else self.replicas
+
+    @property
+    def round_ends(self) -> list[int]:
+        """The replica before which each round ends, in which results are looked at."""
+        if self.allocate:
+            return round_ends(self.replicas, self.stop_when.batch if self.stop_when else None)
+        return [min(n + self.batch, self.replicas) for n in range(0, self.replicas, self.batch)]
 
     def labels(self, cell: int) -> dict[str, Any]:
         """Return column → value of every axis at a cell."""
@@ -163,24 +179,30 @@ class Study:
         changes = [(key, set_text(value)) for key, value in [*sets, *replica.changes.items()]]
         return run_command(str(self.scene_path), replica.seed, swaps, changes)
 
-    def chunks(self, round_number: int, cells: Sequence[int]) -> Iterator[Chunk]:
-        """Return the chunks of one round: a batch of replicas of each of the given cells."""
-        start = round_number * self.batch
-        end = min(start + self.batch, self.replicas)
+    def chunks(
+        self, round_number: int, cells: Sequence[int], plans: Mapping[int, Allocation] | None = None
+    ) -> Iterator[Chunk]:
+        """Return the chunks of one round: a batch of replicas of each of the given cells.
+
+        Of each chunk `runs_per_chunk` are flown, as many as a plan leads to expect.
+        """
+        start, end = [0, *self.round_ends][round_number : round_number + 2]
+        plans = plans or {}
         runs: list[tuple[int, int, int]] = []
-        room, number = self.runs_per_chunk, 0
+        room, number = float(self.runs_per_chunk), 0
         for cell in cells:
+            share = plans[cell].share if cell in plans else 1.0
             first = start
             while first < end:
-                last = min(end, first + room)
+                last = min(end, first + math.ceil(room / share))
                 runs.append((cell, first, last))
-                room -= last - first
+                room -= (last - first) * share
                 first = last
-                if room == 0:
-                    yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
-                    runs, room, number = [], self.runs_per_chunk, number + 1
+                if room <= 0.0:
+                    yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs), plans)
+                    runs, room, number = [], float(self.runs_per_chunk), number + 1
         if runs:
-            yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
+            yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs), plans)
 
 
 def set_text(value: Any) -> str:

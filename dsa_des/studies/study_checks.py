@@ -9,15 +9,16 @@ from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.results.record import FRACTION, NUMBER, SHARE, TRIALS, Result
+from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.summary import of_series
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
+from dsa_des.studies.foreseen import why_not_foreseen
 from dsa_des.studies.metric import Metric, check_recorded
-from dsa_des.studies.study import Study
+from dsa_des.studies.study import AUTO, Study
 
 #: How many replicas the ends of a range are looked for in.
 _MOST_DRAWN = 10_000
@@ -61,6 +62,13 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
         _check_set_up(study, scenes, file)
     if len(file.problems) == before:
         _check_ends(study, scenes, file)
+    if len(file.problems) == before and study.allocate:
+        try:
+            why_not = why_not_foreseen(study, first)
+        except (SceneError, ValueError) as error:
+            why_not = str(error)
+        if why_not:
+            file.report(("allocate",), why_not)
 
 
 def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
@@ -154,6 +162,11 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
     if weight is not None and (weight not in results or results[weight].kind != NUMBER):
         message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
         file.report(("compare", "weight"), message, weight)
+    ratios = [name for name in names if results[name].kind == RATIO]
+    for name in study.allocate:
+        if name != AUTO and name not in ratios:
+            message = f"no ratio of the study has that name{did_you_mean(name, [AUTO, *ratios])}"
+            file.report(("allocate",), message, name)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
             missing(("requirements", number, "metric"), wanted.metric)

@@ -91,6 +91,10 @@ def study_of_tables(
     return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 
 
+def _listed(names: str | list[str]) -> list[str]:
+    return [names] if isinstance(names, str) else names
+
+
 class _StudyReader:
     """Reads a study; its scene, and changes of every cell, may be given beside its tables."""
 
@@ -156,7 +160,8 @@ class _StudyReader:
             figures=self.figures(axes, cells),
             compare_weight=weight,
             requirements=self.requirements(axes),
-            runs_per_chunk=keys.runs_per_chunk or max(1, min(512, -(-runs // 32))),
+            allocate=() if keys.allocate is None else tuple(_listed(keys.allocate)),
+            runs_per_chunk=keys.runs_per_chunk or max(1, min(1024, -(-runs // 16))),
             base=base,
             tables=resolved(self.data, swaps),
         )

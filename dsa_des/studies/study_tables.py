@@ -11,7 +11,7 @@ from dsa_des.block.component import SourcedText
 from dsa_des.results.record import FigureKind, FigureRecord, as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
-_NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
+_NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate")
 #: The key of an axis whose values are patterns of file names.
 _PATTERNS = "files"
 
@@ -111,6 +111,7 @@ class StudyKeys(StudyTable):
     figures: _Tables = []
     requirements: _Tables = []
     stop_when: Any = None
+    allocate: str | list[str] | None = None
     compare: Any = None
     over: str | list[str] | None = None
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)

@@ -7,6 +7,7 @@ no other block's draws.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from hashlib import blake2b
 from typing import Any
 
@@ -53,6 +54,11 @@ def philox4x32(
         ((k0 + np.uint64(first)) & _U_LOW, (k1 + np.uint64(second)) & _U_LOW)
         for first, second in _BUMPS
     ]
+    return _of_arrays((x0, x1, x2, x3), keys)
+
+
+def _of_arrays(counter: Any, keys: Any) -> Any:
+    x0, x1, x2, x3 = counter
     return _ten_rounds(x0, x1, x2, x3, keys, np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32)
 
 
@@ -101,15 +107,22 @@ class Stream:
         seeds = [seed] if isinstance(seed, int) else seed
         keys = [key_of(one, block, purpose) for one in seeds]
         self._keys = np.array(keys, dtype=np.uint64)
-        self._key: tuple[Any, Any] = (keys[0] & 0xFFFFFFFF, keys[0] >> 32)
-        self._round_keys = [
-            ((self._key[0] + first) & _LOW, (self._key[1] + second) & _LOW)
-            for first, second in _BUMPS
+        low, high = keys[0] & _LOW, keys[0] >> 32
+        #: Of each round: two numbers, or arrays of the rows' shape.
+        self._round_keys: Any = [
+            ((low + first) & _LOW, (high + second) & _LOW) for first, second in _BUMPS
         ]
 
     def of_runs(self, run: IntArray) -> "Stream":
         """Return the draws of rows of these runs (`Wake.run`), each with its own run's seed."""
-        return self if len(self._keys) == 1 else _RunStream(self._keys[run])
+        return self if len(self._keys) == 1 else _RunStream(self._rounds_of_all.take(run, axis=2))
+
+    @cached_property
+    def _rounds_of_all(self) -> UInt64Array:
+        """The keys of all ten rounds (rounds, 2, runs): rows take those of their runs."""
+        both, bumps = np.array([self._keys & _U_LOW, self._keys >> _U32]), np.array(_BUMPS)
+        rounds: UInt64Array = (both + bumps.astype(np.uint64)[:, :, np.newaxis]) & _U_LOW
+        return rounds
 
     def _words(
         self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int
@@ -119,10 +132,10 @@ class Stream:
         if len(self._keys) > 1:
             self._draw_for_all()
         target = np.asarray(targets, dtype=np.uint64)
-        key, numbers = self._key, np.asarray(scans, dtype=np.int64)
+        numbers = np.asarray(scans, dtype=np.int64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
         few = target.shape == numbers.shape and 0 < target.size <= _FEW and target.ndim == 1
-        if few and isinstance(key[0], int):
+        if few and not isinstance(self._round_keys, np.ndarray):
             words = [
                 _ten_rounds(
                     draw | ((s >> 32) & 0xFFFF) << 16,
@@ -142,7 +155,8 @@ class Stream:
             target & _U_LOW,
             target >> _U32,
         )
-        return philox4x32(counter, key)
+        keys = np.asarray(self._round_keys, dtype=np.uint64)
+        return _of_arrays(counter, keys)
 
     def _draw_for_all(self) -> None:
         self.drew_for_all = True
@@ -197,9 +211,8 @@ _KNOWN: UInt64Array = np.empty(0, dtype=np.uint64)
 class _RunStream(Stream):
     """The draws of rows whose keys are known; their shape is that of targets or scans."""
 
-    def __init__(self, keys: UInt64Array) -> None:
-        self._keys = _KNOWN
-        self._key = (keys & _U_LOW, keys >> _U32)
+    def __init__(self, round_keys: UInt64Array) -> None:
+        self._keys, self._round_keys = _KNOWN, round_keys
 
 
 def _radius(word: UInt64Array) -> FloatArray:

@@ -178,3 +178,53 @@ def test_a_slip_in_a_named_alerter_is_still_an_error(tmp_path: Path) -> None:
     )
     assert result.exit_code == 2
     assert "One_alert_1_regoin" in result.stderr
+
+
+def table(path: Path, first: str = "time,id,lat,lon,alt,track,gs,vs", unit: str = "") -> Path:
+    """Write a head-on encounter at 60 m/s each; the intruder is heard half a second off."""
+    lines = [first + "\n", *([unit + "\n"] if unit else [])]
+    for t in range(8):
+        if t < 6:
+            lines.append(f"{t + 100},own,{45 + 60 * t / 111120:.9f},7,1000,0,60,0\n")
+        north = 0.1 - 60 * (t - 0.5) / 111120
+        lines.append(f"{t + 99.5},other,{45 + north:.9f},7,1030,180,60,0\n")
+    path.write_text("".join(lines), encoding="utf-8")
+    return path
+
+
+def test_tables_are_read_as_traffic_reads_them(tmp_path: Path) -> None:
+    """In m and m/s where no unit is given; the target is where its flight is at each time of ours.
+
+    They were taken for files of DAIDALUS, in feet and knots, or refused.
+    """
+    out = tmp_path / "alerts.csv"
+    result = call(table(tmp_path / "tracks.csv"), "--conf", conf(tmp_path), "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert "alt in m, gs in m/s, vs in m/s: no unit is given" in " ".join(result.stdout.split())
+    assert "interpolated to the times of the ownship" in " ".join(result.stdout.split())
+    heading, _, *lines = rows(out.read_text(encoding="utf-8"))
+    found = [dict(zip(heading, line, strict=True)) for line in lines]
+    assert [row["Time"] for row in found] == [f"{t}.0" for t in range(100, 106)]
+    for t, row in enumerate(found):
+        assert row["Traffic"] == "other"
+        assert float(row["Projected TCPA"]) == pytest.approx((11112 - 120 * t) / 120, abs=0.01)
+        assert float(row["Vertical Separation"]) == pytest.approx(30 / 0.3048, abs=1e-4)
+
+
+def test_a_table_with_a_row_of_units_is_still_one_of_daidalus(tmp_path: Path) -> None:
+    out, name = tmp_path / "alerts.csv", "time,name,lat,lon,alt,trk,gs,vs"
+    path = table(tmp_path / "a.csv", name, "[s],[none],[deg],[deg],[ft],[deg],[m/s],[fpm]")
+    result = call(path, "--conf", conf(tmp_path), "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert "8 rows of targets are left out" in " ".join(result.stdout.split())
+
+
+def test_a_table_without_anybody_at_our_times_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "apart.csv"
+    path.write_text(
+        "time,id,lat,lon,alt\n0,own,45,7,1000\n1,own,45.001,7,1000\n5,other,45,7,1000\n"
+        "6,other,45.001,7,1000\n", encoding="utf-8",
+    )  # fmt: skip
+    result = call(path, "--conf", conf(tmp_path), "--out", tmp_path / "x.csv")
+    assert result.exit_code == 2
+    assert "no aircraft is there at a time at which own is" in result.stderr

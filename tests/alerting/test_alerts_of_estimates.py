@@ -116,7 +116,8 @@ def tracks(number, status=CONFIRMED, **values):
     fields = {
         "north_m": 1000.0, "east_m": -400.0, "down_m": 50.0, "north_m_s": 20.0, "east_m_s": 30.0,
         "down_m_s": -2.0, "origin_lat_deg": own["lat_deg"], "origin_lon_deg": own["lon_deg"],
-        "origin_alt_m": own["alt_m"], "state_s": 3.0, **values,
+        "origin_alt_m": own["alt_m"], "state_s": 3.0, "updated_s": 2.0,
+        **values,
     }  # fmt: skip
     for name, value in fields.items():
         setattr(made, name, np.array([value]))
@@ -141,10 +142,11 @@ def test_an_estimate_is_carried_on_with_its_covariance():
     # Before it came, when it did, and when a tentative one has come, which counts for nothing; one
     # that is carried on without looks counts.
     now = at(39, 40, 41, 42)
-    instant, number, state, wrong = flights.states(
+    instant, number, state, wrong, age_s = flights.states(
         now, np.full(4, 5.0), np.stack([place] * 4, axis=1)
     )
     assert (instant.tolist(), number.tolist()) == ([1, 3], [7, 9])
+    assert age_s.tolist() == [3.0, 3.0]
     # 2 s later; the sphere's plane is up to half a percent off, and the frame's down 0.1 m.
     wanted = [-400.0 + 60.0, 1000.0 + 40.0, -50.0 + 4.0, 30.0, 20.0, 2.0]
     assert state[:, 0] == pytest.approx(wanted, rel=0.006, abs=0.11)
@@ -161,11 +163,30 @@ def test_what_came_in_another_run_is_not_known():
     both.tick, both.offsets = both.tick[:1], np.array([0, 2])
     flights.add(RunTicks(np.array([1, 2]), np.array([1, 3])), two(tracks(1), both))
     now = RunTicks(np.array([1, 1, 2, 2, 3]), np.array([0, 7, 1, 4, 9]))
-    instant, number, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
+    instant, number, _, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 2, 3, 3], [1, 3, 2, 9])
     flights.keep(np.array([True, False, True, True]))
-    instant, number, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
+    instant, number, _, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 3, 3], [1, 2, 9])
+
+
+def test_a_track_of_which_nothing_has_come_for_long_is_refused():
+    """Half a minute after its last measurement, whatever is still held of it."""
+    flights = EstimatedFlights()
+    one = tracks(1, updated_s=10.0)
+    one.offsets = np.array([0, 2])
+    other = tracks(2, COASTED, updated_s=20.0)
+    for name in ("track", "track_status", "has_range", "state_s", "updated_s", "north_m", "east_m",
+                 "down_m", "north_m_s", "east_m_s", "down_m_s", "origin_lat_deg", "origin_lon_deg",
+                 "origin_alt_m"):  # fmt: skip
+        setattr(one, name, np.concatenate([getattr(one, name), getattr(other, name)]))
+    one.covariance = {name: np.repeat(values, 2) for name, values in one.covariance.items()}
+    flights.add(at(20), one)
+    instant, number, _, _, age_s = flights.states(
+        at(40, 41, 51), np.array([40.0, 41.0, 51.0]), np.zeros((3, 3))
+    )
+    assert (instant.tolist(), number.tolist()) == ([0, 0, 1], [1, 2, 2])
+    assert age_s.tolist() == [30.0, 20.0, 21.0]
 
 
 def two(one, other):

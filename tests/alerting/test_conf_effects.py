@@ -244,7 +244,7 @@ def test_an_older_release_finds_no_recovery_later_than_its_last_early_time(tmp_p
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        ("daidalus_version = 2.0.3", "daidalus_version is '2.0.3': it must be 2.0.1 or 2.0.4"),
+        ("daidalus_version = 2.1", "daidalus_version is '2.1': it must be 2.0.1 or 2.0.4"),
         (
             "daidalus_version = 2.0.1\nbands_add_time_to_maneuver = false",
             "bands_add_time_to_maneuver is false and daidalus_version is 2.0.1",

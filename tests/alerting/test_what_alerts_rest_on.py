@@ -292,7 +292,7 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     now = RunTicks.of_run(0, np.array([1]))
     flights.add(now, tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
                             east_m_s=east, down_m_s=-up))  # fmt: skip
-    _, _, state, _ = flights.states(now, np.array([3.0]), place[:, np.newaxis])
+    _, _, state, _, _ = flights.states(now, np.array([3.0]), place[:, np.newaxis])
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)

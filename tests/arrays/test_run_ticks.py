@@ -69,12 +69,13 @@ def test_union_order_and_ranks(parts, scale):
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
-@given(found=pairs)
-def test_the_newest_so_far_of_each_run(found):
+@given(scale=scales, found=pairs)
+def test_the_newest_so_far_of_each_run(found, scale):
     found = sorted(found, key=lambda pair: pair[0])
-    newest = of(found).newest()
+    newest = of(found, scale).newest()
     for k, (run, _) in enumerate(found):
-        assert newest.tick[k] == max(t for other, t in found[: k + 1] if other == run)
+        so_far = max(t for other, t in found[: k + 1] if other == run)
+        assert newest.tick[k] == scale * so_far
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)

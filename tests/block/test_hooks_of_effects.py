@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 from engine_blocks import Relay
 
+from components.optical.sensors import ElectroOptical
 from components.radar.threshold_radar import ThresholdRadar
 from components.radar.weather import SNR
 from dsa_des.block.component import Context
@@ -63,6 +64,27 @@ def test_an_effect_on_a_hook_of_a_base_class_is_called(lab, monkeypatch):
     assert [factor(None) for factor in radar.snr_factors][-1] == 0.5
     planned = {item.effect.name for item in simulation.plan if item.built and item.block == "radar"}
     assert {*radar.context.effects} == planned > {"halves"}
+
+
+@pytest.mark.parametrize(
+    ("acts_on", "builds", "said"),
+    [("SNR", 0.5, "builds 0.5: SNR needs something to call, (cells) -> factor of each cell's SNR"),
+     ("darkness", lambda: True, "darkness needs a value, whether it is too dark to see anything")],
+)  # fmt: skip
+def test_an_effect_that_builds_what_its_hook_cannot_use_is_named(
+    lab, monkeypatch, acts_on, builds, said
+):
+    effect = Halves(acts_on)
+    effect.build = lambda block: builds
+    base, name = (ThresholdRadar, "radar") if acts_on == "SNR" else (ElectroOptical, "eo")
+    cls = type("Halved", (base,), {"effects": (*base.effects, effect)})
+    monkeypatch.setattr(blocks, "Swapped", cls, raising=False)
+    scene = load_scene(lab.configs / "first_light.toml", swaps=(f"{name}=engine_blocks:Swapped",))
+    with pytest.raises(SceneError) as caught:
+        _ = Simulation(scene).components
+    (problem,) = caught.value.problems
+    assert problem.key == f"blocks.{name}"
+    assert problem.message.startswith("effect 'halves' of ") and said in problem.message
 
 
 def test_two_effects_of_one_name_are_refused(lab, monkeypatch):

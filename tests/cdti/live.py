@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 from components.cdti import control as control_module
 from components.cdti import session as session_module
 from components.examples import folder
+from tests.support.waiting import WAIT_S, wait_for
 
 #: Of the session's tracker, whose first track is that of the intruder's direction.
 TRACKS = 1_000_000
@@ -24,21 +25,28 @@ LATER = (
 
 
 class Session:
-    """A session that runs in a thread.
+    """A session that runs in a thread, and stands still where a test wants to look at it.
+
+    How fast the machine is decides how much scene goes by while a test looks and presses. So a test
+    names the picture at which the scene stands; then it goes on for as long only as it takes to
+    take in what was decided, until `go_on`.
 
     Parameters
     ----------
     monkeypatch : pytest's
     out : Path
+    until : callable, optional
+        Whether the scene is to stand at a picture (`Scope.picture`, and ``t``).
     **options
         As of the command.
     """
 
-    def __init__(self, monkeypatch, out, **options):
+    def __init__(self, monkeypatch, out, until=None, **options):
         self.out, self.said, self.error = out, [], None
-        self._pacers = []
-        made = session_module.LivePacer
-        monkeypatch.setattr(session_module, "LivePacer", lambda *a: self._noted(made(*a)))
+        self._until, self._reached, self._stands = until, False, threading.Event()
+        self._asking = threading.Lock()
+        monkeypatch.setattr(control_module, "_LOOK_AGAIN_S", 0.02)  # whether a decision waits
+        monkeypatch.setattr(session_module, "LivePacer", self._made)
         for module in (session_module, control_module):
             monkeypatch.setattr(module, "say", lambda text="", err=False: self.said.append(text))
         given = {
@@ -60,13 +68,43 @@ class Session:
             self.error = error
             self.said.append(f"http://failed/?token={error}")
 
-    def _noted(self, pacer):
-        self._pacers.append(pacer)
-        return pacer
+    def _made(self, factor, holds, came_to):
+        self.control = holds.__self__
+        self._pacer = control_module.LivePacer(factor, lambda: self._holds() or holds(), came_to)
+        return self._pacer
+
+    def _holds(self):
+        """Whether the scene stands; asked by its own thread after each of its windows."""
+        control = self.control
+        with self._asking:
+            waits = any(one["type"] == "waits" for one in [*control._answers.values()])
+            if self._until is None or control.scope is None or waits:
+                self._stands.clear()
+                return False
+            time_s, _, received = control._now
+            picture = control.scope.picture(time_s, received)
+            self._reached = self._reached or bool(self._until({"t": time_s, **picture}))
+            if self._reached and not self._stands.is_set():
+                control._server.show()  # pages get this very picture, whatever they had before
+                self.stands_at_s = time_s
+                self._stands.set()
+            return self._reached
+
+    def stands(self):
+        """The instant at which the scene stands, once it does, s."""
+        assert self._stands.wait(WAIT_S), "it did not stand"
+        return self.stands_at_s
+
+    def go_on(self, until=None):
+        """Let the scene go on, to its end or until it stands again."""
+        with self._asking:
+            self._until, self._reached = until, False
+            self._stands.clear()
+        self._pacer.wake()
 
     def stop(self):
         """End it as ctrl-C does."""
-        self._pacers[0].stop()
+        self._pacer.stop()
 
     def _address(self, number):
         found = re.findall(r"http\S+", " ".join(self.said))
@@ -76,8 +114,8 @@ class Session:
         """The address printed when the operator's page was gone."""
         return wait_for(lambda: self._address(1))
 
-    def ended(self, timeout=60.0):
-        self.thread.join(timeout)
+    def ended(self):
+        self.thread.join(WAIT_S)
         assert not self.thread.is_alive()
         if self.error is not None:
             raise self.error
@@ -86,20 +124,10 @@ class Session:
         options.setdefault("origin", f"http://{self.authority}")
         token = self.token if token is None else token
         url = f"ws://{self.authority}/socket?token={token}&key={key}"
-        return connect(url, open_timeout=60, **options)
+        return connect(url, open_timeout=WAIT_S, **options)
 
 
-def wait_for(look, timeout=90.0):
-    """What `look` gives once it gives something."""
-    until = time.monotonic() + timeout
-    while time.monotonic() < until:
-        if found := look():
-            return found
-        time.sleep(0.01)
-    raise AssertionError("it did not come")
-
-
-def hear(socket, *kinds, timeout=90.0):
+def hear(socket, *kinds, timeout=WAIT_S):
     """The next message of some kinds; every picture is taken as drawn."""
     until = time.monotonic() + timeout
     while time.monotonic() < until:

@@ -1,8 +1,11 @@
 """The display in a Chromium; tests that need one are left out by name where it is missing."""
 
+import json
 import shutil
 
 import pytest
+
+from tests.support.waiting import WAIT_S, wait_for
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 
@@ -21,7 +24,11 @@ SETS = (
 @pytest.fixture(scope="module")
 def chromium():
     with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        launched = playwright.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox"],
+            timeout=1000 * WAIT_S,
+        )
         yield launched
         launched.close()
 
@@ -29,31 +36,41 @@ def chromium():
 class Screen:
     """A page of the display in the browser; it must have nothing to complain of."""
 
-    def __init__(self, browser, address, **context):
+    def __init__(self, browser, session, **context):
+        self.session = session
         self.context = browser.new_context(
             **{"viewport": {"width": 1280, "height": 800}, **context}
         )
+        self.context.set_default_timeout(1000 * WAIT_S)
         self.page = self.context.new_page()
         self.said, self.asked = [], []
         self.page.on("console", lambda message: self.said.append(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(address)
+        self.page.goto(session.address)
         self.when("App.state().role !== ''")
 
     def state(self):
-        return self.page.evaluate("App.state()")
+        """What it shows once the scene stands: nothing of it changes until that goes on."""
 
-    def when(self, what, timeout=90_000):
-        self.page.wait_for_function(f"() => ({what})", timeout=timeout)
-        return self.state()
+        def settled():
+            shown = self.page.evaluate("App.state()")
+            stands = shown["t"] == round(self.session.stands(), 4)
+            return stands and not shown["waiting"] and shown
+
+        return wait_for(settled)
+
+    def when(self, what):
+        """What it shows when something is so: as it was then, not as it is a moment later."""
+        met = self.page.wait_for_function(f"() => ({what}) && JSON.stringify(App.state())")
+        return json.loads(met.json_value())
 
     def taken(self, decision):
-        self.when(f"App.said.some(one => one.type === 'taken' && one.decision === '{decision}')")
-        said = self.page.evaluate("App.said")
-        return next(one for one in said if one.get("decision") == decision)
+        found = "App.said.find(one => one.type === 'taken' && one.decision === '{}')"
+        met = self.page.wait_for_function(f"() => JSON.stringify({found.format(decision)})")
+        return json.loads(met.json_value())
 
-    def close(self, authority):
+    def close(self):
         assert self.said == [], self.said
-        assert [url for url in self.asked if authority not in url] == []
+        assert [url for url in self.asked if self.session.authority not in url] == []
         self.context.close()

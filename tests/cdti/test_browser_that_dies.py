@@ -15,10 +15,11 @@ import pytest
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 pytest.importorskip("websockets", reason="needs the package websockets")
-from live import Session, hear, page, say, wait_for  # noqa: E402
+from live import Session, hear, page, say  # noqa: E402
 
 import dsa_des  # noqa: E402
 from components.cdti import control  # noqa: E402
+from tests.support.waiting import WAIT_S, wait_for  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 if CHROMIUM is None:
@@ -45,36 +46,41 @@ def kill(process):
     """End it and all it has started, without a word."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
-        process.wait(timeout=30)
+        process.wait(WAIT_S)
 
 
 def test_a_browser_that_is_killed_leaves_a_run_that_another_goes_on_with(tmp_path, monkeypatch):
     monkeypatch.setattr(control, "GONE_S", 0.2)
     sets = ("blocks.operator.unattended='pauses'", "record.truth=true")
-    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="8", sets=sets)
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="8", sets=sets,
+                      until=lambda picture: picture["t"] > 1.0)  # fmt: skip
     with chromium(tmp_path / "profile") as (process, orders), sync_api.sync_playwright() as play:
-        browser = play.chromium.connect_over_cdp(orders)
+        browser = play.chromium.connect_over_cdp(orders, timeout=1000 * WAIT_S)
         screen = browser.contexts[0].new_page()
+        screen.set_default_timeout(1000 * WAIT_S)
         screen.goto(session.address)
         screen.wait_for_function("() => App.state().role === 'operator'")
         with session.socket() as watcher:
             screen.keyboard.press("Enter")
-            wait_for(lambda: hear(watcher, "frame")["t"] > 1.0)
+            stood = session.stands()
             screen.select_option("#turn-by", "30")
             screen.locator("#scope").focus()
             screen.keyboard.press("ArrowLeft")
             taken = hear(watcher, "taken")
             kill(process)
             last = wait_for(lambda: (f := hear(watcher, "frame"))["operators"] == 0 and f)
-            stood = hear_until_it_stands(watcher, last["t"])
+            session.go_on()
+            assert hear_until_it_stands(watcher, last["t"]) == last["t"]
             token = session.new_address().partition("token=")[2]
-    assert taken["time"] <= stood < 7.0
+    assert stood <= taken["time"] <= last["t"] < 2.0
+    session.go_on(until=lambda picture: True)  # but for what the other decides
     with page(session, token=token) as (socket, welcome):
         assert welcome["role"] == "operator"
         assert [one["id"] for one in welcome["log"]] == [taken["id"]]
         say(socket, type="decide", decision="climb", target=-1, value=50, id="c" * 16)
         climbed = hear(socket, "taken")
-        assert stood <= climbed["time"] < stood + 1.0
+        assert last["t"] <= climbed["time"] < last["t"] + 1.0
+        session.go_on()
         hear(socket, "end")
     session.ended()
     rows = pq.read_table(session.out / "decisions.parquet").to_pylist()

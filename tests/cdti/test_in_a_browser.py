@@ -57,14 +57,17 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     browser, tmp_path, monkeypatch, key, judged, arrow, by_deg, kept
 ):
     sets = (*SETS, "blocks.operator.turn_rate_deg_s=6", "blocks.guidance.level=9")
-    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="50", sets=sets)
-    screen = Screen(browser, session.address)
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="50", sets=sets,
+                      until=lambda picture: picture["contacts"])  # fmt: skip
+    screen = Screen(browser, session)
     page = screen.page
     assert page.evaluate("document.activeElement.id") == "ready"
     page.keyboard.press("Enter")
-    seen = screen.when("App.state().lines.length && !App.state().symbols.length")
-    assert seen["lines"][0]["bearing"] == pytest.approx(50.2, abs=3) and not seen["alerts"]
-    seen = screen.when("App.state().alerts.length && App.state().symbols.length")
+    seen = screen.state()
+    assert seen["lines"] and not seen["symbols"] and not seen["alerts"]
+    assert seen["lines"][0]["bearing"] == pytest.approx(50.2, abs=3)
+    session.go_on(until=lambda picture: picture["alerts"])
+    seen = screen.state()
     alert = seen["alerts"][0]
     track, name = alert["target"], f"track {alert['target'] - TRACKS}"
     (symbol,) = [one for one in seen["symbols"] if one["number"] == track]
@@ -81,15 +84,18 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     turn = screen.taken("turn")
     assert answer["time"] <= turn["time"] and answer["target"] == track
     # What is rejected stays on screen, and says so.
+    screen.state()
     said = page.locator("#banner").inner_text()
     assert name in said and ("(rejected)" in said) == (judged == "rejected")
     row = page.locator("#contacts li").first.inner_text()
     assert row.endswith("rejected") == (judged == "rejected")
-    heading = "((App.state().own.heading + 180) % 360) - 180"
-    screen.when(f"Math.abs({heading} - ({by_deg})) < 0.5")
-    seen = screen.when("App.state().over", timeout=120_000)
+    session.go_on(until=lambda p: abs((p["own"]["heading"] - by_deg + 180) % 360 - 180) < 0.5)
+    heading = screen.state()["own"]["heading"]
+    assert (heading - by_deg + 180) % 360 - 180 == pytest.approx(0, abs=0.5)
+    session.go_on()
+    seen = screen.when("App.state().over")
     assert seen["ended"] == "the scene has come to its end" and seen["waiting"] == 0
-    screen.close(session.authority)
+    screen.close()
     session.ended()
     rows = pq.read_table(session.out / "decisions.parquet").to_pylist()
     answers = [row for row in rows if row["decision"] != "shown"]  # an alert may come again
@@ -98,7 +104,6 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     assert math.degrees(answers[1]["turn_rad"]) == pytest.approx(by_deg) == turn["value"]
     assert rows[0]["time_s"] < answers[0]["time_s"] <= answers[1]["time_s"]
     assert (closest_m(session.out) > KEPT_M) == kept
-    # When the page saw the alert is chance: what it wrote there is the track's height of then.
     shown_ft = 100 * int(symbol["tag"].replace("−", "-"))
     assert shown_ft == pytest.approx(above_own_ft(session.out, track, seen_s), abs=50 + 1)
     dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=tmp_path / "again")
@@ -108,26 +113,27 @@ def test_a_session_is_decided_by_its_operator_and_replays(
 
 @pytest.fixture(scope="module")
 def alerted(browser, tmp_path_factory):
-    """A page with an alert on it, for what only looks and clicks; the scene goes on meanwhile."""
+    """A page with an alert on it, for what only looks and clicks; the scene stands."""
     with pytest.MonkeyPatch.context() as patch:
         sets = (*SETS, "title='''a title & " + HOSTILE + "'''",
                 f"blocks.traffic.intruders[0].name='{HOSTILE}'")  # fmt: skip
         out = tmp_path_factory.mktemp("alerted") / "run"
         session = Session(
-            patch, out, realtime="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",)
-        )
-        screen = Screen(browser, session.address)
+            patch, out, realtime="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",),
+            until=lambda picture: picture["alerts"] and picture["bands"]["direction"],
+        )  # fmt: skip
+        screen = Screen(browser, session)
         screen.page.keyboard.press("Enter")
-        screen.when("App.state().alerts.length")
+        screen.state()
         yield session, screen
         session.stop()
-        screen.close(session.authority)
+        screen.close()
         session.ended()
 
 
 def test_bands_of_guidance_are_drawn(alerted):
     _, screen = alerted
-    low, high, region = screen.when("App.state().bands.direction.length")["bands"]["direction"][0]
+    low, high, region = screen.state()["bands"]["direction"][0]
     assert region in ("FAR", "MID", "NEAR", "RECOVERY") and 0 <= low < high <= 360
 
 
@@ -141,7 +147,7 @@ def test_names_carry_no_markup(alerted):
 
 def test_another_browser_watches_and_cannot_decide(browser, alerted):
     session, _ = alerted
-    screen = Screen(browser, session.address)
+    screen = Screen(browser, session)
     assert screen.state()["role"] == "watcher"
     screen.when("App.state().t !== null")
     buttons = screen.page.locator("#decide button")
@@ -149,7 +155,7 @@ def test_another_browser_watches_and_cannot_decide(browser, alerted):
     screen.page.keyboard.press("ArrowRight")
     screen.page.evaluate("Link.decide({ decision: 'turn', target: -1, value: 20 })")
     screen.when("App.said.some(one => one.why === 'this page only watches')")
-    screen.close(session.authority)
+    screen.close()
 
 
 def test_a_page_of_another_origin_gets_no_socket(browser, alerted):
@@ -204,25 +210,42 @@ def test_words_and_symbols_stand_out_from_their_ground(alerted, theme):
     colour = {
         name: luminance(page.evaluate(script, name))
         for name in ("ground", "panel", "ink", "faint", "caution", "warning", "eo", "ir", "radar",
-                     "recovery", "traffic", "own", "symbol-caution", "symbol-warning", "on-symbol")
+                     "recovery", "traffic", "own", "symbol-caution", "symbol-warning", "on-caution",
+                     "on-warning")
     }  # fmt: skip
     texts = ("ink", "faint", "caution", "warning", "eo", "ir", "radar", "traffic")
     for name, under in itertools.product(texts, ("ground", "panel")):
         assert ratio(colour[name], colour[under]) >= 4.5, (name, under)
     for name in ("own", "recovery", "symbol-caution", "symbol-warning"):
         assert ratio(colour[name], colour["ground"]) >= 3.0, name
-    for name in ("symbol-caution", "symbol-warning"):
-        assert ratio(colour["on-symbol"], colour[name]) >= 3.0, name
+    for level in ("caution", "warning"):
+        assert ratio(colour[f"on-{level}"], colour[f"symbol-{level}"]) >= 3.0, level
+    # A warning's arrowhead also for protanopes (Machado et al. 2009, severity 1).
+    red, ink = (page.evaluate(script, name) for name in ("symbol-warning", "on-warning"))
+    assert ratio(protan_luminance(red), protan_luminance(ink)) >= 3.0
 
 
 def ratio(one, other):
     return (max(one, other) + 0.05) / (min(one, other) + 0.05)
 
 
-def luminance(colour):
+def linear(colour):
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
-    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+    return [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+
+
+def luminance(colour):
+    return float(np.dot(linear(colour), (0.2126, 0.7152, 0.0722)))
+
+
+PROTAN = np.array([
+    [0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+    [-0.003882, -0.048116, 1.051998],
+])  # fmt: skip
+
+
+def protan_luminance(colour):
+    return float(np.dot(np.clip(PROTAN @ linear(colour), 0, 1), (0.2126, 0.7152, 0.0722)))
 
 
 def test_a_page_that_is_loaded_again_decides_still_and_lost_nothing(alerted):

@@ -2,16 +2,16 @@
 
 import json
 import signal
-import time
 
 import pyarrow.parquet as pq
 import pytest
 
 pytest.importorskip("websockets", reason="needs the package websockets")
-from live import Session, hear, page, say, wait_for
+from live import Session, hear, page, say
 
 import dsa_des
 from tests import warm_process
+from tests.support.waiting import wait_for
 
 
 def test_what_was_decided_is_kept_when_the_run_is_stopped(tmp_path, monkeypatch):
@@ -40,9 +40,8 @@ def test_a_signal_ends_it_with_a_complete_folder(tmp_path, number, code):
     process = warm_process.start(words)
     wait_for(lambda: list(tmp_path.glob("runs/.dsa_des-*/*/detections.parquet"))
              or list(tmp_path.glob("runs/.dsa_des-*/detections.parquet")))  # fmt: skip
-    time.sleep(0.3)
     process.send_signal(number)
-    stdout, stderr = process.communicate(timeout=60)
+    stdout, stderr = process.communicate()
     assert process.returncode == code
     assert "display: http://127.0.0.1:" in stdout and "run: " in stdout
     assert stderr.splitlines()[-1].startswith("stopped: ")

@@ -6,13 +6,21 @@ import numpy as np
 import pymap3d
 import pytest
 from matplotlib.path import Path as Outline
+from pymap3d import vincenty
 
 import dsa_des
 from components.aircraft.aircraft import VisibleAreas
 from components.cdti.camera import silhouette
-from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines
+from components.cdti.contacts import (
+    Contacts,
+    OwnFlight,
+    OwnNow,
+    contacts_of_lines,
+    contacts_of_states,
+)
 from components.cdti.loss_area import lost_area
 from components.cdti.scope import Scope
+from components.messages.state_tracks import StateTracks
 from components.messages.tracks import Tracks
 from components.optical.silhouette import union_area
 from components.well_clear.volume import Volume, violates
@@ -88,8 +96,45 @@ def test_a_range_is_held_for_a_while_along_the_new_direction():
 
     held = after(3)
     assert held.ranged.tolist() == [True, False]
-    assert held.position_m[0] == pytest.approx([2000.0, 0.0, 1000.0], abs=1e-9)
+    there = pymap3d.enu2geodetic(2000.0, 0.0, 0.0, 0.0, 0.0, 1000.0)
+    assert held.position[0] == pytest.approx(np.array(there, dtype=float), abs=1e-6)
     assert after(5).ranged.tolist() == [False, False]
+
+
+@pytest.mark.parametrize("ranged", [True, False])
+def test_a_contact_dead_ahead_is_on_the_nose_however_far_the_start_is(ranged):
+    """300 km flown from where the tracker began at 60° N, where east is 4.6° off by then."""
+    lat, lon = vincenty.vreckon(60.0, 10.0, 300e3, 90.0)
+    _, back = vincenty.vdist(lat, lon, 60.0, 10.0)
+    nose = math.radians((back + 180.0) % 360.0)
+    own = OwnFlight()
+    own.now = OwnNow(float(lat), float(lon), 1000.0, nose, 0.0, 0.0, 100.0, 0.0)
+    there = pymap3d.enu2geodetic(
+        5000 * math.sin(nose), 5000 * math.cos(nose), 0.0, lat, lon, 1000.0
+    )
+    sight = np.array(pymap3d.geodetic2ned(*there, 60.0, 10.0, 1000.0)).astype(float)
+    here = np.array(pymap3d.geodetic2ned(lat, lon, 1000.0, 60.0, 10.0, 1000.0)).astype(float)
+    toward = sight - here
+    one, none = np.ones(1), np.zeros(1, dtype=np.int64)
+    message = StateTracks(
+        tick=none, offsets=np.array([0, 1]), track=none + 1, track_status=none + 1, existence=one,
+        azimuth_rad=one * math.atan2(toward[1], toward[0]),
+        elevation_rad=one * math.atan2(-toward[2], math.hypot(toward[0], toward[1])),
+        azimuth_variance_rad2=one, elevation_variance_rad2=one, has_range=np.array([ranged]),
+        age_s=one, state_s=one, updated_s=one, contributors=none, updated_by=none,
+        own_north_m=one, own_east_m=one, own_down_m=one, covariance={}, extras={}, sensors=(),
+        north_m=sight[:1], east_m=sight[1:2], down_m=sight[2:], north_m_s=one, east_m_s=one,
+        down_m_s=one, origin_lat_deg=60.0 * one, origin_lon_deg=10.0 * one,
+        origin_alt_m=1000.0 * one,
+    )  # fmt: skip
+    ((_, east, north, up, bearing, _),) = contacts_of_states(message, own, 1).shown(own.now, 2, 9)
+    assert bearing == pytest.approx(math.degrees(nose), abs=0.02)
+    if ranged:
+        assert math.degrees(math.atan2(east, north)) == pytest.approx(math.degrees(nose), abs=0.02)
+        assert math.hypot(east, north) == pytest.approx(5000.0, abs=1.0)
+        assert up == pytest.approx(there[2] - 1000.0, abs=0.1)
+    else:
+        assert east is north is up is None
 
 
 # -- the area in which separation would be lost ---------------------------------------------------

@@ -4,13 +4,13 @@ import asyncio
 import errno
 import resource
 import socket
-import time
 
 import pytest
 
 from components.cdti import server as server_module
 from components.cdti.page import Admission
 from components.cdti.server import MOST_CONNECTIONS, ConnectionLimit, DisplayServer
+from tests.support.waiting import WAIT_S, wait_for
 
 
 class NoControl:
@@ -32,7 +32,7 @@ def served(monkeypatch):
 def page_of(server, admission):
     """What a browser is answered, or nothing while there is no room."""
     host, port = server.authority.split(":")
-    with socket.create_connection((host, int(port)), timeout=5) as browser:
+    with socket.create_connection((host, int(port)), timeout=WAIT_S) as browser:
         browser.sendall(f"GET /?token={admission.token} HTTP/1.1\r\nHost: {host}:{port}\r\n"
                         "Connection: keep-alive\r\n\r\n".encode())  # fmt: skip
         try:
@@ -43,21 +43,18 @@ def page_of(server, admission):
 
 def flood(server, count):
     host, port = server.authority.split(":")
-    return [socket.create_connection((host, int(port)), timeout=5) for _ in range(count)]
+    return [socket.create_connection((host, int(port)), timeout=WAIT_S) for _ in range(count)]
 
 
 def test_connections_beyond_the_limit_are_dropped_and_places_come_back(served, capfd):
     server, admission, said = served
     some = flood(server, MOST_CONNECTIONS + 20)
-    time.sleep(0.2)
+    wait_for(lambda: said)
     assert page_of(server, admission) == b"" and len(said) == 1
     assert f"more than {MOST_CONNECTIONS} connections" in said[0]
     for one in some:
         one.close()
-    deadline = time.monotonic() + 5
-    while (answer := page_of(server, admission)) == b"" and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert answer == b"HTTP/1.1 200 OK"
+    assert wait_for(lambda: page_of(server, admission)) == b"HTTP/1.1 200 OK"
     assert len(said) == 1 and capfd.readouterr().err == ""
 
 
@@ -71,17 +68,14 @@ def test_a_flood_beyond_the_limit_of_open_files_is_one_line(served, capfd):
     try:
         for client in clients:
             client.connect((host, int(port)))
-        time.sleep(0.5)
+        wait_for(lambda: said)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
     for client in clients:
         client.close()
     assert len(said) == 1 and "files may be open" in said[0]
     assert "Traceback" not in capfd.readouterr().err
-    deadline = time.monotonic() + 5
-    while (answer := page_of(server, admission)) == b"" and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert answer == b"HTTP/1.1 200 OK"
+    assert wait_for(lambda: page_of(server, admission)) == b"HTTP/1.1 200 OK"
 
 
 @pytest.mark.parametrize("flooded", [True, False])

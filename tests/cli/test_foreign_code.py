@@ -70,11 +70,11 @@ def call(home: Path, *arguments: object, **environment: str) -> subprocess.Compl
     if not environment:
         words = ["-P", "-c", "from dsa_des.cli import main; main()", *arguments]
         safe = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-        return warm_process.run(words, cwd=home, env=safe, timeout=60)
+        return warm_process.run(words, cwd=home, env=safe, timeout=300)
     return subprocess.run(
         [sys.executable, "-P", "-c", "from dsa_des.cli import main; main()",
          *map(str, arguments)],
-        cwd=home, capture_output=True, text=True, timeout=60,
+        cwd=home, capture_output=True, text=True, timeout=300,
         env={**os.environ, "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1", **environment},
         check=False,
     )  # fmt: skip
@@ -274,7 +274,7 @@ def test_workers_run_nothing_of_the_working_directory(
     command = [sys.executable, str(program), "study", "s.toml", "--workers", "2", "--quiet"]
     plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
     done = subprocess.run([*command, "--out", str(tmp_path / "o")], cwd=shadows, env=plain,
-                          capture_output=True, text=True, timeout=100, check=False)  # fmt: skip
+                          capture_output=True, text=True, timeout=300, check=False)  # fmt: skip
     assert (done.returncode, ran(shadows)) == (0, []), done.stderr
 
 
@@ -297,7 +297,7 @@ print(len(dsa_des.study(scene, metrics=['first_detection'], replicas=2, workers=
     (tmp_path / "elsewhere").mkdir()
     plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
     done = subprocess.run([sys.executable, str(tmp_path / "script.py")], cwd=tmp_path / "elsewhere",
-                          capture_output=True, text=True, timeout=100, env=plain,
+                          capture_output=True, text=True, timeout=300, env=plain,
                           check=False)  # fmt: skip
     assert (done.stdout, ran(tmp_path)) == ("2\n", []), done.stderr
 
@@ -310,6 +310,6 @@ def test_the_program_run_as_a_module_runs_nothing_of_the_working_directory(shado
         (shadows / f"{name}.py").unlink(missing_ok=True)
     plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
     done = subprocess.run([sys.executable, "-m", "dsa_des", "check", "first_light"], cwd=shadows,
-                          capture_output=True, text=True, timeout=60, env=plain,
+                          capture_output=True, text=True, timeout=300, env=plain,
                           check=False)  # fmt: skip
     assert (done.returncode, ran(shadows)) == (0, []), done.stderr

@@ -23,7 +23,7 @@ COMPARISON = "from components.thesis.silhouette_comparison import main; sys.exit
 def limited(limit: int, *words: object, start: str = MAIN) -> subprocess.CompletedProcess[str]:
     """Call the program where no file may become longer than a limit, as on a full disk."""
     code = CODE.format(limit=limit, start=start)
-    return warm_process.run(["-B", "-c", code, *words], timeout=120)
+    return warm_process.run(["-B", "-c", code, *words], timeout=300)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import os
 import re
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from click.testing import CliRunner
 
 from dsa_des.cli import main
 from tests import warm_process
+from tests.support.waiting import wait_for
 
 #: A sensor that says when it is under way, and then takes as long as it is let.
 SLOW = """
@@ -56,11 +56,8 @@ def under_way(place: Path, *words: object, wait_in: str = "look") -> warm_proces
         cwd=place,
         env={**os.environ, "PYTHONPATH": path, "SLOW": wait_in},
     )
-    deadline = time.monotonic() + 60
-    while not sign.exists():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    if wait_for(lambda: "waits" if sign.exists() else process.poll() is not None) != "waits":
+        raise AssertionError(process.communicate())
     return process
 
 
@@ -79,7 +76,7 @@ def test_a_run_that_is_stopped_leaves_nothing(
     process = under_way(tmp_path, *words, wait_in=wait_in)
     assert len(list((tmp_path).glob("a/.*"))) == (wait_in == "look")
     process.send_signal(number)
-    _, stderr = process.communicate(timeout=60)
+    _, stderr = process.communicate()
     assert process.returncode == code, stderr
     assert [line for line in stderr.splitlines() if not re.match(r"note:|\d+ notes?: ", line)] == [
         f"stopped: {word}"
@@ -93,7 +90,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next_one_and_a_living_one_is_n
     words = ("run", configs / "first_light.toml", "--swap", "radar=slow:Slow")
     killed = under_way(tmp_path, *words)
     killed.kill()
-    killed.communicate(timeout=60)
+    killed.communicate()
     (left,) = os.listdir(tmp_path / "runs")
     living = under_way(tmp_path, *words)
     (at_work,) = os.listdir(tmp_path / "runs")
@@ -104,7 +101,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next_one_and_a_living_one_is_n
     assert CliRunner().invoke(main, plain, catch_exceptions=False).exit_code == 0
     assert sorted(os.listdir(tmp_path / "runs")) == [at_work, "first_light-001"]
     living.send_signal(signal.SIGTERM)
-    living.communicate(timeout=60)
+    living.communicate()
     assert os.listdir(tmp_path / "runs") == ["first_light-001"]
 
 
@@ -120,7 +117,7 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
     words = ("study", "study.toml", "--out", "o", "--workers", workers)
     process = under_way(tmp_path, *words)
     process.send_signal(number)
-    _, stderr = process.communicate(timeout=60)
+    _, stderr = process.communicate()
     assert process.returncode == code, stderr
     assert "--resume" in stderr and "Traceback" not in stderr
     assert not list((tmp_path / "o" / "parts").iterdir())

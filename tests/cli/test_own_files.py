@@ -200,10 +200,10 @@ def command(
     start = ["-m", "dsa_des"] if module else ["-P", "-c", "from dsa_des.cli import main; main()"]
     if not environment:
         safe = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-        return warm_process.run([*start, *words], cwd=home, env=safe, timeout=120)
+        return warm_process.run([*start, *words], cwd=home, env=safe, timeout=300)
     return subprocess.run(
         [sys.executable, *start, *map(str, words)], cwd=home, capture_output=True, text=True,
-        timeout=120, check=False,
+        timeout=300, check=False,
         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment},
     )  # fmt: skip
 

@@ -1,11 +1,13 @@
 """What a host may say, what it is told, and when sensors scan between its calls."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from components.embedding.planes import FixedPath
 from dsa_des.cli import main
 from dsa_des.embed import HostDriven, Simulator
 from dsa_des.errors import BlockFailure, SceneError, UsageError
@@ -364,3 +366,67 @@ def test_sensors_that_ask_for_flights_are_refused_when_the_host_sets_up(configs)
         (line,) = (line for line in said if f"blocks.radar.{key}" in line)
         assert line.endswith(f"set it to {off}")
     Simulator(configs / "first_light.toml", sets=[*sets, "blocks.radar.enabled=false"])
+
+
+def summed(step):
+    """Give instants as a host has them that adds up its steps."""
+    time_s = 0.0
+    while True:
+        yield time_s
+        time_s += step
+
+
+@pytest.mark.parametrize(
+    ("times", "hundredths", "calls"),
+    [
+        (summed(0.01), 1, 80_000),
+        (summed(0.05), 5, 80_000),
+        ((np.float32(k * 0.1) for k in itertools.count()), 10, 40_000),
+    ],
+    ids=["0.01 s", "0.05 s", "single precision"],
+)
+def test_a_host_that_adds_up_its_steps_makes_every_scan_at_its_own_call(
+    scene, times, hundredths, calls
+):
+    """Sums of floats leave the scans by more than half a tick from 709 s (1,152 s) on."""
+    rates = {"radar": 1, "eo": 2, "ir": 5}
+    simulator = Simulator(scene, sets=[
+        *(f"blocks.{name}.scan_rate_hz={rate}" for name, rate in rates.items()),
+        *(f"blocks.{name}.offset_s=0" for name in rates),
+    ])  # fmt: skip
+    simulator.start()
+    (chain,) = simulator._chains
+    most = 0.0
+    for call, time_s in zip(range(calls), times, strict=False):
+        at = call * hundredths
+        most = max(most, abs(float(time_s) - at / 100))
+        made = chain.due(chain.tick_of(time_s)).scans
+        assert set(made) == {n for n, rate in rates.items() if at % (100 // rate) == 0}, time_s
+    assert most > 0.5e-9  # else this shows nothing
+
+
+def test_sightings_are_those_of_a_host_that_counts_its_steps(scene):
+    """A million seconds in, sums of steps leave the ticks at once."""
+    simulators = [Simulator(scene) for _ in range(2)]
+    summed, seen = 1e6, ([], [])
+    for call in range(60):
+        for found, simulator, time_s in zip(
+            seen, simulators, (summed, 1e6 + call / 20), strict=True
+        ):
+            planes = np.tile((0.9 + 5e-5, 0.07, 1000.0), (len(simulator.planes), 1))
+            result = simulator.simulate(OWN, LEVEL, planes, np.tile(HEAD_ON, (len(planes), 1)),
+                                        time_s)  # fmt: skip
+            found.append((result.time_s, result.scans, result.detected.tolist()))
+        summed += 0.05
+    assert seen[0] == seen[1]
+    assert abs(summed - 1e6 - 3.0) > 0.5e-9
+
+
+def test_rows_of_a_path_begin_where_their_summed_times_were_meant():
+    times = np.cumsum(np.r_[0.0, np.full(80_000, 0.1)])
+    assert times[-1] > 8000.0
+    places = np.column_stack([0.9 + 1e-9 * np.arange(80_001), np.full((80_001, 2), (0.07, 1000.0))])
+    path = FixedPath(places, np.zeros(3), times)
+    for row in (1, 100, 70_900, 79_999):
+        assert path.at(row / 10)[0] == places[row, 0]
+        assert path.at(row / 10 - 1e-4)[0] == places[row - 1, 0]

@@ -5,11 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.stats import chisquare
 
 from components.encounters.model_file import ModelFileError, read_model
 from components.encounters.sampling import EncounterDraws, TrackSampler
-from tests.encounters.model_text import marginals, next_chances, slow_reading
+from dsa_des.cli import main
+from tests.encounters.model_text import (
+    BOUNDARIES,
+    marginals,
+    next_chances,
+    slow_reading,
+    small_model,
+)
 from tests.encounters.test_set_file import call
 
 INITIAL = ("A", "\\chi", "hmd", "vmd", "v_1", "v_2", "\\dot h_1", "\\dot h_2", "C_1")
@@ -164,3 +172,46 @@ def test_what_does_not_change_may_be_left_out_of_transitions(model: Path, tmp_pa
     other.write_text(text, encoding="utf-8")
     with pytest.raises(ModelFileError, match="needs 'C_1\\(t\\)' beside it"):
         read_model(other)
+
+
+def test_climbs_in_feet_per_second_and_turns_in_radians_are_taken_for_what_they_are(
+    tmp_path: Path,
+) -> None:
+    """As the published model of helicopter ambulances has its climbs."""
+    usual, other = tmp_path / "usual.txt", tmp_path / "other.txt"
+    usual.write_text(small_model(), encoding="utf-8")
+    per_second = " ".join(repr(float(edge) / 60) for edge in BOUNDARIES[3].split())
+    radians = " ".join(repr(float(np.radians(float(edge)))) for edge in BOUNDARIES[4].split())
+    text = small_model().replace(BOUNDARIES[3], per_second).replace(BOUNDARIES[4], radians)
+    other.write_text(text, encoding="utf-8")
+    tables, said = [], []
+    for path in (usual, other):
+        out = tmp_path / f"{path.stem}.csv"
+        done = call("sample", "--model", path, "--count", 30, "--duration-s", 20, "--out", out)
+        assert done.exit_code == 0, done.stderr
+        with out.open(encoding="utf-8") as file:
+            tables.append([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
+        said.append(done.stdout)
+    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=1e-9, abs=1e-6)
+    assert "note:" not in said[0]
+    assert "variable '\\dot h' is read in ft/s: its values reach 20 only" in said[1]
+    assert "variable '\\dot \\psi' is read in rad/s" in said[1]
+    out = tmp_path / "s.parquet"
+    done = call("generate", "--model", usual, "--intruder-model", other, "--count", 2, "--out", out)
+    assert f"note: {other}: variable '\\dot h' is read in ft/s" in done.stdout
+    traffic = f'type = "traffic.encounter_model"\nfile = "{other}"\nencounter = 1\n'
+    scene = tmp_path / "s.toml"
+    scene.write_text(f'extends = "detect_and_sense"\n[blocks.traffic]\n{traffic}', encoding="utf-8")
+    checked = CliRunner().invoke(main, ["check", str(scene)])
+    assert checked.exit_code == 0, checked.output
+    assert "variable '\\dot h' is read in ft/s" in checked.stderr
+
+
+def test_the_model_that_cannot_be_flown_is_named(model: Path, tmp_path: Path) -> None:
+    own, out = tmp_path / "own.txt", tmp_path / "s.parquet"
+    own.write_text(small_model(), encoding="utf-8")
+    for pair in ((own, model), (model, own)):
+        done = call("generate", "--model", pair[0], "--intruder-model", pair[1], "--count", 2,
+                    "--out", out)  # fmt: skip
+        assert done.exit_code == 2
+        assert f"error: {model}: the model has no variable 'v'" in done.stderr

@@ -19,14 +19,16 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 import dsa_des
-from components.display.recorded_run import RecordedTables
+from components.display.recorded_run import RecordedTables, tables_of
 from components.export.alert_levels import alerts_of
+from components.export.asterix_export import _state_tracks
 from components.export.command import export
 from components.export.flight_files import daa_text, xyz_text
 from components.formats.daa_file import read_daa
 from components.view.command import view
 from docs.make.reference import recorded_tables
 from dsa_des.errors import UsageError
+from tests.support.wired import chain
 from tests.view.test_page import SCENE
 
 NAME = "a<b&'c"
@@ -170,6 +172,61 @@ def test_velocities_of_xyz_are_along_the_axes_of_its_reference_point(tmp_path):
         assert float(row[3]) == truth["alt_m"][k]
 
 
+def axes(row):
+    """North, east and down of a place in Earth-centred axes, as columns, by pymap3d."""
+    place = row["lat_deg"], row["lon_deg"]
+    return np.array([pymap3d.enu2uvw(*v, *place) for v in np.eye(3)[[1, 0, 2]]]).T * [1, 1, -1]
+
+
+def moved_axes(start, row):
+    """What turns vectors north, east and down of a place into those of the start."""
+    return axes(start).T @ axes(row)
+
+
+def test_axes_far_from_the_start_are_those_of_the_start(tmp_path):
+    """After 100 km at 60° N: velocities, errors and attitudes are turned by 1.5°, not by none."""
+    reader = pytest.importorskip("mcap.reader", reason="needs the extra mcap")
+    sides = {"east_m": 0.0, "north_m": 3000.0, "up_m": 0.0}
+    level = {"heading_deg": 90.0, "speed_mps": 170.0}
+    radar = {
+        "type": "radar.range_boundary", "scan_rate_hz": 1, "range_km": 20.0, "errors": "stated",
+        "quantised": False, "azimuth_error_deg": 0.2, "elevation_error_deg": 1.0,
+        "range_error_m": 1.0,
+    }  # fmt: skip
+    scene = chain(
+        {"radar": radar}, duration_s=600, targets=[{"name": "beside", **sides, **level}],
+        ownship={"lat_deg": 60.0, "lon_deg": 10.0, "alt_m": 1000.0, **level},
+        fusion={"type": "fusion.pass_through"}, record={"truth": True},
+        tracker={"type": "tracking.ekf"},
+    )  # fmt: skip
+    dsa_des.run(scene, out=tmp_path / "far")
+    truth = pq.read_table(tmp_path / "far" / "truth.parquet").to_pylist()
+    own = [row for row in truth if row["target"] is None]
+    assert call(tmp_path / "far", "--to", "mcap", "--out", tmp_path / "far.mcap").exit_code == 0
+    with open(tmp_path / "far.mcap", "rb") as stream:
+        poses = [
+            json.loads(message.data)["pose"]["orientation"]
+            for _, channel, message in reader.make_reader(stream).iter_messages()
+            if channel.topic == "/aircraft/ownship/pose"
+        ]
+    nose = Rotation.from_quat([poses[-1][axis] for axis in "xyzw"]).apply([1.0, 0.0, 0.0])
+    start, last = own[0], own[-1]
+    along = np.array([last[f"velocity_{axis}_m_s"] for axis in ("north", "east", "down")])
+    turned = moved_axes(start, last) @ along
+    assert math.degrees(math.atan2(turned[0], turned[1])) == pytest.approx(0.0, abs=0.01)
+    assert nose == pytest.approx(turned[[1, 0, 2]] * [1, 1, -1] / np.linalg.norm(turned), abs=1e-4)
+    # Of an estimated track, as ASTERIX has it: north where it is, and errors along its axes.
+    found = list(_state_tracks(tables_of(tmp_path / "far"), {"tracker": 1}))
+    values = [one.values for one in found if not (one.values["tentative"] or one.values["last"])][
+        -1
+    ]
+    course = math.degrees(math.atan2(values["velocity_east_m_s"], values["velocity_north_m_s"]))
+    beside = [row for row in truth if row["target"] == "beside"][-1]
+    wanted = math.degrees(math.atan2(beside["velocity_east_m_s"], beside["velocity_north_m_s"]))
+    assert wanted - 90.0 > 1.4 and course == pytest.approx(wanted, abs=0.4)
+    assert values["velocity_up_m_s"] == pytest.approx(0.0, abs=3.0)
+
+
 def test_mcap_opens_in_its_own_reader(run, tmp_path):
     reader = pytest.importorskip("mcap.reader", reason="needs the extra mcap")
     path = tmp_path / "run.mcap"
@@ -204,7 +261,7 @@ def test_mcap_opens_in_its_own_reader(run, tmp_path):
         # Axes forward, right and down in north, east and down, as the run has them.
         ned = Rotation.from_euler("ZYX", angles).as_matrix()
         flip = np.diag([1.0, -1.0, -1.0])
-        enu = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]) @ ned @ flip
+        enu = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]) @ moved_axes(own[0], row) @ ned @ flip
         assert turn.as_matrix() == pytest.approx(enu, abs=1e-9)
     balls = found["/detections", "foxglove.SceneUpdate"]
     sphere = balls[0][1]["entities"][0]["spheres"][0]["pose"]["position"]

@@ -35,7 +35,7 @@ def say(content):
 
 
 if WAY == "deaf":
-    time.sleep(60)
+    time.sleep(600)
 if WAY == "chatty":
     sys.stderr.write("x" * 300_000 + "\n")
 call()
@@ -58,10 +58,10 @@ while True:
             os.kill(os.getpid(), signal.SIGSEGV)
         if WAY in ("hang", "children"):
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+            child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
             (FOLDER / "child").write_text(str(child.pid))
             if WAY == "hang":
-                time.sleep(60)
+                time.sleep(600)
         if WAY == "garbage":
             say(b"Hello, world! This is no message.")
         if WAY == "no_arrow":
@@ -72,7 +72,7 @@ while True:
             os._exit(0)
         if WAY == "more":
             say(END + b"and more")
-            time.sleep(60)
+            time.sleep(600)
         if WAY == "slow":
             time.sleep(0.3)
         if WAY == "table":

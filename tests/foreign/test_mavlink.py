@@ -196,17 +196,19 @@ def test_over_the_loopback_it_is_the_same_flight(monkeypatch):
     autopilot.start()
     try:
         address = f"127.0.0.1:{port}"
-        far = dsa_des.run(scene(address=address, local_port=local, answer_s=20, lost_s=60))
+        far = dsa_des.run(scene(address=address, local_port=local, answer_s=60, lost_s=600))
     finally:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
             end.sendto(b"", ("127.0.0.1", port))
-        autopilot.join(20.0)
+        autopilot.join(300.0)
     assert not autopilot.is_alive() and ("127.0.0.1", local) in senders
     for table in ("truth", "autopilot", "manoeuvres"):
         assert far[table].to_pylist() == near[table].to_pylist()
 
 
-def test_tracks_are_carried_on_to_the_instant():
+@pytest.mark.parametrize("away_m", [900.0, 200_000.0])
+def test_tracks_are_carried_on_to_the_instant(away_m):
+    """Their velocities are along the axes of where they are, not of their frame's origin."""
     count = 3
     zero, whole = np.zeros(count), np.zeros(count, dtype=np.int64)
     message = StateTracks(
@@ -215,14 +217,20 @@ def test_tracks_are_carried_on_to_the_instant():
         azimuth_variance_rad2=zero, elevation_variance_rad2=zero,
         has_range=np.array([True, True, False]), age_s=zero, state_s=zero + 7.0, updated_s=zero,
         contributors=whole, updated_by=whole, own_north_m=zero, own_east_m=zero, own_down_m=zero,
-        covariance={}, extras={}, sensors=(), north_m=zero + 900, east_m=zero - 400,
+        covariance={}, extras={}, sensors=(), north_m=zero + 900, east_m=zero - away_m,
         down_m=zero - 30, north_m_s=zero - 50, east_m_s=zero + 20, down_m_s=zero + 2,
         origin_lat_deg=zero - 33.9, origin_lon_deg=zero - 179.999, origin_alt_m=zero + 100,
     )  # fmt: skip
+    assert mavlink._tracks(message, np.array([0]), 30.5) == []  # of half a minute ago
     (track,) = mavlink._tracks(message, np.array([0]), 9.5)
-    where = pymap3d.ned2geodetic(900 - 125, -400 + 50, -30 + 5, -33.9, -179.999, 100)
+    assert track.age_s == 9.5
+    origin = -33.9, -179.999, 100
+    where = pymap3d.ned2geodetic(900 - 125, 50 - away_m, -30 + 5, *origin)
+    later = pymap3d.ned2geodetic(900 - 175, 70 - away_m, -30 + 7, *origin)
+    moves = track.north_mps, track.east_mps, track.down_mps
+    assert moves == pytest.approx(pymap3d.geodetic2ned(*later, *where), abs=1e-3)
     assert (track.number, track.name) == (4, "T4")
-    assert (track.lat_deg, track.alt_m) == pytest.approx((where[0], where[2]), abs=1e-6)
+    assert (track.lat_deg, track.alt_m) == pytest.approx((where[0], where[2]), abs=1e-5)
     assert (track.lon_deg - where[1] + 180) % 360 - 180 == pytest.approx(0.0, abs=1e-9)
 
 

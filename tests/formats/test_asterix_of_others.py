@@ -184,6 +184,9 @@ def test_plots_without_a_height_are_left_out_and_counted(tmp_path):
     path.write_bytes(north(99.0, PLACE) + FIRST + FIRST + plot(100.2, 20, 10) + SECOND)
     run = dsa_des.run(scene_of(path, tmp_path))
     assert run.detections.num_rows == 4
+    # Whose plots these are nobody says: they are no false alarms.
+    radar = run.info["summary"]["sensors"]["radar"]
+    assert (radar["detections"], radar["false_alarms"], radar["unnamed_detections"]) == (0, 0, 4)
     notes = [note for note in run.info["notes"] if "file:" in note]
     assert "2 records stand there again and count once" in notes[0]
     assert "1 of 5 plots have no height and are left out" in notes[1]

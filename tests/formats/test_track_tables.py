@@ -151,3 +151,14 @@ def test_what_is_wrong_names_file_and_line_and_can_be_skipped(tmp_path: Path) ->
     assert "MATLAB's class 'ScriptedEncounter'" in refused(tmp_path / "object.mat")
     savemat(tmp_path / "back.mat", {"a": matrix(1)[:, ::-1], "b": matrix(2)})
     assert "aircraft 1: times must rise" in refused(tmp_path / "back.mat")
+
+
+def test_a_matlab_file_of_version_7_3_is_called_that(tmp_path: Path) -> None:
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    hdf5 = b"\x89HDF\r\n\x1a\n" + bytes(400)
+    for content in (head.ljust(512, b"\0") + hdf5, hdf5):
+        (tmp_path / "t.mat").write_bytes(content)
+        done = call("convert", tmp_path / "t.mat", "--out", tmp_path / "s.parquet")
+        assert done.exit_code == 2
+        assert "is a MATLAB 7.3 file (HDF5), which is not read: save it" in done.stderr
+        assert "cut off" not in done.stderr

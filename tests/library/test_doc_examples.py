@@ -25,7 +25,7 @@ def test_there_are_three():
 @pytest.mark.slow
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_it_runs_anywhere(script, tmp_path):
-    done = warm_process.run([script], cwd=tmp_path, timeout=120)
+    done = warm_process.run([script], cwd=tmp_path, timeout=300)
     assert (done.returncode, done.stderr) == (0, "")
     assert SAID[script.stem] in done.stdout
     assert (tmp_path / "plan.png").exists() == (script.stem == "scene_in_python")
@@ -54,7 +54,7 @@ def test_types_hold_for_strict_checkers(tmp_path):
         env={**os.environ, "MYPYPATH": str(ROOT), "PYTHONPATH": ""},
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=300,
     )
     lines = done.stdout.splitlines()
     revealed = [line.partition("Revealed type is ")[2] for line in lines if "Revealed" in line]
@@ -72,6 +72,6 @@ def test_the_first_snippet_of_the_page_leaves_nothing_behind(tmp_path):
     text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
     snippet = text.partition("```python\n")[2].partition("```")[0]
     assert "dsa_des.study(" in snippet
-    done = warm_process.run(["-c", snippet], cwd=tmp_path, timeout=120)
+    done = warm_process.run(["-c", snippet], cwd=tmp_path, timeout=300)
     assert (done.returncode, done.stderr) == (0, "")
     assert "detections" in done.stdout and not list(tmp_path.iterdir())

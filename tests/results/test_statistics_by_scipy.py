@@ -25,6 +25,19 @@ def test_a_mean_has_student_s_interval(count, confidence):
     assert found.few is (count < FEW == 10)
 
 
+@pytest.mark.parametrize("method", ["t", "bootstrap"])
+def test_means_and_differences_of_the_largest_numbers_are_those_of_small_ones(method):
+    """Times a power of two, which changes no digit; sums of such values are beyond the largest."""
+    large = 2.0**1019
+    small, found = (mean(unit * NORMAL, 0.95, method) for unit in (1.0, large))
+    assert [large * end for end in (small.value, small.low, small.high)] == [
+        found.value, found.low, found.high,
+    ]  # fmt: skip
+    plain, far = (difference(unit * NORMAL, unit * OTHER, 0.95, method) for unit in (1.0, large))
+    assert far.paired.half_width == large * plain.paired.half_width
+    assert far.unpaired.half_width == large * plain.unpaired.half_width
+
+
 @pytest.mark.parametrize("second", [OTHER, WIDE])
 def test_a_difference_is_the_second_less_the_first_paired_and_not(second):
     found = difference(NORMAL, second, 0.95)

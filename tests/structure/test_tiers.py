@@ -37,10 +37,6 @@ def test_a_list_is_sorted_and_has_no_doubles(tier: str) -> None:
     assert sorted(set(LISTED[tier])) == LISTED[tier]
 
 
-def test_no_line_stands_in_both_lists() -> None:
-    assert not set(LISTED["slow"]) & set(LISTED["exhaustive"])
-
-
 @pytest.mark.parametrize("tier", TIERS)
 def test_what_is_listed_is_marked(tier: str, request: pytest.FixtureRequest) -> None:
     for item in request.session.items:

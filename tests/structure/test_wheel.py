@@ -26,7 +26,7 @@ def test_the_wheel_holds_the_packages_and_the_scenes_and_nothing_else(tmp_path: 
     built = subprocess.run(
         [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index", "--no-build-isolation",
          "--disable-pip-version-check", "--wheel-dir", str(tmp_path), str(ROOT)],
-        capture_output=True, text=True, timeout=120, check=False,
+        capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert built.returncode == 0, built.stderr
     (wheel,) = tmp_path.glob("dsa_des-*.whl")

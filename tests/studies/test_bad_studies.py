@@ -150,7 +150,8 @@ def test_dask_must_be_there(small: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     words = ("study.toml", "--executor", "dask", "--scheduler", "tcp://127.0.0.1:9")
     assert "pip install 'dsa-des[dask]'" in refused(*words)
-    assert "needs --scheduler" in refused("study.toml", "--executor", "dask")
+    said = refused("study.toml", "--executor", "dask")
+    assert "needs --scheduler" in said and "`dask scheduler`" in said and "`dask worker" in said
 
 
 def test_folders_that_hold_something_else(small: Path) -> None:

@@ -126,7 +126,7 @@ def test_spoofed_aircraft_are_where_they_say(scene):
 def test_stated_variances_are_those_of_the_errors(scene):
     quality = "ads_b = {{ nacp = {}, nacv = 2 }}"
     off = {"azimuth": [], "elevation": [], "range": []}
-    for seed in range(30):
+    for seed in range(60):
         loaded = scene(kea=quality.format(7), moa=quality.format(9), seed=seed, duration_s="6")
         for name in ("kea", "moa"):
             seen = reports(recorded(loaded), name)[-1:]

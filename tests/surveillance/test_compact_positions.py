@@ -118,9 +118,9 @@ def test_velocities_decode_to_whole_knots():
 
 def test_what_no_message_can_hold_is_refused():
     with pytest.raises(
-        ValueError, match=r"altitude_ft is 60000: it must lie in \[-1000, 50187.5\]"
+        ValueError, match=r"altitude_ft is 130000: it must lie in \[-1200, 126700\]"
     ):
-        position_messages(1, 0.0, 0.0, 60000.0, False)
+        position_messages(1, 0.0, 0.0, 130000.0, False)
     with pytest.raises(ValueError, match="lat_deg is 91: it must lie in"):
         encode([91.0], [0.0], False)
     with pytest.raises(ValueError, match="nic is 12: it must lie in"):

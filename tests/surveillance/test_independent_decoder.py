@@ -122,3 +122,44 @@ def test_velocities_are_read_as_they_were_sent():
         ]
         assert abs(read[0] - north) <= 0.5 and abs(read[1] - east) <= 0.5
         assert abs(read[2] - climb) <= 32.0
+
+
+def gray_sequence(bits):
+    """Gray's code, by reflecting the list of one bit less."""
+    found = [""]
+    for _ in range(bits):
+        found = ["0" + one for one in found] + ["1" + one for one in reversed(found)]
+    return found
+
+
+def test_altitudes_beyond_the_code_of_25_ft_are_in_gillham_s():
+    """Rows of 500 ft by reflection, 100 ft to and fro within them: -1,200 to 126,700 ft."""
+    within = ["001", "011", "010", "110", "100"]  # C1 C2 C4 of -200 to 200 ft about the row
+    known = {}
+    for row, code in enumerate(gray_sequence(8)):
+        for place, hundreds in enumerate(within if row % 2 == 0 else within[::-1]):
+            known[code + hundreds] = 500 * row + 100 * place - 1200
+    assert sorted(known.values()) == list(range(-1200, 126_701, 100))
+    rng = np.random.default_rng(8)
+    sought = [-1200.0, -1100.0, 50_200.0, 60_000.0, 126_700.0]
+    sought += rng.uniform(50_188.0, 126_700.0, 200).tolist()
+    for feet in sought:
+        message = int.from_bytes(
+            bytes(position_messages([0xABCDEF], [48.0], [11.0], [feet], [False])[0]), "big"
+        )
+        assert remainder(message) == 0
+        twelve = f"{field(message, 40, 12):012b}"
+        c1, a1, c2, a2, c4, a4, b1, q, b2, d2, b4, d4 = twelve
+        assert q == "0"
+        assert abs(known[d2 + d4 + a1 + a2 + a4 + b1 + b2 + b4 + c1 + c2 + c4] - feet) <= 50.0
+
+
+def test_fast_aircraft_send_the_supersonic_velocity():
+    for north, east, exact in [(1166.3, -3.0, 4), (-640.0, 2200.0, 4), (1021.4, -1021.0, 1)]:
+        message = int.from_bytes(
+            bytes(velocity_messages([0xABCDEF], [north], [east], [0.0], nacv=2)[0]), "big"
+        )
+        assert field(message, 37, 3) == (2 if exact == 4 else 1)
+        for value, sign, first in ((north, 56, 57), (east, 45, 46)):
+            read = exact * (field(message, first, 10) - 1) * (-1 if field(message, sign, 1) else 1)
+            assert abs(read - value) <= 0.5 * exact

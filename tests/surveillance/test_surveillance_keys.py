@@ -7,6 +7,7 @@ from covering import covers
 from wired import chain, rows, run, sensor
 
 import dsa_des
+from dsa_des.running.simulation import Simulation
 
 KINDS = ("surveillance.ads_b", "surveillance.active")
 EXACT = {
@@ -171,6 +172,29 @@ def test_reception():
     assert count["do_365", 30e3] < count["fitted", 50e3] < count["certain", 50e3]
 
 
+@covers("aircraft_around", "airports_around", of=("surveillance.ads_b",))
+def test_traffic_around_garbles_messages():
+    """At 100 nmi fewer messages come through amid more aircraft, and the law says how many."""
+    x = 185_200.0 / (290.0 * 1852.0)
+
+    def received(aircraft, airports):
+        found = fleet("surveillance.ads_b", {"ads_b": {}}, place_m=(185_200.0, 0.0), scan_rate_hz=5,
+                      duration_s=300, aircraft_around=aircraft, airports_around=airports,
+                      reception="fitted")  # fmt: skip
+        return len({row["reported_s"] for row in found})
+
+    for aircraft, airports, factors in (
+        (50, 50, (-1.80, 11.96, -23.27, 20.30)),
+        (95, 50, (-2.754, 15.3035, -30.173, 24.701)),
+        (250, 50, (-6.04, 26.82, -53.95, 39.86)),
+        (95, 40, (-4.371, 24.4585, -51.526, 40.351)),
+    ):
+        sums = 1.0 + sum(factor * x**n for n, factor in enumerate(factors, 1))
+        p = np.clip(np.exp(-3.0 * x**2) * sums, 0.0, 1.0)
+        count = received(aircraft, airports)
+        assert abs(count - 600 * p) < 4.0 * np.sqrt(600 * p * (1.0 - p)) + 5.0
+
+
 @covers("position_errors", "compact", of=("surveillance.ads_b",))
 def test_errors_of_broadcasts():
     """At rest, what changes from message to message are new errors and the rounding."""
@@ -229,3 +253,12 @@ def test_planes_of_a_host_have_no_equipage(key):
         assert [problem.key for problem in e.value.problems] == [
             f"blocks.traffic.planes[0].{first}"
         ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_range_rates_are_offered_by_whoever_reports_them(kind):
+    """An aircraft broadcasts its velocity; a transponder's reply has none."""
+    offer = Simulation(dsa_des.load_scene(scene(kind))).components["sensor"].offer("detections")
+    rates = [row["range_rate_m_s"] for row in rows(run(scene(kind)), scan=2)]
+    assert rates and offer.measures_range_rate is (kind == "surveillance.ads_b")
+    assert {rate is not None for rate in rates} == {offer.measures_range_rate}

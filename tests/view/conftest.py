@@ -4,6 +4,8 @@ import shutil
 
 import pytest
 
+from tests.support.waiting import WAIT_S
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -12,6 +14,7 @@ def browser():
     if chromium is None:
         pytest.skip("needs a Chromium: there is no program chromium")
     with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        launched = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"],
+                                                timeout=1000 * WAIT_S)  # fmt: skip
         yield launched
         launched.close()

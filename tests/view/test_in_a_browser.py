@@ -8,6 +8,7 @@ from click.testing import CliRunner
 import dsa_des
 from components.examples import folder
 from components.view.command import view
+from tests.support.waiting import WAIT_S
 from tests.view.test_page import SCENE, luminance
 
 FADE_S = 4.0
@@ -101,12 +102,7 @@ def test_it_plays_at_a_speed_and_pauses(page):
     page.locator("#plan").focus()
     page.keyboard.press("Home")
     page.keyboard.press(" ")
-    for _ in range(100):
-        page.wait_for_timeout(50)
-        if page.evaluate("App.state().t") > 2:
-            break
-    assert page.evaluate("App.state().t") > 2
-    assert page.evaluate("App.state().playing")
+    page.wait_for_function("App.state().t > 2 && App.state().playing", timeout=1000 * WAIT_S)
     page.keyboard.press(" ")
     stopped = page.evaluate("App.state().t")
     page.wait_for_timeout(120)

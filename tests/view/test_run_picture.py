@@ -187,7 +187,8 @@ def test_tables_and_what_is_said_of_the_run_go_through(picture):
     bands = picture.tables["bands"]
     assert bands["region"].tolist() == [1, 0]
     for name in ("time_s", "low_rad", "high_rad", "low_m", "high_m"):
-        assert bands[name].tolist() == TABLES["bands"][name]
+        # Directions are turned from the north of where the ownship was into the plane's.
+        assert bands[name].tolist() == pytest.approx(TABLES["bands"][name], abs=1e-4)
 
 
 def test_fields_of_view_are_round_the_nose_and_a_sweep_takes_a_scan(picture):
@@ -240,7 +241,8 @@ def test_states_of_tracks_are_brought_into_the_plane(tmp_path):
         ("variance_north_m2", "covariance_00_m2"), ("variance_east_m2", "covariance_11_m2"),
         ("covariance_m2", "covariance_01_m2"),
     ):  # fmt: skip
-        assert found[mine].tolist() == state[theirs][:3]
+        # Its frame begins 1 km beside the plane: north there is turned by 0.4 minutes of arc.
+        assert found[mine].tolist() == pytest.approx(state[theirs][:3], abs=5e-3)
     for row in (0, 1):
         place = [state[name][row] for name in ("east_m", "north_m", "down_m")]
         at = pymap3d.enu2geodetic(place[0], place[1], -place[2], *origin.values())
@@ -253,6 +255,34 @@ def test_states_of_tracks_are_brought_into_the_plane(tmp_path):
         start = pymap3d.geodetic2enu(*here, *PLANE)
         assert found["from_east_m"][row] == pytest.approx(start[0], abs=2e-3)
         assert found["from_north_m"][row] == pytest.approx(start[1], abs=2e-3)
+
+
+def test_far_from_the_start_north_is_another_direction(tmp_path):
+    """A track's frame two degrees east of the plane: what moves north there moves aside here."""
+    origin = {"origin_lat_deg": -41.3, "origin_lon_deg": -178.02, "origin_alt_m": 2000.0}
+    state = {
+        "north_m": [0.0], "east_m": [0.0], "down_m": [0.0], "north_m_s": [60.0], "east_m_s": [0.0],
+        "covariance_00_m2": [400.0], "covariance_01_m2": [0.0], "covariance_11_m2": [100.0],
+        "azimuth_rad": [0.0],
+    }  # fmt: skip
+    told = {**state, "track": [1], "time_s": [2.0], "track_status": ["confirmed"],
+            **{name: [value] for name, value in origin.items()}}  # fmt: skip
+    wanted = {name: TABLES[name] for name in ("scans", "detections", "truth")}
+    found = picture_of(tmp_path, {**wanted, "state_tracks": told}).tables["tracks"]
+    here = tuple(origin.values())
+    start = pymap3d.geodetic2enu(*here, *PLANE)
+    end = pymap3d.geodetic2enu(*pymap3d.enu2geodetic(0.0, 60.0, 0.0, *here), *PLANE)
+    east, north = (float(b - a) for a, b in zip(start[:2], end[:2], strict=True))
+    assert math.degrees(math.atan2(east, north)) == pytest.approx(1.32, abs=0.1)
+    assert found["east_mps"][0] == pytest.approx(east, abs=0.05)
+    assert found["north_mps"][0] == pytest.approx(north, abs=0.05)
+    assert found["bearing_rad"][0] == pytest.approx(math.atan2(east, north), abs=1e-3)
+    along = np.array([east, north]) / math.hypot(east, north)
+    spread = np.array([
+        [found["variance_east_m2"][0], found["covariance_m2"][0]],
+        [found["covariance_m2"][0], found["variance_north_m2"][0]],
+    ])  # fmt: skip
+    assert along @ spread @ along == pytest.approx(400.0, abs=0.5)
 
 
 def test_a_recorded_encounter_is_in_its_own_plane_and_time(tmp_path):

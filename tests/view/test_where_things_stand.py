@@ -14,6 +14,7 @@ from components.examples import folder
 from components.view.command import view
 from tests.results.test_study_report import call
 from tests.results.test_study_report import folder as studied
+from tests.support.waiting import wait_for
 from tests.view.test_page import SCENE
 
 study = studied
@@ -239,33 +240,51 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
     def both(script):
         return [frame.evaluate(script) for frame in (left, right)]
 
-    assert both("App.state().t") == [2.5, 2.5]
+    def come_to(script, *wanted):
+        """What is done in one is told to the other, which takes its time."""
+        wait_for(lambda: both(script) == list(wanted))
+
+    come_to("App.state().t", 2.5, 2.5)
+    # Keys are heard before anything was clicked; what is shown can be chosen above the footer.
+    page.keyboard.press("Home")
+    come_to("App.state().t", 0.0, 0.0)
+    page.evaluate("document.activeElement.blur()")
+    page.evaluate("window.focus()")
+    page.keyboard.press("End")
+    come_to("App.state().t", 9.0, 9.0)
+    left.evaluate("App.seek(2.5)")
+    come_to("App.state().t", 2.5, 2.5)
+    bottoms = both(
+        "[document.querySelector('#layers').getBoundingClientRect().bottom,"
+        " document.querySelector('footer').getBoundingClientRect().top]"
+    )
+    assert all(layers <= footer for layers, footer in bottoms)
     counts = both("App.state().detections.length")
     assert counts[0] > counts[1]  # each shows its own run
-    assert len(set(both("Plan.view.perPixel"))) == 1
+    wait_for(lambda: len(set(both("Plan.view.perPixel"))) == 1)
     # What is done in one is done in both, from either side; time goes to the end of the longer.
     right.locator("#plan").focus()
     page.keyboard.press("End")
-    assert both("App.state().t") == [9.0, 9.0]
+    come_to("App.state().t", 9.0, 9.0)
     before = both("Plan.view.perPixel")
     page.keyboard.press("+")
-    assert both("Plan.view.perPixel") == pytest.approx([before[0] / 1.4] * 2)
+    wait_for(lambda: both("Plan.view.perPixel") == pytest.approx([before[0] / 1.4] * 2))
     page.keyboard.press("n")
     page.keyboard.press("d")
-    assert both("App.options.headingUp") == [True, True]
-    assert len(set(both("document.documentElement.dataset.theme"))) == 1
+    come_to("App.options.headingUp", True, True)
+    wait_for(lambda: len(set(both("document.documentElement.dataset.theme"))) == 1)
     left.select_option("#speed", "10")
     right.evaluate("App.seek(1)")
+    come_to("App.state().t", 1.0, 1.0)
     right.locator("#plan").focus()
     page.keyboard.press(" ")
-    for _ in range(100):
-        page.wait_for_timeout(50)
-        if left.evaluate("App.state().t") > 2:
-            break
+    wait_for(lambda: left.evaluate("App.state().t") > 2)
     page.keyboard.press(" ")
-    times = both("App.state().t")
-    assert times[0] == times[1] > 2 and both("App.state().playing") == [False, False]
+    come_to("App.state().playing", False, False)
+    wait_for(lambda: len(set(both("App.state().t"))) == 1)
+    assert left.evaluate("App.state().t") > 2
     right.evaluate("App.seek(3)")
+    come_to("App.state().t", 3.0, 3.0)
     left.locator("#link").click()
     assert page.url.endswith("#t=3&up=heading")
     assert wrong == []

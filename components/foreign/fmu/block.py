@@ -121,7 +121,9 @@ class ForeignFmu(Component):
                 "a sensor needs to know where aircraft are between instants, as beam_sweep and "
                 "measures_range_rate do: an FMU says where the ownship is at instants only"
             )
-        spec = wiring.spec(self.name, self.context.ticks_per_s)
+        #: Whether its state is saved: where nothing goes back it need not be.
+        self._saves = type(self).rewindable and self.context.rewinds
+        spec = wiring.spec(self.name, self.context.ticks_per_s, rewinds=self._saves)
         self._process = process_for(model.path, alone=model.alone)
         self._number = self._process.open(spec, self.p.deadline_s)
         self._freed: Any = _Shared()
@@ -153,6 +155,11 @@ class ForeignFmu(Component):
                         f"{key}: {block!r} gives no {column!r}{did_you_mean(column, offer)}"
                     )
                 self.p.model.converted(offer[column], variable)
+
+    def warnings(self) -> list[str]:
+        """Say that its communication points are not where its solver's steps are."""
+        said = self.p.step_that_does_not_fit()
+        return [] if said is None else [said]
 
     def close(self) -> None:
         """End the FMU's process: the simulation is over."""
@@ -186,11 +193,11 @@ class ForeignFmu(Component):
                 "do": "run", "instance": self._number, "slot": self._saved.slot, "freed": freed,
                 "ticks": wake.ticks[own].tolist(), "per_s": wake.ticks_per_s,
                 "inputs": rows, "changed": changed.tolist(), "due": [due[row] for row in own],
-                "save": type(self).rewindable,
+                "save": self._saves,
             },
             self.p.deadline_s,
         )  # fmt: skip
-        if type(self).rewindable:
+        if self._saves:
             self._saved = _Saved(answer["slot"], self._freed.slots)
         own = own[: answer["done"]]
         if len(own) == 0:

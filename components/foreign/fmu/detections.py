@@ -16,7 +16,7 @@ from components.foreign.fmu.model import TEXT_KINDS, FmuModel
 from components.foreign.reported_look import TRUE_LINE, reported_looks
 from components.geometry import wrap_pi
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
-from components.messages.detections import Detections, SensorOffer
+from components.messages.detections import Detections, SensorOffer, promises_of_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
@@ -175,7 +175,8 @@ class DetectionOutputs:
         return SensorOffer(
             "range_m" in self._columns, math.sqrt(12.0 * max(angles)),
             "range_rate_m_s" in self._columns,
-            clock=None if clock is None else lambda: clock, **same,
+            clock=None if clock is None else lambda: clock,
+            promises=() if clock is None else promises_of_looks(float(clock.period_s)), **same,
         )  # fmt: skip
 
     def roster(self, known: Sequence[Roster]) -> Roster:

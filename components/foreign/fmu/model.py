@@ -1,7 +1,9 @@
 """What an FMU says of itself: variables, units, clocks; read from its file, nothing is run."""
 
+import math
 import xml.etree.ElementTree as ElementTree
 import zipfile
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -88,8 +90,8 @@ class FmuModel:
     rewindable, alone, varying_steps, events : bool
         Whether its state can be saved; whether a process can hold one instance only; whether steps
         may differ in length; whether it has an event mode.
-    step_s : Fraction or None
-        Of its default experiment.
+    step_s, internal_step_s : Fraction or None
+        Of its default experiment, and the fixed one that it takes inside.
     """
 
     path: Path
@@ -102,6 +104,7 @@ class FmuModel:
     varying_steps: bool
     events: bool
     step_s: Fraction | None
+    internal_step_s: Fraction | None
     variables: Mapping[str, Variable]
     scales: Mapping[str, Scale | None]
     clocks: Mapping[str, PartitionClock] = field(default_factory=dict)
@@ -175,25 +178,63 @@ def read_fmu(path: Path) -> FmuModel:
             "co-simulation (or, FMI 3, scheduled execution)"
         )
     wanted = fmpy.platform_tuple if version == 3 else fmpy.platform
-    library = f"binaries/{wanted}/{interface.modelIdentifier}{fmpy.sharedLibraryExtension}"
-    if library not in names:
-        there = sorted({name.split("/")[1] for name in names if name.startswith("binaries/")})
-        there = [name for name in there if name]
-        raise ValueError(
-            f"{path} holds no library for {wanted}, only for {', '.join(there) or 'no platform'}"
-        )
+    _check_library(path, names, wanted, interface.modelIdentifier + fmpy.sharedLibraryExtension)
     step = said.defaultExperiment.stepSize if said.defaultExperiment else None
+    inside = getattr(interface, "fixedInternalStepSize", None)
     everything = said.modelVariables
+    _check_variables(path, everything)
     return FmuModel(
         path, version, kind, interface.modelIdentifier,
         said.guid if version == 2 else said.instantiationToken,
         bool(interface.canGetAndSetFMUstate), bool(interface.canBeInstantiatedOnlyOncePerProcess),
         kind == "se" or bool(interface.canHandleVariableCommunicationStepSize),
         version == 3 and kind == "cs" and bool(interface.hasEventMode),
-        None if step is None else Fraction(str(step)),
+        _exact(step), _exact(inside),
         {v.name: _variable(v, version, everything) for v in everything if v.type != "Clock"},
         {unit.name: _scale(unit) for unit in said.unitDefinitions}, clocks, raised, terminals,
     )  # fmt: skip
+
+
+def _exact(step_s: Any) -> Fraction | None:
+    return None if step_s is None else Fraction(str(step_s))
+
+
+def _check_library(path: Path, names: list[str], wanted: str, library: str) -> None:
+    """Raise ValueError where an FMU holds no library that can run here: what it holds instead."""
+    if f"binaries/{wanted}/{library}" in names:
+        return
+    there = [name.split("/") for name in names if name.startswith("binaries/")]
+    beside = sorted({parts[2] for parts in there if parts[1] == wanted and len(parts) > 2} - {""})
+    if beside:
+        raise ValueError(
+            f"{path} holds no binaries/{wanted}/{library}, which its description names, but "
+            f"{', '.join(beside)}"
+        )
+    others = sorted({parts[1] for parts in there if parts[1:] != [wanted, ""]} - {"", wanted})
+    raise ValueError(
+        f"{path} holds no library for {wanted}, only for {', '.join(others) or 'no platform'}"
+    )
+
+
+def _check_variables(path: Path, everything: Any) -> None:
+    """Raise ValueError for two variables of one name, and for inputs that start at no number."""
+    name, count = Counter(v.name for v in everything).most_common(1)[0] if everything else ("", 1)
+    if count > 1:
+        raise ValueError(f"{path} has {count} variables of the name {name!r}")
+    for v in everything:
+        if v.causality not in ("input", "parameter", "structuralParameter"):
+            continue
+        if v.type in (*_KINDS, "Float32", "Float64") and v.start is not None:
+            for word in str(v.start).split():
+                if not _is_number(word):
+                    raise ValueError(f"{path}: {v.name!r} starts at {word!r}, which is no number")
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return not math.isnan(float(word))
+    except ValueError:
+        return False
 
 
 def _variable(v: Any, version: int, everything: Any) -> Variable:

@@ -27,7 +27,8 @@ class FmuParameters(Parameters):
     scan_rate_hz: PositiveRational | None = Field(
         default=None,
         description="Communication points per second. By default they are the instants at which "
-        "something arrives, and without wires the FMU's own step.",
+        "something arrives, and without wires the FMU's own step (stepSize, or its "
+        "fixedInternalStepSize).",
     )
     offset_s: NonNegativeRational = Field(
         default=Fraction(0), description="Time of the first communication point, s."
@@ -114,7 +115,27 @@ class FmuParameters(Parameters):
         if self.scan_rate_hz is not None:
             return ClockSpec(self.scan_rate_hz, self.offset_s)
         if not self.wiring.sources and not self.ownship:
-            return ClockSpec(1 / (self.model.step_s or Fraction(1, 100)), self.offset_s)
+            return ClockSpec(1 / self._own_step_s(), self.offset_s)
+        return None
+
+    def _own_step_s(self) -> Fraction:
+        """Return the FMU's own step: of its experiment, if that is whole steps of its solver."""
+        step, inside = self.model.step_s, self.model.internal_step_s
+        if inside and (not step or (step / inside).denominator != 1):
+            return inside
+        return step or Fraction(1, 100)
+
+    def step_that_does_not_fit(self) -> str | None:
+        """Say that communication points are no whole steps of the FMU's own, where they are not."""
+        inside = self.model.internal_step_s
+        if inside and self.scan_rate_hz is not None:
+            steps = 1 / (self.scan_rate_hz * inside)
+            if steps.denominator != 1:
+                return (
+                    f"scan_rate_hz: {float(steps):g} internal steps of the FMU "
+                    f"(fixedInternalStepSize {float(inside):g} s) fit between two communication "
+                    "points: whole ones are meant to"
+                )
         return None
 
 

@@ -104,7 +104,10 @@ class FmuProcess:
             words = self._last_words()
             self.close()
             at = "" if answer["at"] is None else f" at {answer['at']:g} s"
-            raise FmuError(f"{self.path.name}{at}: {printable(answer['failed'])}{words}")
+            error = FmuError(f"{self.path.name}{at}: {printable(answer['failed'])}{words}")
+            if answer["opening"]:  # it says itself that it cannot be used
+                error.exit_code = 2
+            raise error
         return answer
 
     def _gone(self, watch: "_Watch", deadline_s: float) -> FmuError:

@@ -1,5 +1,6 @@
 """Start values of an FMU's variables as a scene gives them, and how long its arrays are."""
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -79,10 +80,15 @@ def _typed(model: FmuModel, variable: Variable, value: Any) -> Any:
             number, unit = value.strip().split(None, 1)
             a, b = model.converted(unit, variable)
             try:
-                return a * float(number) + b
+                found = a * float(number) + b
             except ValueError:
-                raise ValueError(f"{said}: a number and a unit are needed") from None
+                found = math.nan
+            if math.isnan(found):
+                raise ValueError(f"{said}: a number and a unit are needed")
+            return found
         if isinstance(value, int | float) and not isinstance(value, bool):
+            if math.isnan(value):
+                raise ValueError(f"{said}: a number is needed")
             return float(value)
         raise ValueError(f"{said}: a number is needed")
     if isinstance(value, str) and variable.items:

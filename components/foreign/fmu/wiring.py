@@ -253,7 +253,7 @@ class Wiring:
 
     # -- what the FMU's process needs to know --------------------------------------------------
 
-    def spec(self, name: str, ticks_per_s: int) -> dict[str, Any]:
+    def spec(self, name: str, ticks_per_s: int, *, rewinds: bool) -> dict[str, Any]:
         """Return what the FMU's process needs to know.
 
         Raises
@@ -264,7 +264,7 @@ class Wiring:
         model = self.model
         return {
             "version": model.version, "kind": model.kind, "identifier": model.identifier,
-            "token": model.token, "name": name, "events": model.events,
+            "token": model.token, "name": name, "events": model.events, "rewinds": rewinds,
             "discrete": self.discrete, "start": [tuple(one) for one in self.starts],
             "inputs": self.inputs, "outputs": self.outputs, "raised": self.raised,
             "clocks": [self._clock(clock, ticks_per_s) for clock in model.clocks.values()],

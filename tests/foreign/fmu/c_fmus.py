@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("fmpy", reason="needs FMPy: pip install 'dsa-des[fmi]'")
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 
+#: With fault 7 it takes a step only if its state is not set again to one before (as FMUs of FhSim).
 #: A low pass x' = (gain · Σu − x) / 1 s in exact steps; it counts its steps, returns early where
 #: `events` is above 0 (at every multiple of it), and fails as `fault` says once t >= 0.5 s.
 _MODEL = r"""
@@ -103,6 +104,7 @@ int fmi3GetUInt64(void *c, const uint32_t *vr, size_t n, uint64_t *v, size_t nv)
 int fmi3DoStep(void *c, double t, double h, bool np, bool *ev, bool *end, bool *early, double *last)
 { Model *m = c;
   int status = misbehave(m); if (status) return status;
+  if (m->fault == 7 && !np) { *ev = *end = *early = false; return 0; }
   double to = t + h; *ev = *end = *early = false;
   if (m->events > 0 && m->earlyAllowed) {
     double next = m->events * (floor(m->t / m->events + 1e-9) + 1);
@@ -141,6 +143,7 @@ int fmi2GetBooleanStatus(void *c, int kind, int *v) {
 int fmi2GetRealStatus(void *c, int kind, double *v) { *v = ((Model *)c)->t; return 0; }
 int fmi2DoStep(void *c, double t, double h, int np) {
   Model *m = c; int status = misbehave(m); if (status) return status;
+  if (m->fault == 7 && !np) return 0;
   if ((m->fault == 5 || m->fault == 6) && t + h > 1.03) { advance(m, 1.03); return 2; }
   advance(m, t + h); return 0; }
 """
@@ -196,12 +199,20 @@ _DESCRIPTION2 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>"""
 
 
-def lag_fmu(folder: Path, version: int = 3, *, rewindable: bool = True, platform: str = "") -> Path:
-    """Build a low pass as an FMU; a test that needs it is left out where there is no compiler."""
+def lag_fmu(
+    folder: Path, version: int = 3, *, rewindable: bool = True, platform: str = "",
+    change: tuple[str, str] = ("", ""), more: str = "",
+) -> Path:  # fmt: skip
+    """Build a low pass as an FMU; a test that needs it is left out where there is no compiler.
+
+    What it says of itself is changed, and `more` is added to its source.
+    """
     said = (_DESCRIPTION3 if version == 3 else _DESCRIPTION2).format(
         rewindable=str(rewindable).lower(), units=_UNITS
     )
-    source = _MODEL + (_FMI3 if version == 3 else _FMI2)
+    assert change[0] in said
+    said = said.replace(*change)
+    source = _MODEL + (_FMI3 if version == 3 else _FMI2) + more
     return packed(folder / "lag.fmu", said, source, version, platform)
 
 

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import tempfile
-import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from covering import covers
 
 from dsa_des.errors import BlockFailure, SceneError, SetupFailure
 from tests import warm_process
+from tests.support.waiting import wait_for
 
 FMU = ("foreign.fmu",)
 _CHAIN = [
@@ -203,7 +203,7 @@ ownship = { own_alt_m = "x" }
     ("fault", "said"),
     [
         (1, "at 0.6 s: fmi3DoStep returned Error: valve stuck"),
-        (2, "did not answer within 0.5 s"),
+        (2, "did not answer within 2 s"),
         (3, "died of signal 6 (SIGABRT); it printed: last words"),
         (4, "ended with exit code 0"),
     ],
@@ -214,8 +214,8 @@ def test_one_clear_error_and_nothing_left(lab, lag, fault, said, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(lab.folder / "of_this_test"))
     before = _left_behind()
     scene = lab.write(
-        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; deadline_s = 0.5; '
-                f"start = {{ fault = {fault} }}"},
+        {"lag": f'foreign.fmu; file = "{lag()}"; scan_rate_hz = 10; deadline_s = '
+                f"{2 if fault == 2 else 60}; start = {{ fault = {fault} }}"},
         [], duration_s=2,
     )  # fmt: skip
     with pytest.raises(BlockFailure) as caught:
@@ -241,23 +241,113 @@ def test_nothing_is_left_when_we_are_interrupted_or_killed(lab, lag, number):
         ["-m", "dsa_des", "run", scene, "--out", out],
         env={**os.environ, "TMPDIR": str(folder)}, stdout=subprocess.DEVNULL,
     )  # fmt: skip
-    beats: list[Path] = []
-    for _ in range(1500):  # until it hangs: past its first communication points
+
+    def hangs():  # past its first communication points
         beats = [*folder.glob("dsa_des_fmu_*/beat")]
-        if beats and int.from_bytes(beats[0].read_bytes(), "little") > 5:
-            break
-        time.sleep(0.02)
-    assert beats
+        return beats and int.from_bytes(beats[0].read_bytes(), "little") > 5
+
+    wait_for(hangs)
     os.kill(ours.pid, number)
-    _, said = ours.communicate(timeout=30)
+    _, said = ours.communicate()
     assert ours.returncode == (-9 if number == signal.SIGKILL else 128 + number), said
-    for _ in range(1000):  # a process that was killed takes its time to go
+
+    def gone():  # a process that was killed takes its time to go
         inside = [name for _, *kinds in os.walk(folder) for names in kinds for name in names]
-        left = inside, _running_with(str(folder))  # a folder that goes meanwhile is no error
-        if not any(left):
-            break
-        time.sleep(0.02)
-    assert not any(left) and not out.exists()
+        return not inside and not _running_with(str(folder))
+
+    assert wait_for(gone) and not out.exists()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_where_nothing_goes_back_an_fmu_is_told_so(lab, lag, version):
+    """Some do not move while their state might be set again to one before."""
+    start = "u = [3, 1, 2], " if version == 3 else "u = 6, "
+    for rewindable in (True, False):
+        path = lag(version, rewindable=rewindable)
+        scene = lab.write(
+            {"lag": f'foreign.fmu; file = "{path}"; scan_rate_hz = 10; '
+                    f'start = {{ {start}fault = 7 }}'},
+            [], duration_s=2,
+        )  # fmt: skip
+        time_s, x = _values(lab.run(scene).tables, "lag", "x")
+        assert x == pytest.approx(6 - 6 * np.exp(-time_s), rel=1e-12)
+
+
+def test_in_a_loop_that_looks_ahead_an_fmu_is_told_that_it_may_go_back(lab, lag):
+    text = _LOOP.replace("inputs = {", "start = { fault = 7 }\ninputs = {")
+    for rewindable in (True, False):
+        path = lag(rewindable=rewindable)
+        scene = _scene(lab, path, text, wires=["tracker -> pilot", _BACK], duration_s=110)
+        x = _values(lab.run(scene).tables, "pilot", "x")[1]
+        assert (x == 0.0).all() == rewindable
+
+
+def test_a_library_that_crashes_when_it_is_loaded_has_failed(lab, lag):
+    path = lag(more="__attribute__((constructor)) static void die(void) { abort(); }\n")
+    with pytest.raises(SetupFailure, match="died of signal 6") as caught:
+        lab.run(lab.write({"b": f'foreign.fmu; file = "{path}"; scan_rate_hz = 1'}, []))
+    assert caught.value.exit_code == 3
+
+
+@pytest.mark.parametrize(
+    ("version", "change", "said"),
+    [
+        (3, ('name="steps"', 'name="seen"'), "has 2 variables of the name 'seen'"),
+        (2, ('name="gain"', 'name="u"'), "has 2 variables of the name 'u'"),
+        (3, ('causality="input" start="0"', 'causality="input" start="NaN"'),
+         "'u' starts at 'NaN', which is no number"),
+        (2, ('<Real start="1"/>', '<Real start="one"/>'), "'gain' starts at 'one', which is no"),
+    ],
+)  # fmt: skip
+def test_what_an_fmu_says_wrongly_of_itself(lab, lag, version, change, said):
+    path = lag(version, change=change)
+    problems = lab.problems(lab.write({"b": f'foreign.fmu; file = "{path}"'}, []))
+    assert any(said in str(problem) for problem in problems), problems
+
+
+def test_a_library_of_another_name_is_told_from_another_platform(lab, lag):
+    path = lag()
+    import zipfile
+
+    with zipfile.ZipFile(path) as old:
+        (library,) = (name for name in old.namelist() if name.endswith(".so"))
+        content = {name: old.read(name) for name in old.namelist()}
+    with zipfile.ZipFile(path, "w") as new:
+        for name, data in content.items():
+            new.writestr(name.replace("lag.so", "Lag.so"), data)
+    (problem,) = lab.problems(lab.write({"b": f'foreign.fmu; file = "{path}"'}, []))
+    assert f"holds no {library}, which its description names, but Lag.so" in str(problem)
+    assert "only for" not in str(problem)
+
+
+def test_without_wires_an_fmu_takes_whole_steps_of_its_solver(lab, lag):
+    """By default its experiment's step, unless that is not a multiple of the fixed one inside."""
+    for inside, step_s, expected in ((0.125, 0.25, 0.25), (0.1, 0.25, 0.1), (0.5, None, 0.5)):
+        said = f'<CoSimulation fixedInternalStepSize="{inside}"'
+        path = lag(change=("<CoSimulation", said))
+        if step_s is None:
+            path = lag(change=('stepSize="0.25"', ""))
+            import zipfile
+
+            with zipfile.ZipFile(path) as old:
+                content = {name: old.read(name) for name in old.namelist()}
+            with zipfile.ZipFile(path, "w") as new:
+                for name, data in content.items():
+                    new.writestr(name, data.replace(b"<CoSimulation", said.encode()))
+        tables = lab.run(
+            lab.write({"lag": f'foreign.fmu; file = "{path}"'}, [], duration_s=2)
+        ).tables
+        time_s, _ = _values(tables, "lag", "x")
+        assert time_s == pytest.approx(np.arange(0.0, 2.0, expected))
+    for rate, fits in ((2, True), (1, True), (10, False)):
+        scene = lab.write({"lag": f'foreign.fmu; file = "{path}"; scan_rate_hz = {rate}'}, [],
+                          duration_s=1)  # fmt: skip
+        (lag_block,) = lab.run(scene).simulation.components.values()
+        assert (
+            lag_block.warnings() == []
+            if fits
+            else "0.2 internal steps" in str(lag_block.warnings())
+        )
 
 
 def test_one_that_refuses_to_start_cannot_be_used(lab, lag):
@@ -279,6 +369,8 @@ def test_one_that_refuses_to_start_cannot_be_used(lab, lag):
     [
         ("start = { gian = 1 }", "has no variable 'gian'; did you mean 'gain'"),
         ("start = { gain = true }", "'gain' is True: a number is needed"),
+        ("start = { gain = nan }", "'gain' is nan: a number is needed"),
+        ('start = { x = "nan ft" }', "'x' is 'nan ft': a number and a unit are needed"),
         ("start = { u = [1, 2] }", "'u' has 2 values where it needs 3"),
         ('start = { x = "3 s" }', "is in 'ft', which 's' cannot be made into"),
         ("start = { fault = 3000000000 }", "it must be from -2147483648 to 2147483647"),

@@ -114,3 +114,14 @@ def test_bad_ranges_are_refused():
     for ranges, said in ([0.0], "must lie above 0"), ([2.0, 2.0], "names a range twice"):
         with pytest.raises(Exception, match=f"ranges_nmi: {said}"):
             measured(scene(), {"metric": "track_errors_by_range", "ranges_nmi": ranges})
+
+
+def test_errors_are_those_of_the_target_that_is_at_the_range():
+    """Two targets, some 1.5 km apart: whoever is nearest to the range, with its own track."""
+    both = scene((crooked.DIVING, crooked.ROLLING), **FINE)
+    for target in (crooked.ROLLING, crooked.DIVING):
+        range_nmi = round(float(np.linalg.norm(crooked.ned(target, 3.0))) / MILE_M, 2)
+        alone, found = at(range_nmi, scene((target,), **FINE)), at(range_nmi, both)
+        assert found["tracked"] == 1.0
+        assert found["error_horizontal_m"] == pytest.approx(alone["error_horizontal_m"], abs=5.0)
+        assert found["error_horizontal_rate_m_s"] < 20.0

@@ -25,7 +25,7 @@ OWN = {**crooked.OWNSHIP, "alt_m": 500.0, "climb_mps": 0.0, "pitch_deg": 0.0, "r
 
 def radars(path: Path) -> dict[str, dict[str, Any]]:
     """The radars that a file holds, with all their parameters."""
-    if "sensors" in path.parts:
+    if path.parent.name == "sensors":
         scene = dsa_des.load_scene(chain({"radar": {"extends": str(path)}}))
     else:
         scene = dsa_des.load_scene(path)

@@ -3,10 +3,11 @@
 import math
 
 import crooked
+import numpy as np
 import pytest
 from covering import LINK_BUDGETS, covers
 from scipy.stats import gamma
-from wired import alone, chain, decided, run, sensor
+from wired import alone, chain, decided, rows, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -183,3 +184,20 @@ def test_what_fits_and_what_is_free_runs():
         {**VIEW, "prf_hz": 9993.0},  # c / (2 * 9993 Hz) is 15.0001 km, and range_km 15
     ):
         assert decided(alone("radar.threshold", **keys))
+
+
+@covers("prf_hz", "range_km", of=("radar.swerling", "radar.threshold"))
+@pytest.mark.parametrize("kind", ["radar.swerling", "radar.threshold"])
+def test_without_a_range_the_reach_ends_where_the_next_pulse_leaves(kind):
+    """c / 2 PRF between two targets: the nearer one alone is detected, however strong the other."""
+    far = {t["name"]: float(np.linalg.norm(crooked.body(t, 0.0))) for t in crooked.TARGETS}
+    near, other = sorted(far, key=far.__getitem__)
+    radar = {**sensor(kind), "power_w": 1e9}
+    radar.pop("range_km", None)
+    targets = [{**target, "rcs_dbsm": 30.0, "swerling": 0} for target in crooked.TARGETS]
+    between = 0.5 * (far[near] + far[other])
+    ends = (between, {near}), (far[other] + 1.0, {near, other}), (far[near] - 1.0, set())
+    for between_m, expected in ends:
+        prf_hz = 299_792_458.0 / (2.0 * between_m)
+        found = run(chain({"s": {**radar, "prf_hz": prf_hz}}, targets=targets, duration_s=0.5))
+        assert {row["target"] for row in rows(found, block="s")} == expected

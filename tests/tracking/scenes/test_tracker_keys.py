@@ -134,9 +134,12 @@ def test_tracks_live_by_their_rules(kind):
 
 @covers("delete_above_m", of=TRACKERS)
 @pytest.mark.parametrize("kind", TRACKERS)
-def test_a_track_ends_where_its_position_is_too_uncertain(kind):
-    assert tracks(kind, delete_above_m=0.5)[1]["track_status"] == "deleted"
-    assert "deleted" not in {row["track_status"] for row in tracks(kind)}
+def test_a_track_ends_where_its_position_has_become_too_uncertain(kind):
+    """At 3 m a new track is less certain than that with every hit, and ends at its first miss."""
+    life = [row["track_status"] for row in fading(5, kind=kind, delete_above_m=3.0)]
+    assert life == ["tentative"] * 2 + ["confirmed"] * 3 + ["deleted"]
+    # 2 s without a detection: 4 m²/s³ alone are 4 · 2³ / 3 = 11 m² an axis.
+    assert len(fading(5, kind=kind, delete_above_m=1000.0)) > 8
 
 
 @covers("assumed_range_m", of=TRACKERS)

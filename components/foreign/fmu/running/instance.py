@@ -24,6 +24,8 @@ class Instance:
         from fmpy import fmi2, fmi3
 
         self.spec, self.three = spec, spec["version"] == 3
+        #: FMI's noSetFMUStatePriorToCurrentPoint: it is never taken back to an instant before.
+        self.only_forward = not spec["rewinds"]
         self.log: deque[str] = deque(maxlen=20)
         slave = {
             "cs": fmi3.FMU3Slave if self.three else fmi2.FMU2Slave,
@@ -187,7 +189,8 @@ class Instance:
         for _ in range(1_000_000):
             to_s = self.next_event_s if start_s < self.next_event_s < end_s else end_s
             size = to_s - start_s
-            status = self._do_step(self.component, start_s, size, False, *self._pointers)
+            forward = self.only_forward
+            status = self._do_step(self.component, start_s, size, forward, *self._pointers)
             if status > 1:
                 self.refuse("fmi3DoStep", status)
             self.ended = self.ended or ended.value
@@ -210,7 +213,7 @@ class Instance:
         self._leave_event_mode(round(now_s * self.per_s), self.per_s)
 
     def _step2(self, start_s: float, end_s: float) -> bool:
-        status = self._do_step(self.component, start_s, end_s - start_s, 0)
+        status = self._do_step(self.component, start_s, end_s - start_s, self.only_forward)
         if status == 2 and self.fmu.getBooleanStatus(3):
             self.ended = True
             last: float = self.fmu.getRealStatus(2)

@@ -48,4 +48,4 @@ def _answer(
         if not isinstance(error, FmuFailure):
             instance = instances.get(number)
             words += "" if instance is None else instance.words()
-        return {"failed": words, "at": request.get("at")}
+        return {"failed": words, "at": request.get("at"), "opening": request["do"] == "open"}

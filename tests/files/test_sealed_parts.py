@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dsa_des.cli import main
-from dsa_des.results.sealed_files import is_sealed, parquet, sealed
+from dsa_des.files.sealed_files import is_sealed, parquet, sealed
 
 STUDY = """
 scene = "small.toml"

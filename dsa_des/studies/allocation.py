@@ -1,0 +1,240 @@
+"""Which runs are flown where all are known without flying: drawn by what they can contribute.
+
+A study of a ratio knows of every run what happens without a remedy, and its geometry, for an
+eighth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
+them the chance p(x) of each event is learnt, by a logistic model of the geometry x, and then a run
+is flown with a probability π(x) of its own and stands for 1/π runs (`dsa_des.results.ratio`). A
+wrong p(x) costs width, never truth. With weights w and nominal flags n the variance of a ratio R is
+that of Σ w (m/π - R n), of which only Σ w² p/π depends on π; so with costs c of knowing and 1 of
+flying
+
+    π ∝ w √(Σ_e p_e / V_e),   of the size that makes  Σ_e V_e(π) / V_e · (Σ π + N c)  least,
+
+V_e being the variance of event e with every run flown. It is Neyman's rule for a sample in two
+phases (J. Neyman, "Contribution to the theory of sampling human populations", Journal of the
+American Statistical Association 33, 1938; C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted
+survey sampling", 1992, chapter 9). No π is below `LEAST`: what nobody expects must be seen too, and
+weighs 1/π then. What was flown teaches the next round, four times as large.
+
+Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.results.ratio import FORESEEN_COST
+
+#: Runs of a cell that are all flown, and how many times as many are known after each round.
+PILOT, GROWTH = 300, 4
+#: The least probability to be flown.
+LEAST = 0.03
+#: All are flown unless a sample is expected to cost less than this for the same width.
+_WORTH_IT = 0.9
+#: The chance that is expected of an event of which nothing is told.
+UNTOLD = 0.05
+# Standard deviations of the model's coefficients before anything is flown: of the level, and for
+# one standard deviation of geometry, or its square.
+_LEVEL_SD, _SLOPE_SD = 3.0, 0.5
+_ITERATIONS = 50
+# Sizes of π that are tried.
+_SIZES = np.geomspace(1e-3, 1e6, 200)
+# No chance is taken for nothing, or for certain.
+_LEAST_CHANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class ForeseenRuns:
+    """Runs as their geometry and nominal flights tell them, before they are flown.
+
+    Geometry (numbers, runs); nominal flags (events, runs), 0 outside an event's class; the chance
+    of each event that is expected before anything is flown (events, runs); weights (runs,).
+    """
+
+    geometry: FloatArray
+    nominal: FloatArray
+    expected: FloatArray
+    weight: FloatArray
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """With which probability runs of a cell are flown, by what is known of them."""
+
+    middle: FloatArray
+    spread: FloatArray
+    #: Of the logistic models, (events, without and with the nominal event, coefficients).
+    coefficients: FloatArray
+    #: 1 / V of each event, (events,).
+    precision: FloatArray
+    #: How much π is for each w √(Σ p/V); infinite where all are flown.
+    size: float
+    #: Of the runs it was learnt from, so many would be flown.
+    share: float = 1.0
+
+    def probabilities(self, runs: ForeseenRuns) -> FloatArray:
+        """Return the probability with which each run is flown, (runs,)."""
+        worth = np.sqrt(_combined(self.precision, self._chances(runs)))
+        return flown_with(runs.weight * worth, self.size)
+
+    def _chances(self, runs: ForeseenRuns) -> FloatArray:
+        terms = model_terms(self._scaled(runs.geometry), runs.nominal)
+        return chances(terms, runs, self.coefficients)
+
+    def _scaled(self, geometry: FloatArray) -> FloatArray:
+        away = geometry - self.middle[:, None]
+        return np.where(np.isfinite(away), away, 0.0) / self.spread[:, None]
+
+
+def flown_with(worth: FloatArray, size: float) -> FloatArray:
+    """Return probabilities in proportion to what runs are worth, between `LEAST` and 1."""
+    if not np.isfinite(size):
+        return np.ones(len(worth))
+    result: FloatArray = np.clip(size * worth, LEAST, 1.0)
+    return result
+
+
+def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
+    """Return the terms of the logistic model: geometry, its squares, and all nominal flags."""
+    within = np.clip(scaled, -4.0, 4.0)
+    return np.concatenate([within, within**2 - 1.0, nominal])
+
+
+def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
+    """Return the chance of each event by the logistic models, (events, runs)."""
+    design = _design(terms)
+    without, having = (
+        np.array([_combined(mine[k], design) for mine in coefficients]) for k in (0, 1)
+    )
+    score = np.where(runs.nominal > 0.0, having, without) + _offset(runs.expected)
+    result: FloatArray = np.clip(_logistic(score), _LEAST_CHANCE, 1.0 - _LEAST_CHANCE)
+    return result
+
+
+def learn(runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray) -> Allocation:
+    """Return the plan for further runs of a cell, from those that are known.
+
+    Parameters
+    ----------
+    runs : ForeseenRuns
+    happened : (events, runs)
+        Whether each event happened with the remedy; of those not flown anything.
+    stands_for : (runs,)
+        For how many each stands, 0 of those not flown.
+    """
+    there = np.isfinite(runs.geometry)
+    many = np.maximum(there.sum(axis=1), 1)
+    middle = np.where(there, runs.geometry, 0.0).sum(axis=1) / many
+    away = np.where(there, runs.geometry, middle[:, None]) - middle[:, None]
+    spread = np.sqrt((away**2).sum(axis=1) / many)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    terms = model_terms(away / spread[:, None], runs.nominal)
+    flown = stands_for > 0.0
+    fitted = np.zeros((len(happened), 2, 1 + len(terms)))
+    for event, (n, e, m) in enumerate(zip(runs.nominal, runs.expected, happened, strict=True)):
+        for having in (0, 1):
+            some = flown & ((n > 0.0) == having)
+            weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
+            fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
+    precision, size = best_size(runs, chances(terms, runs, fitted))
+    plan = Allocation(middle, spread, fitted, precision, size)
+    return replace(plan, share=float(plan.probabilities(runs).mean()))
+
+
+def best_size(runs: ForeseenRuns, chance: FloatArray) -> tuple[FloatArray, float]:
+    """Return 1/V of each event, and the size of π with the least variance times cost."""
+    w, n = runs.weight, runs.nominal
+    below = (w * n).sum(axis=1)
+    there = below > 0.0
+    ratio = np.where(there, (w * chance).sum(axis=1) / np.where(there, below, 1.0), 0.0)[:, None]
+    fixed = (w**2 * (ratio**2 * n - 2.0 * ratio * chance * n)).sum(axis=1)
+    all_flown = (w**2 * chance).sum(axis=1) + fixed
+    counts = there & (all_flown > 0.0)
+    precision = np.where(counts, 1.0 / np.where(counts, all_flown, 1.0), 0.0)
+    if not counts.any():
+        return precision, np.inf
+    gone = _combined(precision, chance)
+    worth = w * np.sqrt(gone)
+    scale = 1.0 / max(float(worth.max()), 1e-300)
+    costs = []
+    for size in _SIZES * scale:
+        pi = flown_with(worth, size)
+        variance = float((w**2 * gone / pi).sum() + precision @ fixed)
+        costs.append(variance * (float(pi.mean()) + FORESEEN_COST))
+    best = int(np.argmin(costs))
+    # Flying all tells the nominal runs by the way.
+    worth_it = costs[best] < _WORTH_IT * counts.sum()
+    return precision, float(_SIZES[best] * scale) if worth_it else np.inf
+
+
+def fit_chances(
+    terms: FloatArray, expected: FloatArray, happened: FloatArray, weight: FloatArray
+) -> FloatArray:
+    """Return the coefficients of the logistic model that are likeliest, given what was expected.
+
+    Newton's method on the logarithm of the likelihood and of a normal distribution of the
+    coefficients; with no event at all it stays near what was expected before.
+    """
+    design, offset = _design(terms), _offset(expected)
+    sd = np.full(len(design), _SLOPE_SD)
+    sd[0] = _LEVEL_SD
+    prior, at = np.diag(1.0 / sd**2), np.zeros(len(design))
+
+    def loss(coefficients: FloatArray) -> float:
+        score = design.T @ coefficients + offset
+        likely = weight @ (np.logaddexp(0.0, score) - happened * score)
+        return float(likely + 0.5 * coefficients @ prior @ coefficients)
+
+    for _ in range(_ITERATIONS):
+        p = _logistic(design.T @ at + offset)
+        slope = design @ (weight * (p - happened)) + prior @ at
+        curve = (design * (weight * p * (1.0 - p))) @ design.T + prior
+        step = np.linalg.solve(curve, slope)
+        part, here = 1.0, loss(at)
+        while part > 1e-6 and loss(at - part * step) > here:
+            part /= 2.0
+        at = at - part * step
+        if np.abs(part * step).max() < 1e-8:
+            break
+    return at
+
+
+def _combined(factors: FloatArray, terms: FloatArray) -> FloatArray:
+    """Return a sum of terms (k, runs) with factors (k,), the same for a run alone as among many."""
+    result = np.zeros(terms.shape[1])
+    for factor, term in zip(factors.tolist(), terms, strict=True):
+        result += factor * term
+    return result
+
+
+def _design(terms: FloatArray) -> FloatArray:
+    return np.concatenate([np.ones((1, terms.shape[1])), terms])
+
+
+def _offset(expected: FloatArray) -> FloatArray:
+    p = np.clip(expected, _LEAST_CHANCE, 1.0 - _LEAST_CHANCE)
+    result: FloatArray = np.log(p / (1.0 - p))
+    return result
+
+
+def _logistic(score: FloatArray) -> FloatArray:
+    result: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * score))
+    return result
+
+
+def round_ends(replicas: int, batch: int | None) -> list[int]:
+    """Return the replica before which each round ends; with a `batch`, rounds of so many."""
+    if batch is not None:
+        return [min(end, replicas) for end in range(batch, replicas + batch, batch)]
+    ends = [PILOT]
+    while ends[-1] < replicas:
+        ends.append(ends[-1] * GROWTH)
+    return [*ends[:-1], replicas]
+
+
+def drawn(probability: FloatArray, uniform: Sequence[float]) -> tuple[BoolArray, FloatArray]:
+    """Return which runs are flown, and for how many each stands."""
+    flown = np.asarray(uniform) < probability
+    return flown, np.where(flown, 1.0 / probability, 0.0)

@@ -1,0 +1,147 @@
+"""What is known of a study's runs before they are flown, and which of them are flown.
+
+Between the columns of a study's parts and the arrays of `dsa_des.studies.allocation`: metrics
+foresee nominal events, weights and geometry; ratios say which columns are events.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.record import EVENT, RATIO, STANDS_FOR, RatioOf, Result, geometry_column
+from dsa_des.results.rows import Rows, StoredRows
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.allocation import PILOT, UNTOLD, Allocation, ForeseenRuns, drawn, learn
+from dsa_des.studies.draws import uniform
+from dsa_des.studies.metric import Group, Metric, expected_column
+from dsa_des.studies.study import AUTO, Study
+
+#: Runs that are foreseen at a time: what is made of their encounters is kept until they are flown.
+_AT_ONCE = 4096
+
+
+def geometry_of(metrics: Sequence[Metric]) -> list[str]:
+    """Return the names of all numbers by which metrics tell runs apart before they are flown."""
+    return list(dict.fromkeys(name for metric in metrics for name in metric.geometry))
+
+
+def why_not_foreseen(study: Study, scene: Scene) -> str:
+    """Return why a sample of the runs cannot answer a study; nothing if it can."""
+    metrics = {spec.name: spec.build(scene) for spec in study.metrics}
+    blind = [name for name, one in metrics.items() if type(one).foresee is Metric.foresee]
+    if blind:
+        return (
+            f"{', '.join(blind)} can tell nothing of a run that is not flown: only metrics that "
+            "foresee a run (risk_ratio, encounter_weight) go with a sample of the runs"
+        )
+    if not geometry_of(list(metrics.values())):
+        return "no metric of the study tells encounters apart by their geometry: add risk_ratio"
+    if study.over:
+        return f"goes with replicas, and not with a sample along an axis ({', '.join(study.over)})"
+    known = foresee(scene, list(metrics.values()), [study.replica(0)])
+    for one in metrics.values():
+        for result in one.results():
+            if result.name not in known and result.kind not in (EVENT, RATIO):
+                return f"{result.name} is no event, and only known of runs that are flown"
+    return ""
+
+
+def ratios_of(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
+    """Return the ratios for whose sake runs are chosen: those named, or all without a class."""
+    ratios = [result for result in results if result.ratio is not None]
+    if AUTO in allocate:
+        return [one for one in ratios if one.ratio is not None and one.ratio.only is None]
+    return [one for one in ratios if one.name in allocate]
+
+
+def foresee(
+    scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
+) -> dict[str, AnyArray]:
+    """Return what is known of runs without flying them: results, and columns of geometry."""
+    parts: dict[str, list[AnyArray]] = {}
+    for start in range(0, len(replicas), _AT_ONCE):
+        group = Group(scene, replicas[start : start + _AT_ONCE], (), {})
+        mine: dict[str, AnyArray] = {}
+        for metric in metrics:
+            for name, values in metric.foresee(group).items():
+                column = geometry_column(name) if name in metric.geometry else name
+                mine.setdefault(column, values)
+        for name, values in mine.items():
+            parts.setdefault(name, []).append(values)
+    return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def stands_for(
+    study: Study,
+    cell: int,
+    numbers: Sequence[int],
+    plan: Allocation | None,
+    results: Sequence[Result],
+    columns: Mapping[str, AnyArray],
+) -> FloatArray:
+    """Return for how many runs each one stands, 0 where it is not flown, (runs,).
+
+    Whether a run is flown depends on its seed and on what is known of it, and on no other run.
+    """
+    if plan is None or not columns:  # nothing is known of runs that are all in error
+        return np.ones(len(numbers))
+    ratios = [one.ratio for one in ratios_of(results, study.allocate) if one.ratio is not None]
+    seed = study.member_seed(cell)
+    draws = [uniform(seed, "study allocation", number) for number in numbers]
+    return drawn(plan.probabilities(_known(columns, ratios)), draws)[1]
+
+
+def _known(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
+    chances = [geometry_column(expected_column(of.above)) for of in ratios]
+    names = sorted(name for name in columns if name.startswith(geometry_column("")))
+    geometry = [columns[n] for n in names if not n.startswith(geometry_column(expected_column("")))]
+    weights = [np.ones(len(geometry[0])) if of.weight is None else columns[of.weight]
+               for of in ratios]  # fmt: skip
+    return ForeseenRuns(
+        np.array(geometry, dtype=np.float64),
+        np.array([_of_class(columns, of, columns[of.below]) for of in ratios]),
+        np.array(
+            [
+                columns[name] if name in columns else np.full(len(weights[0]), UNTOLD)
+                for name in chances
+            ]
+        ),
+        np.array(weights[0], dtype=np.float64),
+    )
+
+
+def _of_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
+    """Return flags of an event, 0 outside the class that a ratio is of."""
+    result: FloatArray = np.nan_to_num(flags.astype(np.float64))
+    return result if of.only is None else result * (columns[of.only[0]] == of.only[1])
+
+
+def plans_of(
+    study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
+) -> dict[int, Allocation]:
+    """Return the plan of every cell for the round that begins with a replica, by earlier rounds."""
+    if not study.allocate or first < PILOT:
+        return {}
+    rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
+    ratios = [
+        one.ratio
+        for one in ratios_of(folder.record.results, study.allocate)
+        if one.ratio is not None
+    ]
+    read = {geometry_column(name) for name in folder.record.geometry}
+    read |= {name for of in ratios for name in of.reads()}
+    plans = {}
+    for (cell,), chosen in rows.each_place():
+        if cell not in cells:
+            continue
+        columns = {name: rows.column(name)[chosen] for name in read}
+        stood = rows.column(STANDS_FOR)[chosen]
+        if not (stood > 0.0).any():
+            continue
+        happened = [_of_class(columns, of, columns[of.above]) for of in ratios]
+        plans[int(cell)] = learn(_known(columns, ratios), np.array(happened), stood)
+    return plans

@@ -1,0 +1,215 @@
+"""Runs flown by what they can contribute: unbiased, with intervals that cover, and a gain."""
+
+import numpy as np
+import pytest
+
+from dsa_des.arrays.types import FloatArray
+from dsa_des.results.ratio import FORESEEN_COST, paired_ratio
+from dsa_des.studies.allocation import (
+    LEAST,
+    PILOT,
+    Allocation,
+    ForeseenRuns,
+    best_size,
+    drawn,
+    fit_chances,
+    flown_with,
+    learn,
+    round_ends,
+)
+
+#: Of a study.
+RUNS = 3000
+
+
+def encounters(
+    rng: np.random.Generator, count: int, *, sigma: float = 0.0, everywhere: float = 0.0
+) -> tuple[ForeseenRuns, FloatArray]:
+    """Encounters by miss distance d and closing speed v, and whether the event happens when flown.
+
+    Nominal where d < 1, a sixth of them; a third of these stay if v is high, a twentieth if low;
+    beside it one that was just missed comes with 1 %, and anywhere with `everywhere`.
+    """
+    distance, speed = rng.uniform(0.0, 6.0, count), rng.uniform(0.0, 1.0, count)
+    nominal = (distance < 1.0).astype(float)
+    chance = np.where(nominal > 0.0, np.where(speed > 0.6, 0.35, 0.05), 0.0)
+    chance = np.where((distance >= 1.0) & (distance < 1.5), 0.01, chance) + everywhere
+    happened = (rng.uniform(size=count) < chance).astype(float)
+    expected = np.where(nominal > 0.0, 0.2, 0.02 * np.maximum(distance, 1.0) ** -8)
+    weight = np.exp(sigma * rng.standard_normal(count))
+    known = ForeseenRuns(
+        np.array([distance, speed]), nominal[np.newaxis], expected[np.newaxis], weight
+    )
+    return known, happened[np.newaxis]
+
+
+def part_of(runs: ForeseenRuns, some: slice) -> ForeseenRuns:
+    return ForeseenRuns(
+        runs.geometry[:, some], runs.nominal[:, some], runs.expected[:, some], runs.weight[some]
+    )
+
+
+def allocated(rng: np.random.Generator, runs: ForeseenRuns, happened: FloatArray) -> FloatArray:
+    """For how many each encounter stands after all rounds, as a study allocates them."""
+    stands_for = np.ones(len(runs.weight))
+    start, *ends = round_ends(len(stands_for), None)
+    for end in ends:
+        plan = learn(part_of(runs, slice(start)), happened[:, :start], stands_for[:start])
+        chance = plan.probabilities(part_of(runs, slice(start, end)))
+        stands_for[start:end] = drawn(chance, rng.uniform(size=end - start))[1]
+        start = end
+    return stands_for
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.7])
+def test_the_ratio_is_unbiased_its_interval_covers_and_the_gain_said_is_there(sigma: float) -> None:
+    rng = np.random.default_rng(20261128)
+    # By counting far more of them than any study has.
+    many, events = encounters(rng, 1_000_000, sigma=sigma)
+    truth = float((many.weight * events).sum() / (many.weight * many.nominal).sum())
+    errors, covered, costs, plain, said = [], [], [], [], []
+    for _ in range(200):
+        runs, happened = encounters(rng, RUNS, sigma=sigma)
+        stands_for = allocated(rng, runs, happened)
+        flags = runs.nominal[0], happened[0], runs.weight
+        one = paired_ratio(*flags, stands_for=stands_for)
+        errors.append(one.ratio - truth)
+        covered.append(one.interval[0] <= truth <= one.interval[1])
+        costs.append(one.flown / RUNS + FORESEEN_COST)
+        said.append(one.gain)
+        plain.append(paired_ratio(*flags).ratio - truth)
+    spread = float(np.std(errors))
+    # The mean of 200 has a standard error of 0.07 of the spread.
+    assert abs(np.mean(errors)) < 0.15 * spread
+    assert 0.93 <= np.mean(covered) <= 0.985
+    gain = float(np.var(plain)) / spread**2 / float(np.mean(costs))
+    assert gain > 1.5
+    assert np.median(said) == pytest.approx(gain, rel=0.35)
+
+
+def test_where_the_event_comes_anywhere_nothing_is_gained_and_it_says_so() -> None:
+    rng = np.random.default_rng(7)
+    errors, gains = [], []
+    for _ in range(60):
+        runs, happened = encounters(rng, RUNS, everywhere=0.2)
+        one = paired_ratio(runs.nominal[0], happened[0], stands_for=allocated(rng, runs, happened))
+        errors.append(one.ratio)
+        gains.append(one.gain)
+    many, events = encounters(rng, 1_000_000, everywhere=0.2)
+    truth = float(events.sum() / many.nominal.sum())
+    assert abs(np.mean(errors) - truth) < 3.0 * float(np.std(errors)) / np.sqrt(60)
+    assert 0.8 <= np.median(gains) <= 1.0
+
+
+def test_an_event_that_nobody_expects_is_flown_and_weighs_what_it_stands_for() -> None:
+    rng = np.random.default_rng(11)
+    runs, happened = encounters(rng, RUNS)
+    far = np.flatnonzero(runs.geometry[0] > 5.0)
+    happened[0, far[::10]] = 1.0  # the pilot never saw why
+    sums = []
+    for _ in range(60):
+        s = allocated(rng, runs, happened)
+        sums.append(float((s * happened[0]).sum()))
+    assert np.mean(sums) == pytest.approx(happened.sum(), abs=3.0 * np.std(sums) / np.sqrt(60))
+
+
+def test_no_event_one_event_and_encounters_that_are_all_alike() -> None:
+    rng = np.random.default_rng(3)
+    runs, happened = encounters(rng, PILOT)
+    for seen in (np.zeros_like(happened), np.eye(1, PILOT)):
+        plan = learn(runs, seen, np.ones(PILOT))
+        chance = plan.probabilities(runs)
+        assert ((chance >= LEAST) & (chance <= 1.0)).all()
+        # What is nominal is flown before what passes far away.
+        assert chance[runs.nominal[0] > 0.0].min() > chance[runs.geometry[0] > 3.0].max()
+    alike = ForeseenRuns(np.ones((2, 50)), np.ones((1, 50)), np.full((1, 50), 0.2), np.ones(50))
+    plan = learn(alike, np.zeros((1, 50)), np.ones(50))
+    assert np.unique(plan.probabilities(alike)).size == 1
+    never = ForeseenRuns(
+        np.full((2, 50), np.nan), np.zeros((1, 50)), np.zeros((1, 50)), np.ones(50)
+    )
+    assert np.isfinite(learn(never, np.zeros((1, 50)), np.ones(50)).probabilities(never)).all()
+
+
+def test_weights_over_six_orders_of_magnitude_stay_finite_and_the_heavy_are_flown() -> None:
+    rng = np.random.default_rng(5)
+    runs, happened = encounters(rng, PILOT)
+    heavy = ForeseenRuns(
+        runs.geometry, runs.nominal, runs.expected, 10.0 ** rng.uniform(-3, 3, PILOT)
+    )
+    chance = learn(heavy, happened, np.ones(PILOT)).probabilities(heavy)
+    assert np.isfinite(chance).all() and chance.min() >= LEAST
+    inside = heavy.nominal[0] > 0.0
+    order = np.argsort(heavy.weight[inside])
+    assert chance[inside][order[-1]] == 1.0 and chance[inside][order[0]] < 0.5
+
+
+def test_the_size_of_the_probabilities_has_the_least_variance_times_cost() -> None:
+    """Against a search over all pairs of two probabilities, one for each of two kinds of runs."""
+    p, many = np.array([0.3, 0.002]), np.array([100, 900])
+    runs = ForeseenRuns(
+        np.zeros((1, 1000)), np.repeat([1.0, 0.0], many)[np.newaxis], np.zeros((1, 1000)),
+        np.ones(1000),
+    )  # fmt: skip
+    ratio = float((p * many).sum() / many[0])
+
+    def cost(pi: FloatArray) -> float:
+        variance = (many * p / pi).sum() + many[0] * (ratio**2 - 2.0 * ratio * p[0])
+        return float(variance * ((many * pi).sum() / 1000 + FORESEEN_COST))
+
+    precision, size = best_size(runs, np.repeat(p, many)[np.newaxis])
+    mine = flown_with(np.sqrt(precision[0] * p), size)
+    grid = np.linspace(LEAST, 1.0, 98)
+    best = min(cost(np.array([a, b])) for a in grid for b in grid)
+    assert cost(mine) <= 1.01 * best
+    # Neyman's rule: in proportion to the root of the chance, but for the limits.
+    assert mine[1] == pytest.approx(max(LEAST, mine[0] * np.sqrt(p[1] / p[0])), rel=0.02) or (
+        mine[0] == 1.0
+    )
+
+
+def test_chances_are_those_that_a_grid_search_finds_likeliest() -> None:
+    rng = np.random.default_rng(2)
+    terms = rng.standard_normal((1, 400))
+    happened = (rng.uniform(size=400) < 1.0 / (1.0 + np.exp(1.0 - 0.8 * terms[0]))).astype(float)
+    expected = np.full(400, 0.2)
+    level, slope = fit_chances(terms, expected, happened, np.ones(400))
+
+    def loss(a: float, b: float) -> float:
+        p = 1.0 / (1.0 + np.exp(-(a + b * terms[0] + np.log(0.25))))
+        likely = -(happened * np.log(p) + (1 - happened) * np.log(1 - p)).sum()
+        return float(likely + a * a / 18.0 + b * b / 0.5)
+
+    grid = np.linspace(-0.05, 0.05, 21)
+    found = min((loss(level + a, slope + b), a, b) for a in grid for b in grid)
+    assert found[1:] == pytest.approx((0.0, 0.0), abs=0.0051)
+
+
+def test_rounds_grow_and_end_with_the_study() -> None:
+    assert round_ends(100, None) == [100]
+    assert round_ends(PILOT, None) == [PILOT]
+    assert round_ends(10_000, None) == [PILOT, 4 * PILOT, 16 * PILOT, 10_000]
+    assert round_ends(250, 100) == [100, 200, 250]
+
+
+def test_a_plan_that_flies_all_stands_for_one_each() -> None:
+    plan = Allocation(np.zeros(1), np.ones(1), np.zeros((1, 2, 4)), np.ones(1), float("inf"))
+    runs = ForeseenRuns(np.zeros((1, 3)), np.ones((1, 3)), np.full((1, 3), 0.2), np.ones(3))
+    flown, stands_for = drawn(plan.probabilities(runs), [0.0, 0.5, 0.999])
+    assert flown.all() and stands_for.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_ratio_of_a_sample_by_hand() -> None:
+    # Two of four flown, each for two; the second unflown one has the event nominally.
+    one = paired_ratio(
+        [1, 1, 0, 0], [1, np.nan, np.nan, 1], [1.0, 2.0, 3.0, 4.0], stands_for=[2, 0, 0, 2]
+    )
+    assert one.ratio == pytest.approx((2 * 1 + 2 * 4) / 3)
+    assert one.induced == pytest.approx(8 / 3) and one.unresolved == pytest.approx(2 / 3)
+    assert (one.flown, one.nominal_events, one.mitigated_events, one.induced_events) == (2, 2, 2, 1)
+    r = 10 / 3
+    terms = [2 - r, -2 * r, 0, 8]
+    assert one.standard_error == pytest.approx(np.sqrt(np.square(terms).sum()) / 3)
+    for bad in ([0.5, 1.0], [np.nan, 1.0], [-1.0, 1.0], [1.0]):
+        with pytest.raises(ValueError, match="stands_for"):
+            paired_ratio([1, 0], [1, 0], stands_for=bad)
