@@ -17,10 +17,10 @@ import pyarrow.parquet as pq
 from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
-from dsa_des.errors import SceneError
+from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
 from dsa_des.record.undone import Undone, added
-from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
 from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
@@ -31,6 +31,7 @@ from dsa_des.results.record import (
     columns_of,
     draw_column,
 )
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
@@ -238,6 +239,8 @@ def _flown(
     done = 0
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
+    if key not in _bytes_of_a_run and len(replicas) > _FIRST_RUNS:
+        _bytes_of_a_run[key] = _likely_bytes(scene, replicas[0], wanted_by(metrics))
     while done < len(replicas):
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
@@ -263,8 +266,21 @@ def _flown(
     return values
 
 
-#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
-#: runs of a cell tell how many that is.
+def _likely_bytes(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> float:
+    """Return what a run hardly records more than: of every target a row at every scan.
+
+    Few runs to begin with would cost a closed loop as many windows as all.
+    """
+    try:
+        simulation = Simulation(scene_of(scene, replica))
+        width = max(component.width for component in simulation.components.values())
+    except (SceneError, BlockFailure):  # its row says why
+        return _MOST_BYTES / _FIRST_RUNS
+    return 8.0 * sum(map(len, wanted.values())) * simulation.scans * max(1, width)
+
+
+#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The runs
+#: before tell how many that is.
 _MOST_BYTES, _FIRST_RUNS = 150e6, 64
 _MOST_KNOWN = 1000
 #: By study and cell, from the runs before: it follows from the scene, and changes no result.

@@ -109,10 +109,10 @@ def test_what_has_no_range_is_counted(tmp_path: Path, tracker: str | None, sourc
     eyes["wires"] += ["traffic -> alerting", f"{source} -> alerting"]
     times, of = undone(eyes)["alerting"][NO_RANGE]
     assert times == of > 30
-    # In lock step each run counts, as often as by itself.
-    together = lock_step(replicas_of(dsa_des.load_scene(eyes), {}, {}))
-    counts = [undone(one) for one in replicas_of(dsa_des.load_scene(eyes), {}, {})]
-    assert together.run().undone == added(counts)
+    # In lock step each run counts, as often as by itself: of a shared block and of a split one.
+    for change in ({}, {"blocks.alerting.fit_s": 2.0}):
+        scenes = replicas_of(dsa_des.load_scene(eyes), {}, change)
+        assert lock_step(scenes).run().undone == added(map(undone, scenes))
 
 
 def test_a_block_that_nothing_wakes_is_named(tmp_path: Path) -> None:
