@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
-from components.guidance.daidalus import ConfParameters, changes_out, smaller
+from components.guidance.daidalus import ConfParameters, changes_out, smaller, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
@@ -79,6 +79,12 @@ class TurnOut(Component):
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
+
+    def warnings(self) -> list[str]:
+        """Say why it never steers, where that is so."""
+        return why_never_steers(
+            self.p.level, self._configuration, self._alerter, self.context.producers
+        )
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look at every instant with an alert."""

@@ -45,6 +45,12 @@ class BelievedPositions:
         self._keep_s, self._targets = keep_s, targets
         #: East, north, up (targets, 3, n); NaN where a target was not seen.
         self._seen = ReceivedRows.none(time_s=(), position_m=(targets, 3))
+        #: How many, of how many: sights without a range, and targets there without a velocity.
+        self._rangeless, self._unmoving = np.zeros((2, 2), dtype=np.int64)
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often something could not be judged."""
+        return judged_not(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in positions (n, targets, 3) at instants of their run, and when they came."""
@@ -55,9 +61,12 @@ class BelievedPositions:
         """Take in what was measured in body axes, by the attitude of when it was measured."""
         sights: Tracks | FusedDetections = arrived.message
         row = sights.row_of_entries
-        new = np.isfinite(sights.range_m) & (sights.target >= 0)
+        new = sights.target >= 0
         if isinstance(sights, Tracks):
             new &= sights.updated  # others came with an earlier row
+        with_range = np.isfinite(sights.range_m)
+        self._rangeless += np.count_nonzero(new & ~with_range), np.count_nonzero(new)
+        new &= with_range
         # The attitude of when it was measured, of those that have arrived.
         came = arrived.instants.take(row)
         pose = own.pose_of(RunTicks(came.run, sights.measured_tick), came, new)
@@ -125,6 +134,7 @@ class BelievedPositions:
             )
         if not known.all() and len(time_s):
             self._add_slow(now, now_s, known, state)
+        self._unmoving[1] += np.count_nonzero(known)
         return known, state
 
     def _add_slow(
@@ -143,6 +153,8 @@ class BelievedPositions:
         found = _fitted(time_s[lines], position, now_s[scans[of]])
         known[scans[of], target] = found[0][:, 0]
         state[:, scans[of], target] = found[1][:, :, 0]
+        there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
+        self._unmoving += np.count_nonzero(there & ~known[scans])
 
     def _last_two(self, now: RunTicks) -> tuple[IntArray, IntArray]:
         """Return the last rows with a position of each target, of two instants, by some instants.
@@ -169,6 +181,15 @@ class BelievedPositions:
             if not alike.any():
                 return last, before
             before = np.where(alike, earlier(before - 1), before)
+
+
+def judged_not(rangeless: IntArray, unmoving: IntArray) -> dict[str, tuple[int, int]]:
+    """Return in words how often something could not be judged, and why."""
+    lacks = {
+        "what it hears of has no range and is not judged": rangeless,
+        "who is there has no velocity yet and is not judged": unmoving,
+    }
+    return {what: (int(count[0]), int(count[1])) for what, count in lacks.items() if count[1]}
 
 
 def true_positions_m(states: TrafficStates) -> FloatArray:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations, largest
-from components.alerting.believed_positions import BelievedFlights
+from components.alerting.believed_positions import BelievedFlights, judged_not
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
@@ -38,6 +38,8 @@ class EstimatedFlights:
     """
 
     def __init__(self) -> None:
+        #: How many tracks have no range, of how many.
+        self.rangeless = np.zeros(2, dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
         self._rows = ReceivedRows.none("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
@@ -55,7 +57,9 @@ class EstimatedFlights:
 
     def add(self, came: RunTicks, tracks: StateTracks) -> None:
         """Take in tracks of a tracker, and when each row came."""
-        good = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
+        good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
+        self.rangeless += np.count_nonzero(good & ~tracks.has_range), np.count_nonzero(good)
+        good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
         self._rows = self._rows.with_more(came, begin=begin, count=np.diff(before))
@@ -163,6 +167,12 @@ class BelievedTracks:
         self._estimates = EstimatedFlights()
         #: Where the targets are: a track is named by the nearest.
         self._true = ReceivedRows.none(position_m=(targets, 3))
+        #: At how many scans the ownship's velocity is not known yet, of how many.
+        self._unmoving = np.zeros(2, dtype=np.int64)
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often something could not be judged."""
+        return judged_not(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in the tracks of a tracker."""
@@ -185,6 +195,7 @@ class BelievedTracks:
         """
         # Without two poses the ownship's own velocity is not known, and no relative one.
         moving = np.flatnonzero(np.isfinite(own["east_mps"]))
+        self._unmoving += len(asked) - len(moving), len(asked)
         now = asked.take(moving)
         result = self._estimates.states(now, times_s[moving], poses.place(now))
         scan, number, state, deviations, age_s = moving[result[0]], *result[1:]

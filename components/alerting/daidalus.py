@@ -20,7 +20,7 @@ from components.alerting.memory import LevelMemory
 from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
-from components.messages.alerts import MOST_LEVELS, AlertLevels
+from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
@@ -108,9 +108,28 @@ class DaidalusAlerting(Component):
         self._over_s = 0.0 if self._source == "estimates" else self.p.fit_s
         self._memory = LevelMemory(memory_rule(configuration))
 
+    def offer(self, port: str) -> AlertsOffered:
+        """Say how many levels there are, and how far apart the scans."""
+        return AlertsOffered(len(self.p.read()[1].levels), float(1 / self.p.scan_rate_hz))
+
     def warnings(self) -> list[str]:
-        """Say what of its configuration is not used."""
-        return self._configuration.notes()
+        """Say what of its configuration is not used, and what leaves it without work."""
+        said, period_s = self._configuration.notes(), float(1 / self.p.scan_rate_hz)
+        if 0.0 < self._configuration["hysteresis_time"] < period_s:
+            said.append(
+                f"hysteresis_time is {self._configuration['hysteresis_time']:g} s and scans are "
+                f"{period_s:g} s apart: no level is remembered"
+            )
+        if self.p.offset_s + 1 / self.p.scan_rate_hz >= self.context.duration_s:
+            said.append(
+                f"scan_rate_hz is {float(self.p.scan_rate_hz):g}: in "
+                f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
+            )
+        return said
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often a flight could not be judged."""
+        return {} if self._roster is None else self._belief.undone()
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""

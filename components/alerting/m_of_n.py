@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.alerting.memory import LevelMemory, MemoryRule
-from components.messages.alerts import MOST_LEVELS, AlertLevels
+from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
 
@@ -49,6 +49,20 @@ class MOfNAlerts(Component):
     def setup(self) -> None:
         """Start without memory."""
         self._memory = LevelMemory(MemoryRule(self.p.forget_s, self.p.hold_s, self.p.m, self.p.n))
+
+    def offer(self, port: str) -> AlertsOffered | None:
+        """Pass on what is said of the unfiltered alerts."""
+        return next((p.offer for p in self.context.producers), None)
+
+    def warnings(self) -> list[str]:
+        """Say where its memory cannot hold anything."""
+        offered = self.offer("alerts")
+        if offered is None or self.p.forget_s >= offered.period_s:
+            return []
+        return [
+            f"forget_s is {self.p.forget_s:g} and the alerts come {offered.period_s:g} s apart: "
+            "every one is new, and passes as it is"
+        ]
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Filter every instant."""

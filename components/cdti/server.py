@@ -219,9 +219,13 @@ class DisplayServer:
         """Live with one page until it goes."""
         assert connection.request is not None
         query = parse_qs(urlsplit(connection.request.path).query)
-        role, key = self._admission.role(_token(connection.request), query.get("key", [""])[0])
+        deciding = [page for page in self.pages if page.role == OPERATOR]
+        # A browser that had the key is known by it again, but takes nobody's place.
+        names = ("key",) if deciding else ("key", "before")
+        known = next((query[name][0] for name in names if query.get(name)), "")
+        role, key = self._admission.role(_token(connection.request), known)
         if role == OPERATOR:
-            for other in [p for p in self.pages if p.role == OPERATOR]:
+            for other in deciding:
                 other.role = "replaced"
                 await other.connection.close(4001, "opened elsewhere")
         page = Page(connection, role)

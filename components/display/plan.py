@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from components.display.alerted import Alerted, draw_alerted_lines, draw_manoeuvres
 from components.display.flights import Flights, Positions, Track, positions
 from components.display.map_view import (
     MAP_WIDTH_IN,
@@ -54,6 +55,7 @@ def draw_plan(
     flights: Flights,
     detected: Detected,
     summary: dict[str, Any],
+    alerted: Alerted,
 ) -> Path:
     """Draw the plan view, with fields of view as the blocks have them, and write it as PNG."""
     marks = positions(flights, detected)
@@ -83,6 +85,9 @@ def draw_plan(
         for name, outline in outlines.items():
             draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
+        above = {t.name: (t.time_s, t.east_km, t.north_km) for t in flights.targets}
+        draw_alerted_lines(axes, alerted, above)
+        draw_manoeuvres(axes, *flights.own_at(alerted.manoeuvres_s))
         drawn = {
             name: _draw_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
@@ -101,9 +106,15 @@ def draw_plan(
         )
         px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
         _draw_altitudes(heights, flights, marks, detected.styles, px_per_s)
+        beside = {t.name: (t.time_s, t.time_s, t.alt_m) for t in flights.targets}
+        draw_alerted_lines(heights, alerted, beside)
+        own = flights.own
+        when_s = alerted.manoeuvres_s
+        draw_manoeuvres(heights, when_s, np.interp(when_s, own.time_s, own.alt_m))
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         dense = len(flights.targets) >= DENSE
         handles = _legend(texts, detected, drawn, summary, dense)
+        handles[4:4] = alerted.key()
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
             frameon=False, labelspacing=0.9, borderaxespad=0.0,

@@ -61,9 +61,11 @@ class DetectAndSenseReport:
     def draw(self, simulation: Simulation, folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw the figures of a run into its folder, the same bytes on every drawing.
 
-        ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
-        ``tracks.png`` and ``consistency.png`` where a tracker confirmed tracks with a range.
+        ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, both with
+        alerts and manoeuvres, and ``tracks.png`` and ``consistency.png`` where a tracker confirmed
+        tracks with a range.
         """
+        from components.display.alerted import Alerted
         from components.display.consistency import draw_consistency
         from components.display.flights import Flights
         from components.display.plan import draw_plan
@@ -75,10 +77,13 @@ class DetectAndSenseReport:
         flights = Flights.of(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))
         detected.styles = styles_of(detected.sensors, simulation.components)
+        alerted = Alerted.read(folder)
         paths = []
         if flights is not None:
-            paths.append(draw_plan(folder / "plan.png", simulation, flights, detected, summary))
-        paths.append(draw_timeline(folder / "timeline.png", simulation, flights, detected, folder))
+            plan = folder / "plan.png"
+            paths.append(draw_plan(plan, simulation, flights, detected, summary, alerted))
+        timeline = folder / "timeline.png"
+        paths.append(draw_timeline(timeline, simulation, flights, detected, folder, alerted))
         tracks = DrawnTracks.read(simulation, folder)
         if tracks is not None:
             paths.append(draw_tracks(folder / "tracks.png", tracks))

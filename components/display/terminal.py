@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from components.display.outcomes import NEAR_M
+from dsa_des.record.undone import undone_sentences
 from dsa_des.text.safe_text import printable, shortened
 
 MOST_TARGETS = 10
@@ -42,6 +43,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
     if summary.get("targets"):
         _show_closest(console, summary["targets"])
     for line in outcome_lines(summary):
+        _print_line(console, line)
+    for line in undone_sentences(summary.get("undone") or {}):
         _print_line(console, line)
     for line in attitude_lines(summary.get("traffic") or {}):
         _print_line(console, line)

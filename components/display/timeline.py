@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from components.display.alerted import Alerted, draw_alerted_lines, draw_manoeuvres
 from components.display.flights import Flights
 from components.display.recorded_rows import (
     Detected,
@@ -58,6 +59,7 @@ def draw_timeline(
     flights: Flights | None,
     detected: Detected,
     folder: Path,
+    alerted: Alerted,
 ) -> Path:
     """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
@@ -66,7 +68,7 @@ def draw_timeline(
     with drawing(*_SIZE_IN, path) as figure:
         if not scans:  # a scene without sensors has ranges only
             whole = figure.add_axes((_LEFT, 0.1, _BELOW, 0.8))
-            _draw_ranges(whole, flights, detected, duration_s)
+            _draw_ranges(whole, flights, detected, duration_s, alerted)
             whole.set_title(f"{title}: no sensor scans", loc="left")
             return path
         close_up = find_close_up(scans, folder, duration_s)
@@ -77,7 +79,7 @@ def draw_timeline(
         # The legend stands beside the lower line.
         above.set_title(f"{title}\n{close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
-        _draw_ranges(below, flights, detected, duration_s)
+        _draw_ranges(below, flights, detected, duration_s, alerted)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
         below.set_title("Whole run (shaded: the part above)", loc="left")
     return path
@@ -206,7 +208,13 @@ def _mark_size(count: int) -> float:
     return 0.65 * _SIZE_IN[0] * _WIDTH * 72 / max(1, count)
 
 
-def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duration_s: float) -> None:
+def _draw_ranges(
+    axes: Any,
+    flights: Flights | None,
+    detected: Detected,
+    duration_s: float,
+    alerted: Alerted,
+) -> None:
     from matplotlib.lines import Line2D
 
     top_km = max(
@@ -229,6 +237,11 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
         if flights is not None and len(lines) <= MOST_NAMED:
             names = [target.name for target in flights.targets]
             name_lines(axes, dict(zip(names, lines, strict=True)), "#333333")
+        if flights is not None:
+            ranges = {t.name: (t.time_s, t.time_s, t.range_m / 1000) for t in flights.targets}
+            draw_alerted_lines(axes, alerted, ranges)
+    draw_manoeuvres(axes, alerted.manoeuvres_s, np.zeros(len(alerted.manoeuvres_s)))
+    handles += alerted.key()
     width_px = _SIZE_IN[0] * _BELOW * DPI
     for name in detected.sensors:
         _draw_detections(axes, detected, name, width_px / duration_s)

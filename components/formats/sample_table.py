@@ -53,7 +53,7 @@ class SampleTable:
     A bad cell of an `optional` quantity is no error: the aircraft goes without the whole column,
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
-    `instead` names for it. Rows of one aircraft that say the same of one instant are one sample.
+    `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
     `parse_time` reads a time cell where a plain number will not do.
     """
 
@@ -300,7 +300,7 @@ class SampleTable:
         lines = lines[order]
         columns = {key: values[order] for key, values in columns.items()}
         where = [values for key, values in columns.items() if key not in self._optional]
-        again = np.all([values[1:] == values[:-1] for values in where], axis=0)
+        again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
         if again.any():
             count = int(np.count_nonzero(again))
             self.note_of(name, "again", f"{count} of its samples stand there again and count once")

@@ -13,9 +13,15 @@ from components.guidance.bands import Guidance, guidance_of_many, resolution
 from components.guidance.intervals import FULL_TURN, same_place
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
-from components.messages.alerts import BAND_KINDS, BAND_REGIONS, AlertLevels, GuidanceBands
+from components.messages.alerts import (
+    BAND_KINDS,
+    BAND_REGIONS,
+    AlertLevels,
+    GuidanceBands,
+    never_reached,
+)
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component, Input, Output, Parameters, ScenePath
+from dsa_des.block.component import Component, Input, Output, Parameters, Producer, ScenePath
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
 
@@ -144,6 +150,20 @@ def smaller(changes: tuple[float, float]) -> float | None:
     return change if math.isfinite(change) else None
 
 
+def why_never_steers(
+    level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
+) -> list[str]:
+    """Say where no alert reaches the level from which somebody steers, or no band is red."""
+    said = never_reached("level", level, producers)
+    if configuration.corrective_level(alerter) is None:
+        said.append(
+            f"no level of the alerter {alerter.name} has the region "
+            f"{configuration['corrective_region']} (corrective_region) or a worse one: no band is "
+            "red, so it never steers"
+        )
+    return said
+
+
 _NAMES = {"direction": "hdir", "altitude": "alt", "speed": "hs"}
 
 
@@ -179,6 +199,13 @@ class DaidalusGuidance(Component):
     def setup(self) -> None:
         """Read the configuration."""
         self._configuration, self._alerter = self.p.read()
+
+    def warnings(self) -> list[str]:
+        """Say where no alert reaches its level, or no level has bands."""
+        said = never_reached("level", self.p.level, self.context.producers)
+        if all(level.region == "NONE" for level in self._alerter.levels):
+            said.append(f"no level of the alerter {self._alerter.name} has a region: no bands")
+        return said
 
     def run(self, wake: Wake) -> GuidanceBands | None:
         """Give the bands of every instant with an alert."""

@@ -1,12 +1,15 @@
 """The messages of alerting: the alert level of each target, and the bands of guidance."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.columns import target_names
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Producer
 from dsa_des.block.message import Column, Message, Text, column, columns, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
@@ -91,6 +94,21 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
     if contact < 0:
         return ""
     return names[contact] if contact < len(names) else None
+
+
+class AlertsOffered(NamedTuple):
+    """What a block says of the alerts that it sends."""
+
+    levels: int  # Of the alerter, which is the highest that may come
+    period_s: float  # Between its scans
+
+
+def never_reached(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
+    """Say that no alert reaches the level of a key, of who is fed by such producers."""
+    offered = [p.offer.levels for p in producers if isinstance(p.offer, AlertsOffered)]
+    if not offered or level <= max(offered):
+        return []
+    return [f"{key} is {level}: the alerts it gets have {max(offered)} levels, so it does nothing"]
 
 
 #: What bands are of, and the regions they are painted with.

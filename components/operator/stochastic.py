@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from components.arguments.units import FOOT_M
 from components.flights.point_mass import LEAST_EASING_S
-from components.guidance.daidalus import ConfParameters, changes_out
+from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.arrays.types import FloatArray
@@ -236,6 +236,12 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
+
+    def warnings(self) -> list[str]:
+        """Say why it never steers, where that is so."""
+        return why_never_steers(
+            self.p.level, self._configuration, self._alerter, self.context.producers
+        )
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Follow the alerts, instant by instant."""

@@ -58,15 +58,15 @@ Model = Literal["velocity", "turn", "acceleration"]
 class InteractingParameters(TrackerParameters):
     """Parameters of the tracker with interacting models.
 
-    Manoeuvres are the other models' work, so every model's own noise is small.
+    The defaults are chosen on a table of turns, climbs and changes of speed (docs/tracking.md).
     """
 
     acceleration_intensity_m2_s3: float = Field(
-        default=0.1, gt=0,
+        default=1.0, gt=0,
         description="Intensity of the white acceleration within `velocity`, m²/s³.",
     )  # fmt: skip
     models: tuple[Model, ...] = Field(
-        default=("velocity", "turn"),
+        default=("velocity", "turn", "acceleration"),
         min_length=2,
         max_length=3,
         description="Motion models, each once: constant velocity, coordinated turn, constant "
@@ -75,16 +75,16 @@ class InteractingParameters(TrackerParameters):
     transition_rates_per_s: tuple[tuple[float, ...], ...] | None = Field(
         default=None,
         description="Rates from each model (row) to each (column), 1/s; the diagonal is not read. "
-        "By default velocity is left every 60 s and the others every 100 s, to any other alike.",
+        "By default each is left every 15 s, to any other alike.",
     )
     turn_acceleration_intensity_m2_s3: float = Field(
-        default=0.1, gt=0, description="Intensity of the white acceleration within a turn, m²/s³."
+        default=1.0, gt=0, description="Intensity of the white acceleration within a turn, m²/s³."
     )
     turn_rate_intensity_deg2_s3: float = Field(
         default=0.01, gt=0, description="Intensity with which the rate of a turn drifts, deg²/s³."
     )
     jerk_intensity_m2_s5: float = Field(
-        default=1.0, gt=0, description="Intensity of white jerk of `acceleration`, m²/s⁵."
+        default=4.0, gt=0, description="Intensity of white jerk of `acceleration`, m²/s⁵."
     )
     start_turn_deg_s: float = Field(
         default=3.0,
@@ -93,7 +93,7 @@ class InteractingParameters(TrackerParameters):
         "turn, deg/s.",
     )
     start_acceleration_m_s2: float = Field(
-        default=3.0,
+        default=8.0,
         gt=0,
         description="That of the acceleration along each axis of a new track, and of one that "
         "begins to accelerate, m/s².",
@@ -135,8 +135,7 @@ class InteractingModels(Tracker):
         rates = p.transition_rates_per_s
         if rates is None:
             others = len(p.models) - 1
-            leave = [1.0 / 60.0 if name == "velocity" else 0.01 for name in p.models]
-            rates = tuple(tuple(rate / others for _ in p.models) for rate in leave)
+            rates = ((1.0 / 15.0 / others,) * len(p.models),) * len(p.models)
         fresh = {
             "velocity": 0.0,
             "turn": float(np.radians(p.start_turn_deg_s)) ** 2,

@@ -316,6 +316,13 @@ class Component:
         """
         return []
 
+    def undone(self) -> Mapping[str, tuple[int, int]]:
+        """Return how often this block could not do its work: by what lacked, times, of how many.
+
+        Asked after it has run; counts are over every row of every run that it has seen.
+        """
+        return {}
+
     def left_out(self) -> list[str]:
         """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []

@@ -241,6 +241,7 @@ def _as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
         "runs": _count(tables),
         "failed": tables.rows.failed,
         "crashed": tables.rows.crashed,
+        "undone": tables.folder.undone(),
         **rows,
         "figures": [str(path) for path in figures],
     }

@@ -18,7 +18,7 @@ _LONGEST = 60
 def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
     """Return a PNG: the running estimate of every requirement with its interval and its limit."""
     drawn = io.BytesIO()
-    with drawing(7.0, 2.6 * len(findings) + 0.3, drawn) as figure:
+    with drawing(8.6, 2.9 * len(findings) + 0.3, drawn) as figure:
         grid = figure.subplots(len(findings), 1, squeeze=False)[:, 0]
         for axes, one in zip(grid, findings, strict=True):
             c, asked = one.convergence, one.requirement
@@ -41,7 +41,8 @@ def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
             axes.set_xscale("log")
             plain_log_ticks(axes.xaxis)
             axes.set_ylabel(figure_text(asked.name, _LONGEST))
-            axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+            # Above the plot: beside it, the words would take a third of its width.
+            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
         grid[-1].set_xlabel("encounters")
         tight(figure)
     return drawn.getvalue()

@@ -40,7 +40,7 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
         ],
         also=[(readable(r["result"]), _number(r["value"]), _interval(r), r["meaning"])
               for r in e["also"]],
-        beside_heads=("", *map(readable, names)), beside=_beside(e, names),
+        beside_heads=("system", *map(readable, names)), beside=_beside(e, names),
         sample=[
             ("model", e["sample"]["model"]), ("licence", e["sample"]["licence"]),
             ("weights", e["sample"]["weights"]), ("encounters", e["sample"]["encounters"]),

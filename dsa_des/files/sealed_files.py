@@ -53,12 +53,20 @@ _MARK = _KEY + bytes([0x18, _DIGITS])
 _ZEROS = b"0" * _DIGITS
 
 
-def parquet(table: "pa.Table") -> bytes:
-    """Return a table as the bytes of a Parquet file that can be sealed."""
+#: What is said of the rows of a file as a whole.
+ABOUT = b"dsa_des.about"
+
+
+def parquet(table: "pa.Table", about: bytes = b"") -> bytes:
+    """Return a table as the bytes of a Parquet file that can be sealed.
+
+    `about` says something of all its rows; it stands in the metadata of the table that is read.
+    """
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
-    marked = table.replace_schema_metadata({_KEY: _ZEROS})
+    said = {ABOUT: about} if about else {}
+    marked = table.replace_schema_metadata({_KEY: _ZEROS, **said})
     # Arrow's own copy of the schema holds the key again, but encoded: the zeros stay there.
     pq.write_table(marked, buffer, compression="zstd")
     return buffer.getvalue()

@@ -13,6 +13,7 @@ from typing import Any
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.record.recording import Recorder
+from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
@@ -69,6 +70,8 @@ class Replicas(Timeline):
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
         self.together: dict[str, Component] = {}
+        #: What instances of split blocks could not do.
+        self._undone: Undone = {}
         _check_alike(self._scenes)
         self.seeds = _seeds_of(self._scenes)
         self.streams = Streams(self.seeds)
@@ -185,7 +188,13 @@ class Replicas(Timeline):
             for number in range(len(self._scenes)):
                 block.make(number)
 
+    def undone(self, components: Mapping[str, Component]) -> Undone:
+        """Return what blocks could not do over all runs: of those that are split, by instance."""
+        shared = {n: c.undone() for n, c in components.items() if n not in self.split}
+        return added([shared, self._undone])
+
     def _finished(self, number: int, component: Component) -> None:
+        self._undone = added([self._undone, {component.name: component.undone()}])
         if self._report is not None:
             if number in self.runs.ended_by:
                 ended = Fraction(int(self.runs.ends[number]), self.scene.ticks_per_s)

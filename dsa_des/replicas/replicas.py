@@ -1,7 +1,7 @@
 """Many runs of one scene that differ by their seed and by a few values."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -11,6 +11,7 @@ from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
+from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
@@ -30,6 +31,7 @@ class Shared:
 
     tables: dict[str, Columns]
     replicas: int
+    undone: Undone
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Recorded:
 
     `report` returns the sections that blocks add to the summary; `ended_early` says whether a block
     ended the run before its time; `shared` is the recording of which the tables of this `number`
-    are a part.
+    are a part, and says what blocks could not do; of a run by itself `undone` does.
     """
 
     tables: dict[str, Columns]
@@ -48,6 +50,7 @@ class Recorded:
     ended_early: bool = False
     shared: Shared | None = None
     number: int = 0
+    undone: Undone = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -139,7 +142,7 @@ def _together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Record
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
-    shared = Shared(sink.tables(), len(scenes))
+    shared = Shared(sink.tables(), len(scenes), outcome.undone)
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _by_replica(shared.tables, len(scenes))
     ended = simulation.runs.ended_by
@@ -185,5 +188,12 @@ def _run(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
         return Failed(str(error))
     return Recorded(
         sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
-        simulation.runs.early,
+        simulation.runs.early, undone=outcome.undone,
     )  # fmt: skip
+
+
+def undone_in(outcomes: Iterable[Recorded | Failed]) -> Undone:
+    """Return what blocks could not do in runs; what ran in lock step counts once."""
+    runs = [one for one in outcomes if isinstance(one, Recorded)]
+    together = {id(one.shared): one.shared.undone for one in runs if one.shared is not None}
+    return added([*together.values(), *(one.undone for one in runs)])

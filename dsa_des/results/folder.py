@@ -1,9 +1,10 @@
 """The folder of a study: one Parquet part per chunk, each there as a whole or not at all."""
 
 import io
+import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -13,7 +14,8 @@ from pydantic import ValidationError
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, locked, write_file
 from dsa_des.files.output_names import why_not_written
-from dsa_des.files.sealed_files import is_sealed, open_lock, read_regular, sealed
+from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, sealed
+from dsa_des.record.undone import Undone, added
 from dsa_des.results.record import StudyHead, StudyRecord
 
 if TYPE_CHECKING:
@@ -170,6 +172,7 @@ class StudyFolder:
         Only some `columns` are read of a part that was checked before.
         """
         table = self._sealed(self.parts / f"{name}.parquet", name, columns)
+        table = None if table is None else table.replace_schema_metadata(None)
         whole = table is None or columns is not None or _fits(table, self.record)
         return table if whole else None
 
@@ -181,10 +184,17 @@ class StudyFolder:
             content = read_regular(path)
             if not is_sealed(content, self._owner(name)):
                 return None
-            table = pq.read_table(io.BytesIO(content), columns=columns)
+            return pq.read_table(io.BytesIO(content), columns=columns)
         except (OSError, MemoryError, pa.ArrowException):
             return None
-        return table.replace_schema_metadata(None)
+
+    def undone(self, names: Iterable[str] | None = None) -> Undone:
+        """Return what blocks could not do in the runs of some parts, by default of all."""
+        parts = []
+        for name in self.part_names() if names is None else names:
+            table = self._sealed(self.parts / f"{name}.parquet", name, ["cell"])
+            parts.append({} if table is None else undone_of(table))
+        return added(parts)
 
     def write_part(self, name: str, content: bytes) -> None:
         """Write a part as a whole, sealed as one of this study."""
@@ -248,7 +258,20 @@ class StudyFolder:
 
     def table(self, name: str) -> "pa.Table | None":
         """Return a table beside the parts; None if it is not there or not of this study."""
-        return self._sealed(self.path / name, name, None)
+        table = self._sealed(self.path / name, name, None)
+        return None if table is None else table.replace_schema_metadata(None)
+
+
+def undone_of(table: "pa.Table") -> Undone:
+    """Return what blocks could not do in the runs of a part, as its metadata says."""
+    text = (table.schema.metadata or {}).get(ABOUT, b"{}")
+    with suppress(ValueError, RecursionError):
+        found = json.loads(text)
+        return {
+            str(block): {str(what): (int(n), int(of)) for what, (n, of) in counts.items()}
+            for block, counts in found.items()
+        }
+    return {}
 
 
 #: How many damaged parts a message names.

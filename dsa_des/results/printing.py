@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from dsa_des.record.undone import undone_sentences
 from dsa_des.results.labels import rounded_to, short
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Answer, Compared, Line, one_sided
@@ -12,6 +13,7 @@ from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
 
+_LONGEST = 300
 #: Lines of a table that are printed.
 _MOST_SHOWN = 1000
 
@@ -75,6 +77,8 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     _note_unreached(console, tables)
     if len(lines) < len(tables.lines):
         console.print("all results: summary.parquet, or dsa-des study show FOLDER")
+    for sentence in undone_sentences(tables.folder.undone()):
+        console.print(shortened(sentence, _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
     if tables.rows.crashed:

@@ -124,6 +124,7 @@ def page_environment() -> Environment:
     )
     environment.filters.update(
         verbatim=_verbatim,
+        filled=_filled,
         plain=Markup,
         axis=axis_label,
         models=_models,
@@ -138,6 +139,13 @@ def _text(value: Any) -> Markup:
     if isinstance(value, Markup):
         return value
     return Markup(escape(shortened(printable(str(value)), _LONGEST)))
+
+
+def _filled(table: tuple[Iterable[Any], Iterable[Any]]) -> tuple[list[Any], list[list[Any]]]:
+    """Return heads and rows of a table without the columns in which nothing stands."""
+    heads, rows = list(table[0]), [list(row) for row in table[1]]
+    kept = [k for k in range(len(heads)) if any(str(row[k]) for row in rows)]
+    return [heads[k] for k in kept], [[row[k] for k in kept] for row in rows]
 
 
 def _verbatim(lines: Iterable[str]) -> Markup:

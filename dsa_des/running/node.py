@@ -98,6 +98,8 @@ class Node:
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
+        #: In which runs it has run.
+        self._ran: set[int] = set()
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
@@ -141,6 +143,16 @@ class Node:
                 raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
+
+    def undone(self) -> Mapping[str, tuple[int, int]]:
+        """Return in how many runs it never ran, where there are any."""
+        runs = self.simulation.runs.count
+        idle = 0 if self.component.process is not None else runs - len(self._ran)
+        if not idle:
+            return {}
+        ports = [name for name in self.channels if self.component.inputs[name].held]
+        why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
+        return {f"it never ran{why}": (idle, runs)}
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -281,6 +293,8 @@ class Node:
         if wake is None:
             return
         ticks = wake.ticks
+        if len(self._ran) < self.simulation.runs.count:
+            self._ran.update(wake.run[wake.instants.last_of_each].tolist())
         try:
             self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):

@@ -18,6 +18,7 @@ from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, attempt
+from dsa_des.record.undone import undone_sentences
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.reports import draw_all, load_reports, notes_of_scene, say_if_long
@@ -117,6 +118,7 @@ def summary_of(
     return {
         **observers.result(),
         **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
+        **({"undone": outcome.undone} if undone_sentences(outcome.undone) else {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
         "out": None if target is None else str(target),

@@ -21,6 +21,7 @@ from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import NotRecordedError, Recorder
+from dsa_des.record.undone import Undone, added
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
@@ -48,13 +49,15 @@ class Outcome:
     """What a run came to.
 
     Of runs that share a timeline, `duration_s` is the longest it may be. `windowed` are the blocks
-    that ran in look-ahead windows; `components` speak for the whole run.
+    that ran in look-ahead windows; `components` speak for the whole run. `undone` is what blocks
+    could not do, over all runs.
     """
 
     duration_s: float
     cpu_s: float
     windowed: list[str]
     components: Mapping[str, Component]
+    undone: Undone
 
     @cached_property
     def report(self) -> dict[str, Any]:
@@ -197,11 +200,15 @@ class Simulation:
             self.duration_s = Fraction(int(self.runs.ends[0]), self.ticks_per_s)
             for component in self.components.values():
                 component.context.duration_s = self.duration_s  # what it reports is up to there
+        speaking = self.timeline.finish(self.components)
+        stopped = pacer is not None and pacer.stopped
+        idle = {} if stopped else {name: node.undone() for name, node in self.nodes.items()}
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,
             sorted(name for name, node in self.nodes.items() if node.windowed),
-            self.timeline.finish(self.components),
+            speaking,
+            added([self.timeline.undone(self.components), idle]),
         )
 
     def _start(self, runs: range) -> None:

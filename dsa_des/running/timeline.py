@@ -12,6 +12,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
+from dsa_des.record.undone import Undone
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
@@ -117,3 +118,7 @@ class Timeline:
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Take note that all has run, and return the blocks that speak for the whole run."""
         return components
+
+    def undone(self, components: Mapping[str, Component]) -> Undone:
+        """Return what blocks could not do over all runs, once they are finished."""
+        return {name: component.undone() for name, component in components.items()}

@@ -5,6 +5,7 @@ the same.
 """
 
 import gc
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,10 +17,12 @@ import pyarrow.parquet as pq
 from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.foreign_calls import error_text, must_pass
-from dsa_des.errors import SceneError
+from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
-from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas
+from dsa_des.record.undone import Undone, added
+from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
+from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
     DONE,
@@ -28,6 +31,7 @@ from dsa_des.results.record import (
     columns_of,
     draw_column,
 )
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
@@ -67,8 +71,11 @@ def schema_of(study: Study) -> pa.Schema:
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
-    tables = [_run_cell(study, schema, *part, chunk.plans.get(part[0])) for part in chunk.runs]
-    done = done_of(chunk.name, pa.concat_tables(tables))
+    undone: list[Undone] = []
+    tables = [
+        _run_cell(study, schema, *part, chunk.plans.get(part[0]), undone) for part in chunk.runs
+    ]
+    done = done_of(chunk.name, pa.concat_tables(tables), added(undone))
     del tables
     if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
         gc.collect()
@@ -84,22 +91,24 @@ def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
         rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
         rows["status"] = [CRASHED] * (end - start)
         tables.append(_table(study, schema, cell, rows, {}))
-    return done_of(chunk.name, pa.concat_tables(tables))
+    return done_of(chunk.name, pa.concat_tables(tables), {})
 
 
-def done_of(name: str, table: pa.Table) -> Done:
-    """Return rows as the result of a chunk."""
+def done_of(name: str, table: pa.Table, undone: Undone) -> Done:
+    """Return rows as the result of a chunk, with what blocks could not do in these runs."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
-    return Done(name, parquet(table), table.num_rows, failed, status.count(CRASHED))
+    about = json.dumps(undone).encode() if undone else b""
+    return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
 
 
 def joined(name: str, parts: Sequence[Done]) -> Done:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    order = [("cell", "ascending"), ("replica", "ascending")]
-    return done_of(name, pa.concat_tables(tables).sort_by(order))
+    undone = added(map(undone_of, tables))
+    rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
+    return done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
@@ -149,9 +158,18 @@ def _nothing(count: int, *, text: bool) -> AnyArray:
 
 
 def _run_cell(
-    study: Study, schema: pa.Schema, cell: int, start: int, end: int, plan: Allocation | None
+    study: Study,
+    schema: pa.Schema,
+    cell: int,
+    start: int,
+    end: int,
+    plan: Allocation | None,
+    undone: list[Undone],
 ) -> pa.Table:
-    """Return the rows of some replicas of a cell, of which those that a plan chooses are flown."""
+    """Return the rows of some replicas of a cell, of which those that a plan chooses are flown.
+
+    What blocks could not do in them is put to `undone`.
+    """
     numbers = range(start, end)
     rows = _leading(study, cell, numbers)
     try:
@@ -161,8 +179,9 @@ def _run_cell(
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
+    key = str(study.path), cell
     if not study.allocate:
-        values = _flown(scene, metrics, replicas, rows["error"], (str(study.path), cell))
+        values = _flown(scene, metrics, replicas, rows["error"], key, undone)
         return _table(study, schema, cell, rows, values)
     known, errors = _foreseen(scene, metrics, replicas)
     for k, text in errors.items():
@@ -171,7 +190,7 @@ def _run_cell(
     shares = stands_for(study, cell, numbers, plan, results, known)
     chosen = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(chosen)
-    flown = _flown(scene, metrics, [replicas[k] for k in chosen], wrong, (str(study.path), cell))
+    flown = _flown(scene, metrics, [replicas[k] for k in chosen], wrong, key, undone)
     for k, said in zip(chosen, wrong, strict=True):
         rows["error"][k] = said
     values = {}
@@ -210,12 +229,18 @@ def _flown(
     replicas: Sequence[Replica],
     errors: list[str | None],
     key: tuple[str, int],
+    undone: list[Undone],
 ) -> dict[str, AnyArray]:
-    """Run replicas and return result → values; what went wrong is put among `errors`."""
+    """Run replicas and return result → values.
+
+    What went wrong is put among `errors`, and to `undone` what blocks could not do.
+    """
     values: dict[str, AnyArray] = {}
     done = 0
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
+    if key not in _bytes_of_a_run and len(replicas) > _FIRST_RUNS:
+        _bytes_of_a_run[key] = _likely_bytes(scene, replicas[0], wanted_by(metrics))
     while done < len(replicas):
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
@@ -223,6 +248,7 @@ def _flown(
         many = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
         part = replicas[done : done + many]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
+        undone.append(undone_in(outcomes))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded:
             _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)
@@ -240,8 +266,21 @@ def _flown(
     return values
 
 
-#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
-#: runs of a cell tell how many that is.
+def _likely_bytes(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> float:
+    """Return what a run hardly records more than: of every target a row at every scan.
+
+    Few runs to begin with would cost a closed loop as many windows as all.
+    """
+    try:
+        simulation = Simulation(scene_of(scene, replica))
+        width = max(component.width for component in simulation.components.values())
+    except (SceneError, BlockFailure):  # its row says why
+        return _MOST_BYTES / _FIRST_RUNS
+    return 8.0 * sum(map(len, wanted.values())) * simulation.scans * max(1, width)
+
+
+#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The runs
+#: before tell how many that is.
 _MOST_BYTES, _FIRST_RUNS = 150e6, 64
 _MOST_KNOWN = 1000
 #: By study and cell, from the runs before: it follows from the scene, and changes no result.

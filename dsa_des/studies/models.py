@@ -170,7 +170,8 @@ def scene_errors(
             (its,) = [cost for cost in costs if cost.rung == rung]
             if not its.errors:
                 why = its.unavailable or its.error_note or "nothing to compare"
-                notes.append(f"{name}, {ladder.name}: not measured, {why}")
+                # They stand below the words "not measured", and may begin with them.
+                notes.append(f"{name}, {ladder.name}: {why.removeprefix('not measured: ')}")
             rows += _error_rows(its)
     return rows, notes
 

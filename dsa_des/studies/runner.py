@@ -107,14 +107,15 @@ def _run_round(
         if rows is None or not _same_runs(rows, chunk):
             missing.append(chunk)
             continue
-        there = done_of(chunk.name, rows)
+        undone = folder.undone([chunk.name])
+        there = done_of(chunk.name, rows, undone)
         progress.failed += there.failed - there.crashed
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
             missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed))))
             if there.crashed < there.runs:
-                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed))
+                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), undone)
     report(progress)
     for done in executor.run(study, missing):
         whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message, Text
+from dsa_des.block.wake import Wake
 from dsa_des.running.channel import Channel
 
 RAGGED_ROWS = st.lists(st.lists(st.integers(0, 99), max_size=4), min_size=1, max_size=12)
@@ -191,3 +192,15 @@ def test_a_simulation_that_has_run_says_that_it_runs_once(lab):
     run = lab.run(lab.write({"a": "Pulse; scan_rate_hz = 4", "b": "Relay"}, ['"a -> b"']))
     with pytest.raises(RuntimeError, match="a simulation runs once"):
         run.simulation.run()
+
+
+def test_a_wake_without_a_clock_has_no_scans_before_it():
+    instants = RunTicks(np.array([0, 0, 1]), np.array([3, 7, 5]))
+    wake = Wake(instants, np.array([0, 1, 0]), 10, {}, {})
+    assert wake.scans_before.tolist() == [-1, -1, -1] and wake.time_s.tolist() == [0.3, 0.7, 0.5]
+    asked = []
+    clocked = Wake(
+        instants, np.array([4, 5, 9]), 10, {}, {},
+        clock=lambda scans, runs: asked.append((scans, runs)) or 100 * runs + scans - 1,
+    )  # fmt: skip
+    assert clocked.scans_before.tolist() == [3, 4, 108] and len(asked) == 1

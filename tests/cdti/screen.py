@@ -16,7 +16,8 @@ if CHROMIUM is None:
 #: The intruder is in sight of the camera at once, of the radar after 6 s; a warning follows at 7 s.
 SETS = (
     "blocks.traffic.intruders[0].east_m=3000", "blocks.traffic.intruders[0].north_m=2500",
-    "blocks.radar.range_km=3.5", "blocks.eo.scan_rate_hz=5", "record.truth=true",
+    "blocks.radar.range_km=3.5", "blocks.eo.scan_rate_hz=5", "blocks.eo.threshold=0.3",
+    "record.truth=true",
     "blocks.radar.false_alarm_probability=1e-6",
 )  # fmt: skip
 

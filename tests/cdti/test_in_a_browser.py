@@ -210,25 +210,42 @@ def test_words_and_symbols_stand_out_from_their_ground(alerted, theme):
     colour = {
         name: luminance(page.evaluate(script, name))
         for name in ("ground", "panel", "ink", "faint", "caution", "warning", "eo", "ir", "radar",
-                     "recovery", "traffic", "own", "symbol-caution", "symbol-warning", "on-symbol")
+                     "recovery", "traffic", "own", "symbol-caution", "symbol-warning", "on-caution",
+                     "on-warning")
     }  # fmt: skip
     texts = ("ink", "faint", "caution", "warning", "eo", "ir", "radar", "traffic")
     for name, under in itertools.product(texts, ("ground", "panel")):
         assert ratio(colour[name], colour[under]) >= 4.5, (name, under)
     for name in ("own", "recovery", "symbol-caution", "symbol-warning"):
         assert ratio(colour[name], colour["ground"]) >= 3.0, name
-    for name in ("symbol-caution", "symbol-warning"):
-        assert ratio(colour["on-symbol"], colour[name]) >= 3.0, name
+    for level in ("caution", "warning"):
+        assert ratio(colour[f"on-{level}"], colour[f"symbol-{level}"]) >= 3.0, level
+    # A warning's arrowhead also for protanopes (Machado et al. 2009, severity 1).
+    red, ink = (page.evaluate(script, name) for name in ("symbol-warning", "on-warning"))
+    assert ratio(protan_luminance(red), protan_luminance(ink)) >= 3.0
 
 
 def ratio(one, other):
     return (max(one, other) + 0.05) / (min(one, other) + 0.05)
 
 
-def luminance(colour):
+def linear(colour):
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
-    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+    return [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+
+
+def luminance(colour):
+    return float(np.dot(linear(colour), (0.2126, 0.7152, 0.0722)))
+
+
+PROTAN = np.array([
+    [0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+    [-0.003882, -0.048116, 1.051998],
+])  # fmt: skip
+
+
+def protan_luminance(colour):
+    return float(np.dot(np.clip(PROTAN @ linear(colour), 0, 1), (0.2126, 0.7152, 0.0722)))
 
 
 def test_a_page_that_is_loaded_again_decides_still_and_lost_nothing(alerted):

@@ -131,6 +131,11 @@ def test_labels_lie_on_nothing_and_inside_the_display(operated, width):
         assert one["top"] >= 0 and one["low"] <= boxes[1]
     named = [one for one in seen["labels"] if one["words"]]
     assert not [pair for pair in itertools.combinations(named, 2) if overlaps(*pair)]
+    for one in seen["symbols"]:  # nor in the frame of the contact that is chosen
+        half = 15 if one["number"] == seen["chosen"] else 9
+        box = {"left": one["x"] - half, "right": one["x"] + half, "top": one["y"] - half,
+               "low": one["y"] + half}  # fmt: skip
+        assert not [name for name in named if overlaps(name, box)]
     page.set_viewport_size({"width": 1280, "height": 800})
 
 

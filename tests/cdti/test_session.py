@@ -237,3 +237,24 @@ def test_the_run_goes_on_or_pauses_without_its_operator(tmp_path, monkeypatch, u
             assert welcome["role"] == "operator"
             hear(socket, "end")
     session.ended()
+
+
+def test_a_tab_that_is_opened_again_decides_while_nobody_else_does(tmp_path, monkeypatch):
+    """Its browser still has the key; while another page decides, that one keeps its place."""
+    session = Session(monkeypatch, tmp_path / "run", realtime="8", duration="6",
+                      until=lambda picture: picture["t"] > 0.0)  # fmt: skip
+    with page(session) as (socket, welcome):
+        say(socket, type="ready")
+        key = welcome["key"]
+        asked = f"{session.token}&before={key}"
+        with page(session, token=asked) as (_, beside):
+            assert beside["role"] == "watcher"
+        with page(session, token=f"{session.token}&before=guess") as (_, guessing):
+            assert guessing["role"] == "watcher"
+        socket.close()
+        wait_for(lambda: session.control._operators == 0)
+        with page(session, token=asked) as (_, again):
+            assert again["role"] == "operator" and again["key"] == key
+    session.go_on()
+    session.stop()
+    session.ended()

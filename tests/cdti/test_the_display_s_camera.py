@@ -149,3 +149,24 @@ def test_a_camera_that_renders_shows_the_patch_that_it_searched():
     assert patch[middle - 2 : middle + 2, middle - 2 : middle + 2].min() < 40
     assert 110 < np.median(patch[:4]) < 145
     assert recorded["detections"]
+
+
+def test_what_a_camera_has_seen_is_replaced_and_never_changed():
+    """A page's thread may be looking at it; each target's last detection stays beside others'."""
+    handed = {}
+
+    def look(scope, time_s):
+        for seen in scope._sights._seen.values():
+            handed.setdefault(id(seen), (seen, seen.copy()))
+
+    scene = chain(
+        {"eye": CAMERAS["eye"]}, targets=[TURNING, BELOW], duration_s=4.5,
+        tracker={"type": "tracking.stub"}, fusion={"type": "fusion.pick_best"},
+    )  # fmt: skip
+    scope, recorded = displayed(scene, look, window=1)
+    assert len(handed) >= 3
+    for seen, before in handed.values():
+        np.testing.assert_array_equal(seen, before)
+    last = {row["target"]: row["time_s"] for row in recorded["detections"]}
+    assert sorted(last) == ["diving", "turning"]
+    assert scope._sights._seen["eye"][:, 0].tolist() == [last["turning"], last["diving"]]

@@ -15,7 +15,7 @@ from matplotlib.patches import Polygon
 from scipy.stats import chi2
 
 import dsa_des
-from components.display.map_view import draw_outline, outline_of
+from components.display.map_view import MAP_WIDTH_IN, draw_outline, outline_of
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
@@ -219,6 +219,19 @@ def test_flights_on_the_plan_and_the_arrows_at_their_ends(drawn):
     every = np.concatenate(flown.get_segments())
     assert x[0] < every[:, 0].min() and every[:, 0].max() < x[1]
     assert y[0] < every[:, 1].min() and every[:, 1].max() < y[1]
+
+
+def test_map_and_altitudes_stand_above_each_other_beside_the_legend(drawn):
+    """Both as wide as a map is, from its left edge to where the legend begins."""
+    figure = drawn.figure["plan"]
+    plan, heights = (axes.get_position() for axes in figure.axes[:2])
+    width_in = figure.get_figwidth()
+    for place in (plan, heights):
+        assert (place.x1 - place.x0) * width_in == pytest.approx(MAP_WIDTH_IN)
+        assert place.x0 * width_in == pytest.approx(0.75, abs=0.5)
+    assert plan.x0 == heights.x0 and heights.y1 < plan.y0
+    legend = figure.legends[0].get_window_extent().transformed(figure.transFigure.inverted())
+    assert plan.x1 < legend.x0 < 1.0
 
 
 def test_detections_on_the_plan_by_height_and_over_time(drawn):

@@ -70,6 +70,24 @@ def test_derivatives_are_those_of_differences(at_range):
         assert (np.abs(apart - slope[:, i]) < 1e-5 * size + least).all(), i
 
 
+def test_heights_at_ranges_and_without_stand_beside_each_other():
+    """One that leaves its range as it is beside one that does not: each as by itself."""
+    count, rng = 6, np.random.default_rng(8)
+    state = np.concatenate([
+        rng.uniform(2000.0, 6000.0, (2, count)), rng.normal(0.0, 400.0, (1, count)),
+        rng.normal(0.0, 60.0, (3, count)), rng.normal(size=(len(WAYS), count)),
+    ])  # fmt: skip
+    kind, place, at_range = Kind(True, False, True), pose(count), np.arange(count) % 3 == 0
+    both = [told(count, each) for each in (False, True)]
+    mixed = replace(
+        both[0], at_range=at_range, deviation=np.where(at_range, *(b.deviation for b in both[::-1]))
+    )
+    alone = [each.linearised(kind, state, place) for each in both]
+    for part, found in enumerate(mixed.linearised(kind, state, place)):
+        expected = np.where(at_range, alone[1][part], alone[0][part])
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_a_height_at_a_range_moves_on_a_sphere_and_a_bearing_about_the_vertical():
     place, kind = pose(1), Kind(True)
     state = np.zeros((6 + len(WAYS), 1))

@@ -20,6 +20,7 @@ from components.export.command import export
 from components.formats.asterix_file import read_asterix, read_asterix_plots
 from components.formats.asterix_records import ADS_B, PLOTS, SYSTEM_TRACKS, read_records
 from components.formats.text_rows import TrafficFileError
+from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import UsageError
 
 asterix = pytest.importorskip("asterix", reason="needs the extra asterix")
@@ -125,8 +126,8 @@ def test_the_bytes_are_those_of_the_specification(tmp_path):
     assert height == round(alt[0] / FOOT_M / 25) % 2**14
 
 
-#: Variances of the first track; the second one says none.
-SPREADS = {
+#: Covariances of the first track, across the axes none; the second one says none.
+SPREADS = dict.fromkeys(COVARIANCE.values(), 0.0) | {
     "covariance_00_m2": 20.25, "covariance_11_m2": 6250000.0, "covariance_22_m2": 1e9,
     "covariance_33_m2_s2": 1.1, "covariance_44_m2_s2": 1e6, "covariance_55_m2_s2": 0.04,
 }  # fmt: skip
@@ -198,9 +199,12 @@ def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
     assert [(t["last"], t["coasted"]) for t in tracks[-2:]] == [(1, 0), (0, 1)]
     assert all(t["simulated"] for t in tracks)
     said = [tracks[0][f"{name}_error_m"] for name in ("north", "east", "alt")]
-    assert said == [4.5, 2500.0, 255 * 6.25 * FOOT_M]  # the largest stands for all that are larger
+    # The track's vertical leans by 800 m of the Earth's radius: 31.6 km of error up are 4 north.
+    assert math.hypot(4.5, math.sqrt(1e9) * 800 / 6.37e6) == pytest.approx(6.0, abs=0.05)
+    assert said == [6.0, 2500.0, 255 * 6.25 * FOOT_M]  # the largest stands for all that are larger
     moves = [tracks[0][f"velocity_{name}_error_m_s"] for name in ("north", "east", "up")]
-    assert moves == [1.0, 63.75, pytest.approx(0.2, abs=6.25 * FOOT_M / 120)]
+    climb = math.hypot(0.2, 1e3 * 1500 / 6.37e6)  # 1,500 m east of the origin
+    assert moves == [1.0, 63.75, pytest.approx(climb, abs=6.25 * FOOT_M / 120)]
     assert "north_error_m" not in tracks[1]
 
 

@@ -1,11 +1,14 @@
 """What is kept in memory takes less room than its rows, and comes back bit by bit."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from dsa_des.arrays.column_values import Text
+from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.sinks import ColumnSink, MemorySink
 
 SCHEMA = {
@@ -74,3 +77,23 @@ def test_what_two_tables_share_and_whole_numbers_take_little() -> None:
     }
     # Three columns of 8 bytes in a row, and three of one; names share codes, which are small.
     assert sum(held.values()) <= 8192 * (3 * 8 + 4)
+
+
+def test_of_a_table_no_more_than_a_row_group_waits_to_be_written(tmp_path: Path) -> None:
+    """Two megabytes of values, whatever the columns: a wide table is written after fewer rows."""
+    wide = {"tick": "int64", **{f"c{i}": "float64" for i in range(59)}}
+    narrow = {"tick": "int64", "time_s": "float64"}
+    sink = ParquetSink(tmp_path)
+    sink.open({"wide": wide, "narrow": narrow})
+    for turn in range(30):
+        for table, schema in (("wide", wide), ("narrow", narrow)):
+            ticks = np.arange(5000) + 5000 * turn
+            sink.write(table, {n: ticks if n == "tick" else ticks * 0.5 for n in schema})
+            waiting = sum(len(piece["tick"]) for piece in sink._pieces[table])
+            assert waiting * len(schema) < 2**18
+    sink.close()
+    for table, size in (("wide", 4096), ("narrow", 65536)):
+        file = pq.ParquetFile(tmp_path / f"{table}.parquet")
+        groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
+        assert set(groups[:-1]) == {size} and sum(groups) == 150_000
+        assert file.read()["tick"].to_pylist() == list(range(150_000))

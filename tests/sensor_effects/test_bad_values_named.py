@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import pytest
+from wired import chain, sensor
 
 from dsa_des.errors import SceneError
+from dsa_des.library.scenes import load_scene as load_any
 from dsa_des.scene.scene import load_scene
 
 
@@ -66,6 +68,28 @@ def test_one_problem_at_its_own_key(configs: Path, sets: list[str], text: str) -
     with pytest.raises(SceneError) as caught:
         load_scene(configs / "first_light.toml", sets=sets)
     assert [str(problem) for problem in caught.value.problems] == [f"command line: {text}"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "where", "said"),
+    [
+        ({}, "", "exactly one of wavelength_m and frequency_hz must be given"),
+        ({"wavelength_m": 0.03, "frequency_hz": 1e10}, "", "exactly one of wavelength_m and"),
+        ({"wavelength_m": 0.0}, ".wavelength_m = 0.0", "must be greater than 0"),
+        ({"wavelength_m": -0.03}, ".wavelength_m = -0.03", "must be greater than 0"),
+        ({"frequency_hz": 0.0}, ".frequency_hz = 0.0", "must be greater than 0"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling"])
+def test_a_radar_has_one_carrier(kind: str, keys: dict, where: str, said: str) -> None:
+    radar = {**sensor(kind), "frequency_hz": None, **keys}
+    radar = {key: value for key, value in radar.items() if value is not None}
+    if "wavelength_m" not in keys:
+        radar.pop("wavelength_m", None)
+    with pytest.raises(SceneError) as caught:
+        load_any(chain({"radar": radar}))
+    assert any(f"blocks.radar{where}" in str(one) and said in str(one)
+               for one in caught.value.problems)  # fmt: skip
 
 
 def test_of_a_whole_table_no_contents_are_shown(configs: Path) -> None:

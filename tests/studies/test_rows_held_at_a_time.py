@@ -55,7 +55,8 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     del recorded[:]
     parts = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert parts.content == whole.content
-    assert recorded[0] == 5 and max(recorded[1:]) < 16 and sum(recorded) == 16
+    # By the scans and targets of the scene fewer than all at once, and more than few.
+    assert 1 < recorded[0] < 16 and max(recorded[1:]) < 16 and sum(recorded) == 16
     assert max(measured[-len(recorded) :]) < 16
     # What was learnt holds for the next chunk of the cell.
     del recorded[:]

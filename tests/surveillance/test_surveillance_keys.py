@@ -7,6 +7,7 @@ from covering import covers
 from wired import chain, rows, run, sensor
 
 import dsa_des
+from dsa_des.running.simulation import Simulation
 
 KINDS = ("surveillance.ads_b", "surveillance.active")
 EXACT = {
@@ -252,3 +253,12 @@ def test_planes_of_a_host_have_no_equipage(key):
         assert [problem.key for problem in e.value.problems] == [
             f"blocks.traffic.planes[0].{first}"
         ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_range_rates_are_offered_by_whoever_reports_them(kind):
+    """An aircraft broadcasts its velocity; a transponder's reply has none."""
+    offer = Simulation(dsa_des.load_scene(scene(kind))).components["sensor"].offer("detections")
+    rates = [row["range_rate_m_s"] for row in rows(run(scene(kind)), scan=2)]
+    assert rates and offer.measures_range_rate is (kind == "surveillance.ads_b")
+    assert {rate is not None for rate in rates} == {offer.measures_range_rate}

@@ -7,7 +7,7 @@ import tracemalloc
 import pytest
 
 import dsa_des
-from docs.make.track_consistency import NOISY, OWNSHIP, Case, scene_of_case
+from docs.make.track_consistency import NOISY, OWNSHIP, SENSORS, Case, scene_of_case
 from dsa_des.running.simulation import Simulation
 
 TARGETS, SECONDS, PER_SCAN = 100, 18, 20.0
@@ -66,3 +66,17 @@ def test_a_hundred_targets_in_dense_clutter_take_no_more_memory_in_the_end(track
     assert min(tracks[1:]) >= TARGETS and max(tracks) < TARGETS + 5 * PER_SCAN
     # Looks of the last two seconds, where late ones have them worked on again.
     assert max(remembered) == (3 if "lag_s" in tracker else 0)
+
+
+@pytest.mark.parametrize("kind", ["tracking.ekf", "tracking.stub"])
+def test_what_a_window_holds_does_not_grow_with_the_run(kind):
+    """Of an hour's 14,400 looks no window has more than 4,096: all that is made of them stays."""
+    radar = {**SENSORS["radar"], "range_km": 30.0, "scan_rate_hz": 2}
+    scene = scene_of_case(
+        Case("", {"type": kind}, sensors={"one": radar, "two": {**radar, "offset_s": "0.1"}}),
+        {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": [circling(0)]},
+    )
+    scene["duration_s"] = 3600
+    simulation = Simulation(dsa_des.load_scene(scene))
+    looks = 4 * simulation.windows.longest_ticks / simulation.ticks_per_s
+    assert 1024 < looks <= 4096

@@ -245,6 +245,20 @@ def test_two_runs_stand_beside_each_other_on_one_clock(browser, tmp_path):
         wait_for(lambda: both(script) == list(wanted))
 
     come_to("App.state().t", 2.5, 2.5)
+    # Keys are heard before anything was clicked; what is shown can be chosen above the footer.
+    page.keyboard.press("Home")
+    come_to("App.state().t", 0.0, 0.0)
+    page.evaluate("document.activeElement.blur()")
+    page.evaluate("window.focus()")
+    page.keyboard.press("End")
+    come_to("App.state().t", 9.0, 9.0)
+    left.evaluate("App.seek(2.5)")
+    come_to("App.state().t", 2.5, 2.5)
+    bottoms = both(
+        "[document.querySelector('#layers').getBoundingClientRect().bottom,"
+        " document.querySelector('footer').getBoundingClientRect().top]"
+    )
+    assert all(layers <= footer for layers, footer in bottoms)
     counts = both("App.state().detections.length")
     assert counts[0] > counts[1]  # each shows its own run
     wait_for(lambda: len(set(both("Plan.view.perPixel"))) == 1)

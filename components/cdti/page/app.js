@@ -88,8 +88,11 @@ const App = (() => {
     if (performance.now() < state.noticeUntil) return state.notice;
     if (state.lost) return "connection lost: the display stands still";
     if (!state.began) return "waiting for the operator to begin";
-    const watched = state.role === "operator" ? "you decide" : "you watch";
-    return scene.console ? watched : "nobody decides in this scene";
+    if (!scene.console) return "nobody decides in this scene";
+    if (state.role === "operator") return "you decide";
+    return state.frame && state.frame.operators === 0
+      ? "you watch, nobody decides: the terminal shows the address of a page that does"
+      : "you watch: another page decides";
   }
   function render() {
     const began = performance.now();

@@ -6,14 +6,19 @@ const Link = (() => {
   const hears = {};
   let socket = null, over = false, lost = 0;
 
-  function key() {
-    try { return sessionStorage.getItem("key") || ""; } catch { return ""; }
+  // A tab that is loaded again has its key; one that was closed and is opened again asks with the
+  // browser's, which counts while no other page decides.
+  function key(storage) {
+    try { return window[storage].getItem("key") || ""; } catch { return ""; }
   }
   function keep(value) {
-    try { if (value) sessionStorage.setItem("key", value); } catch { /* then a reload only watches */ }
+    for (const storage of value ? ["sessionStorage", "localStorage"] : []) {
+      try { window[storage].setItem("key", value); } catch { /* then a reload only watches */ }
+    }
   }
   function open() {
-    const query = new URLSearchParams({ token, key: key() });
+    const query = new URLSearchParams({ token, key: key("sessionStorage"),
+      before: key("localStorage") });
     socket = new WebSocket(`ws://${location.host}/socket?${query}`);
     socket.addEventListener("message", (event) => {
       const said = JSON.parse(event.data);

@@ -88,6 +88,15 @@ const Rose = (() => {
     c.setLineDash([]);
   }
 
+  // Names keep clear of a band.
+  function blockBand(x0, y0, outer, heading, [low, high, region]) {
+    const wide = painted(region)[1], r = outer - 2 - wide / 2, step = 5 / (r * rad);
+    for (let bearing = low; bearing <= high + step; bearing += step) {
+      const angle = (Math.min(bearing, high) - heading) * rad;
+      Labels.block(x0 + r * Math.sin(angle), y0 - r * Math.cos(angle), wide / 2 + 1, wide / 2 + 1);
+    }
+  }
+
   // The area of a loss: where the ownship would be inside a volume, if it turned there at once.
   function edge(c, at, [bearing, near, far], range, half) {
     const end = Math.min(far, range * 1.05);
@@ -123,5 +132,5 @@ const Rose = (() => {
     c.lineWidth = 1;
     c.stroke();
   }
-  return { rings, words, reach, reachWords, painted, band, area, hatch, DASHES };
+  return { rings, words, reach, reachWords, painted, band, blockBand, area, hatch, DASHES };
 })();

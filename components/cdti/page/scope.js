@@ -3,7 +3,7 @@
 const Scope = (() => {
   const canvas = document.getElementById("scope");
   const rad = Math.PI / 180;
-  const MOST_TAGS = 40, LONGEST = 24, NARROW = 150;
+  const MOST_TAGS = 40, LONGEST = 24, NARROW = 150, FRAME = 15;
   let place = 5;
 
   const ranges = () => Units.system.ranges;
@@ -39,7 +39,8 @@ const Scope = (() => {
     for (const sensor of scene.sensors) Rose.reach(c, x0, y0, scale, sensor);
     c.restore();
     for (const one of frame.bands.direction) Rose.band(c, x0, y0, outer, heading, one);
-    if (bug !== null) Symbols.bug(c, ...at(bug, metres * 1.03));
+    // On the ring itself: the numbers of the compass stand outside of it.
+    if (bug !== null) Symbols.bug(c, ...at(bug, (outer - 2) / scale));
     // The most urgent are drawn last, over others, and named first.
     const ranged = frame.contacts.filter((one) => one[1] !== null)
       .sort((a, b) => a[9] - b[9] || (a[0] === chosen) - (b[0] === chosen));
@@ -50,16 +51,21 @@ const Scope = (() => {
 
     // Words come last, and keep clear of symbols and of each other.
     Labels.block(x0, y0, 12, 12);
-    for (const one of drawn.symbols) Labels.block(one.x, one.y, 9, 9);
+    for (const one of drawn.symbols) {
+      const half = one.number === chosen ? FRAME + 1 : 9;
+      Labels.block(one.x, one.y, half, half);
+    }
+    for (const one of frame.bands.direction) Rose.blockBand(x0, y0, outer, heading, one);
     Rose.words(c, x0, y0, outer, metres, heading);
     for (const sensor of scene.sensors) Rose.reachWords(x0, y0, scale, outer, sensor);
     for (const one of drawn.lines) {
       Labels.add(`${scene.name(one.number)} no range`, one.x, one.y, 8, 4, Symbols.ink(one.level));
     }
     const tagged = drawn.symbols.slice(-MOST_TAGS);
-    const words = tagged.reverse().map((one) => tag(c, one, scene, outer)).reverse();
+    const apart = (one) => (one.number === chosen ? FRAME + 3 : 14);
+    const words = tagged.reverse().map((one) => tag(c, one, scene, outer, apart(one))).reverse();
     tagged.reverse().forEach((one, i) => {
-      Labels.add(words[i], one.x, one.y, 14, 4, Symbols.ink(one.level));
+      Labels.add(words[i], one.x, one.y, apart(one), 4, Symbols.ink(one.level));
     });
     drawn.labels = Labels.draw(c, Symbols.colours.ground);
     drawn.range = metres;
@@ -110,21 +116,22 @@ const Scope = (() => {
     if (number === chosen) {
       c.strokeStyle = Symbols.colours.ink;
       c.lineWidth = 1.5;
-      c.strokeRect(x - 15, y - 15, 30, 30);
+      c.strokeRect(x - FRAME, y - FRAME, 2 * FRAME, 2 * FRAME);
     }
     return { number, x, y, level, shape: Symbols.shape(level, course !== null), above: up >= 0,
       tag: Units.above(up), arrow: Symbols.climb(vu), off };
   }
   // Writes the relative altitude above or below a symbol; returns the words beside it, which hold
   // the altitude as well where there was no room for it.
-  function tag(c, one, scene, outer) {
+  function tag(c, one, scene, outer, apart) {
     const colour = Symbols.ink(one.level), halo = Symbols.colours.ground;
     // In a hand there is room for names only: the level is told by the symbol, list and banner.
     const word = one.level && outer > NARROW ? ` ${Symbols.WORDS[Math.min(one.level, 3)]}` : "";
     const whole = scene.name(one.number);
     const name = whole.length > LONGEST ? `${whole.slice(0, LONGEST - 1)}…` : whole;
     const height = `${one.tag}${one.arrow}`, x = one.x - Labels.width(c, height) / 2;
-    const written = Labels.place(c, height, x, one.above ? one.y - 18 : one.y + 28, colour, halo);
+    const written = Labels.place(c, height, x, one.above ? one.y - apart - 4 : one.y + apart + 14,
+      colour, halo);
     return `${name}${word}${written ? "" : ` ${height}`}`;
   }
 

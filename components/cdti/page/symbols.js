@@ -3,7 +3,7 @@
 // direction of flight is an arrowhead inside; without an alert an open arrowhead, or a diamond.
 const Symbols = (() => {
   const names = ["ground", "ink", "faint", "line", "own", "traffic", "eo", "ir", "radar", "recovery",
-    "symbol-caution", "symbol-warning", "on-symbol", "caution", "warning"];
+    "symbol-caution", "symbol-warning", "on-caution", "on-warning", "caution", "warning"];
   const WORDS = ["", "PREVENTIVE", "CORRECTIVE", "WARNING"];
   const CLIMBS_MPS = 2.54;  // 500 ft/min
   let colours = {};
@@ -47,7 +47,7 @@ const Symbols = (() => {
       c.rotate(course);
       c.beginPath();
       arrowhead(c, 0.62 * r);
-      c.strokeStyle = level >= 2 ? colours["on-symbol"] : alert;
+      c.strokeStyle = level >= 3 ? colours["on-warning"] : level === 2 ? colours["on-caution"] : alert;
       c.lineWidth = 1.5;
       c.stroke();
     }
@@ -65,6 +65,8 @@ const Symbols = (() => {
   function bug(c, x, y) {
     c.beginPath();
     c.arc(x, y, 5, 0, 2 * Math.PI);
+    c.fillStyle = colours.ground;
+    c.fill();
     c.strokeStyle = colours.own;
     c.lineWidth = 2;
     c.stroke();

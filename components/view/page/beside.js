@@ -7,4 +7,13 @@ window.addEventListener("load", () => {
   for (const app of [...apps].reverse()) {
     app.join(apps.filter((other) => other !== app), app === apps[0], lasts_s);
   }
+  // Keys are the first one's from the start, and where none of the pages has the focus.
+  const first = document.querySelector("iframe").contentWindow;
+  first.focus();
+  document.addEventListener("keydown", (event) => {
+    const same = new first.KeyboardEvent("keydown", { key: event.key, shiftKey: event.shiftKey,
+      ctrlKey: event.ctrlKey, altKey: event.altKey, metaKey: event.metaKey, bubbles: true,
+      cancelable: true });
+    if (!first.document.body.dispatchEvent(same)) event.preventDefault();
+  });
 });

@@ -139,8 +139,9 @@ added to the stepped turn before the search. *Equal* is within one step of it, {
 closing speed. As flown, ours differ by
 {longer_low:+.2f} to {longer_high:+.2f} s.
 
-Choices: turns by 90° to the better side; from behind 140° also by 60° and 75°, since theirs are
-better there than turns by 90°. Their numbers are not part of the project; those shown here are
+Choices: turns by 90° to the better side; from behind 140° also by 30°, 45°, 60° and 75°, since
+theirs are better there than turns by 90°: an aircraft a little faster than the ownship (61 to
+85 kt) is let by with less. Their numbers are not part of the project; those shown here are
 read when the page is made.
 
 {table}

@@ -24,7 +24,7 @@ from docs.make.published.turn_geometry import least_range_m as by_geometry_m
 
 SCENE = "published/least_range"
 #: Turns that are tried: by 90 deg, or somewhat less where the intruder comes from behind.
-_BEHIND_DEG, TURNS_DEG, TURNS_BEHIND_DEG = 140.0, (90.0,), (60.0, 75.0, 90.0)
+_BEHIND_DEG, TURNS_DEG, TURNS_BEHIND_DEG = 140.0, (90.0,), (30.0, 45.0, 60.0, 75.0, 90.0)
 # From the disc to beyond where any of these turns is late; how far from a guess is looked first.
 _NEAREST_M, _FARTHEST_M, _ABOUT_M = 155.0, 2500.0, 8.0
 _TRIES, _NEAR_ENOUGH_M = 20, 0.2

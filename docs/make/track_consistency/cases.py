@@ -106,11 +106,12 @@ _EKF = {"type": "tracking.ekf", **STILL}
 _DEGREE = math.radians(1.0)
 #: Of turns that a computer flies: all but no noise in a model, and turns begin at any time.
 _STEADY = {
-    "acceleration_intensity_m2_s3": 0.01, "turn_acceleration_intensity_m2_s3": 1.2e-5,
+    "models": ["velocity", "turn"], "acceleration_intensity_m2_s3": 0.01,
+    "turn_acceleration_intensity_m2_s3": 1.2e-5,
     "transition_rates_per_s": [[0.0, 0.05], [0.01, 0.0]],
 }  # fmt: skip
 #: The default of `tracking.imm`.
-_TURN = CoordinatedTurn(0.1, 0.01 * _DEGREE**2)
+_TURN = CoordinatedTurn(1.0, 0.01 * _DEGREE**2)
 _GONE = {"delete_misses": 40}
 _MISSES = {
     name: {**one, "type": _CLASS + ("MissingRadar" if name == "radar" else "MissingCamera")}

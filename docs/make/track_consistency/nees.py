@@ -26,7 +26,7 @@ _LOST_ABOVE = 60.0
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 
 
-def _tracks(scenes: list[Any]) -> list[Any]:
+def tracks_of(scenes: list[Any]) -> list[Any]:
     """Return each replica's table of tracks."""
     sink = MemorySink()
     try:
@@ -54,7 +54,7 @@ def nees_of(case: Case, replicas: int) -> FloatArray:
     with tempfile.TemporaryDirectory() as folder:
         for scenes in scenes_of(case, replicas, Path(folder)):
             targets = traffic_of(scenes[0])[0].targets
-            for table in _tracks(scenes):
+            for table in tracks_of(scenes):
                 found.append(_of_run(table, targets, case.within_m))
     return np.concatenate(found)
 

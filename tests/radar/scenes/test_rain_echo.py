@@ -5,15 +5,17 @@ Gaussian beam and an integral over its height. The ownship banks, south of the e
 """
 
 import math
+from types import SimpleNamespace
 
 import crooked
+import numpy as np
 import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from scipy.integrate import quad
 from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
-from components.radar.rain import rain_spread_m_s
+from components.radar.rain import RainEcho, fall_speed_m_s, rain_spread_m_s
 from dsa_des.errors import SceneError
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -229,6 +231,30 @@ def test_a_canceller_takes_out_rain_by_where_the_wind_blows_it(wind_mps):
         before = noise_like("radar.threshold", plain[name], {})
         after = noise_like("radar.threshold", found[name], {})
         assert after == pytest.approx(left * before, rel=5e-3)
+
+
+def test_rain_spreads_by_how_fast_it_passes_the_radar_across_its_sight():
+    """0.30 of speed past the rain, beamwidth and sine of the angle, beside the rain's own."""
+    wind_mps, from_deg, own_m_s = 17.0, 290.0, (31.0, -52.0, 4.0)
+    scene = chain({"radar": sensor("radar.threshold", **KEYS["radar.threshold"])}, targets=TARGETS,
+                  weather={"rain_rate_mm_h": RATE_MM_H, "wind_mps": wind_mps,
+                           "wind_from_deg": from_deg})  # fmt: skip
+    rain = RainEcho(Simulation(dsa_des.load_scene(scene)).components["radar"])
+    azimuth, elevation = np.radians([12.0, 75.0, -160.0]), np.radians([3.0, -8.0, 20.0])
+    range_m = np.array([900.0, 4000.0, 2500.0])
+    cells = SimpleNamespace(range_m=range_m, azimuth_rad=azimuth, elevation_rad=elevation)
+    mean, spread = rain.range_rates(cells, own_m_s, np.zeros(3))
+    towards = math.radians(from_deg + 180.0)
+    fall_m_s = fall_speed_m_s(RATE_MM_H)
+    past = np.subtract([wind_mps * math.cos(towards), wind_mps * math.sin(towards), fall_m_s],
+                       own_m_s)  # fmt: skip
+    level = np.cos(elevation)
+    sight = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)])
+    np.testing.assert_allclose(mean, past @ sight, rtol=1e-12)
+    across = np.linalg.norm(np.cross(past, sight.T), axis=1)
+    gaussian = math.radians(AZIMUTH_DEG) / math.sqrt(16.0 * math.log(2.0))
+    own = rain_spread_m_s(range_m, elevation, math.radians(ELEVATION_DEG))
+    np.testing.assert_allclose(spread, np.hypot(own, gaussian * across), rtol=0.01)
 
 
 def test_rain_s_own_rates_spread_by_turbulence_fall_and_at_most_6_m_s_of_shear():

@@ -224,8 +224,9 @@ def test_models_are_those_that_are_named():
 def test_a_model_that_is_never_entered_fades_away():
     # Before a look at most exp(-rate x 1 s) of it is left, 5e-5; at 5 per second 0.007, which
     # one look that favours turns by three makes 0.02.
-    never = turning(transition_rates_per_s=[[0.0, 0.0], [10.0, 0.0]])[-1]
-    often = turning(transition_rates_per_s=[[0.0, 10.0], [0.0, 0.0]])[-1]
+    two = ["velocity", "turn"]
+    never = turning(models=two, transition_rates_per_s=[[0.0, 0.0], [10.0, 0.0]])[-1]
+    often = turning(models=two, transition_rates_per_s=[[0.0, 10.0], [0.0, 0.0]])[-1]
     assert never["probability_turn"] < 0.01 < 0.99 < often["probability_turn"]
 
 
@@ -278,7 +279,14 @@ def test_a_track_with_a_range_is_where_the_target_is():
         ({"confirm_m": 4, "confirm_n": 3}, "confirm_n"),
         ({"type": "tracking.imm", "models": ["turn", "turn"]}, "twice"),
         ({"type": "tracking.imm", "transition_rates_per_s": [[0.0]]}, "rows"),
-        ({"type": "tracking.imm", "transition_rates_per_s": [[0, -1], [1, 0]]}, "negative"),
+        (
+            {
+                "type": "tracking.imm",
+                "models": ["velocity", "turn"],
+                "transition_rates_per_s": [[0, -1], [1, 0]],
+            },
+            "negative",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(keys, said):

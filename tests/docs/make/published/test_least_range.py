@@ -217,3 +217,13 @@ def test_flown_ranges_are_within_steps_of_the_published_ones(monkeypatch):
     off = least_range.differences_s(found)
     assert len(off) == 3
     assert all(abs(one) < least_range.STEP_S + 5e-4 for one in off)
+
+
+@pytest.mark.parametrize("intruder_kt", [35, 61, 65, 75, 105, 195])
+def test_no_other_turn_lets_an_overtaking_aircraft_by_with_less(intruder_kt):
+    """Within a step of the search or a metre of all turns from 20 to 90 deg, by five degrees."""
+    for azimuth in (145.0, 160.0, 175.0):
+        for speed in closing_speeds(azimuth, intruder_kt * KNOT_M_S):
+            every = stepped_least_range_m(azimuth, speed, range(20, 95, 5))
+            tried = stepped_least_range_m(azimuth, speed, turns_deg(azimuth))
+            assert tried - every < max(0.3 * speed, 1.0)

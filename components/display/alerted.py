@@ -1,0 +1,117 @@
+"""What pictures of a run show of its alerts and of the manoeuvres that followed."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.display.recorded_run import RecordedTables, read_table
+from dsa_des.arrays.types import FloatArray
+
+#: Colour and width of an alert by its level, from 1; levels beyond the last share its own. Each is
+#: thicker than the one before, so that none is told by its colour alone.
+_LEVELS = (("#d9b300", 3.0), ("#e07b00", 4.5), ("#c1121f", 6.0))
+_MANOEUVRE: dict[str, Any] = {
+    "linestyle": "none", "marker": "^", "markersize": 8, "markerfacecolor": "#ffffff",
+    "markeredgecolor": "#000000", "markeredgewidth": 1.4,
+}  # fmt: skip
+
+
+@dataclass
+class Alerted:
+    """When which target was alerted to at which level, and when the ownship was told to fly."""
+
+    #: Target → level, and from when to when, s; of several alerting blocks the highest counts.
+    stretches: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
+    manoeuvres_s: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    @classmethod
+    def read(cls, folder: Path) -> "Alerted":
+        """Read a run folder; what was not recorded is none."""
+        names = [n for n in ("alerts", "manoeuvres") if (folder / f"{n}.parquet").is_file()]
+        run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
+        result = cls()
+        if "manoeuvres" in names:
+            result.manoeuvres_s = np.unique(run.numbers("manoeuvres", "time_s"))
+        if "alerts" in names and run.tables["alerts"].num_rows:
+            result.stretches = _stretches(run)
+        return result
+
+    @property
+    def levels(self) -> list[int]:
+        """The levels that there were, ascending."""
+        return sorted({level for mine in self.stretches.values() for level, _, _ in mine})
+
+    def key(self) -> list[Any]:
+        """Return what a legend says of them."""
+        from matplotlib.lines import Line2D
+
+        handles = []
+        for level in self.levels:
+            colour, width = style_of(level)
+            line = Line2D([], [], color=colour, linewidth=width, label=f"alert {level}")
+            line.set_solid_capstyle("butt")
+            handles.append(line)
+        if len(self.manoeuvres_s):
+            handles.append(Line2D([], [], **_MANOEUVRE, label="manoeuvre"))
+        return handles
+
+
+def style_of(level: int) -> tuple[str, float]:
+    """Return colour and width of an alert of a level."""
+    return _LEVELS[min(level, len(_LEVELS)) - 1]
+
+
+def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
+    """Return the alerts of each target; each lasts until the alerting looks again."""
+    level = run.numbers("alerts", "level").astype(np.int64)
+    time_s = run.numbers("alerts", "time_s")
+    looks = np.unique(time_s)
+    last = float(np.median(np.diff(looks))) if len(looks) > 1 else 0.0
+    ends = np.append(looks[1:], looks[-1] + last)
+    on = np.flatnonzero(level > 0)
+    targets = np.array(run.tables["alerts"]["target"].take(on).to_pylist(), dtype=object)
+    result: dict[str, list[tuple[int, float, float]]] = {}
+    for target in sorted({name for name in targets.tolist() if name is not None}):
+        mine = on[targets == target]
+        highest = np.zeros(len(looks), dtype=np.int64)
+        np.maximum.at(highest, np.searchsorted(looks, time_s[mine]), level[mine])
+        edges = np.flatnonzero(np.diff(highest, prepend=-1, append=-1))
+        result[target] = [
+            (int(highest[a]), float(looks[a]), float(ends[b - 1]))
+            for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+            if highest[a] > 0
+        ]
+    return result
+
+
+def draw_alerted_lines(
+    axes: Any, alerted: Alerted, lines: dict[str, tuple[FloatArray, FloatArray, FloatArray]]
+) -> None:
+    """Draw alerts under the lines of their targets, each given as times (s), x and y."""
+    from matplotlib.collections import LineCollection
+
+    segments, colours, widths = [], [], []
+    for target, (time_s, x, y) in lines.items():
+        for level, begin, end in alerted.stretches.get(target, ()):
+            inside = time_s[(time_s > begin) & (time_s < end)]
+            at = np.concatenate([[begin], inside, [end]])
+            points = np.column_stack((np.interp(at, time_s, x), np.interp(at, time_s, y)))
+            if not np.isfinite(points).all():
+                points = points[np.isfinite(points).all(axis=1)]
+            colour, width = style_of(level)
+            segments.append(points)
+            colours.append(colour)
+            widths.append(width)
+    if segments:
+        axes.add_collection(
+            LineCollection(segments, colors=colours, linewidths=widths, alpha=0.75, zorder=0.9,
+                           capstyle="butt"), autolim=False,
+        )  # fmt: skip
+
+
+def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
+    """Mark where, or when, the ownship was told to fly otherwise."""
+    if len(x):
+        axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)
