@@ -62,13 +62,15 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     Gaussian filters of the picture's own blur and of its multiples by 2, as far as the picture
     goes, each weighed by the noise that it lets through: the larger of what white noise of a pixel
     comes to, and of what the picture's rim varies by, where there is clutter. A place between
-    pixels is the vertex of a parabola.
+    pixels is the vertex of a parabola, or of a spot larger than its filter, over which the filter
+    has no peak but noise, the middle of what stands out with it.
     """
     cv2 = opencv()
     rim = _rim(picture.shape[0])
     behind = float(picture[rim].mean())
     flat = picture - behind
     best: tuple[float, Any, float] = (-math.inf, flat, 1.0)
+    of_best = spread_pixels
     cluttered = False
     spread = spread_pixels
     while spread <= max(picture.shape[0] / 6.0, spread_pixels):
@@ -81,18 +83,35 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
         deviation = max(rough, white)
         peak = float(np.where(sought, through, -math.inf).max())
         if peak / deviation > best[0]:
-            best = peak / deviation, through, peak
+            best, of_best = (peak / deviation, through, peak), spread
         spread *= 2.0
     snr, through, peak = best
     row, column = np.unravel_index(
         int(np.argmax(np.where(sought, through, -math.inf))), picture.shape
     )
-    x = column + 0.5 + _vertex(through[row, max(column - 1, 0) : column + 2])
-    y = row + 0.5 + _vertex(through[max(row - 1, 0) : row + 2, column])
+    x = float(column + 0.5 + _vertex(through[row, max(column - 1, 0) : column + 2]))
+    y = float(row + 0.5 + _vertex(through[max(row - 1, 0) : row + 2, column]))
     finest = cv2.GaussianBlur(flat, (0, 0), spread_pixels, borderType=cv2.BORDER_REFLECT)
     level = float(finest[row, column])
-    pixels = int(np.count_nonzero(sought & (finest > 0.5 * level))) if level > 0.0 else 0
+    stands = sought & (finest > 0.5 * level)
+    pixels = int(np.count_nonzero(stands)) if level > 0.0 else 0
+    if pixels > 4.0 * math.pi * of_best**2:
+        x, y = _middle(stands, finest, int(row), int(column), (x, y))
     return Spot(snr, x, y, pixels, level, behind, cluttered)
+
+
+def _middle(
+    stands: BoolArray, picture: FloatArray, row: int, column: int, otherwise: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the centre of what stands out around a pixel, x and y; if that is beside it, another.
+
+    It is weighed by the picture, as its edge covers pixels in part.
+    """
+    _, labels = opencv().connectedComponents(stands.astype(np.uint8), connectivity=8)
+    rows, columns = np.nonzero(labels == labels[row, column])
+    weight = picture[rows, columns]
+    x, y = (float(np.average(one + 0.5, weights=weight)) for one in (columns, rows))
+    return (x, y) if labels[int(y), int(x)] == labels[row, column] else otherwise
 
 
 @cache

@@ -249,6 +249,13 @@ GAIN_TIMES_BEAM = 30_000.0
 MOST_GAIN_DISAGREEMENT_DB = 3.0
 
 
+def gain_of_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> float:
+    """Return the gain of an antenna with some beamwidths; 0 dB where they are not known."""
+    if not (azimuth_deg and elevation_deg):
+        return 0.0
+    return max(0.0, 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg)))
+
+
 def beam_against_gain(parameters: Any) -> list[str]:
     """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
 
@@ -263,7 +270,7 @@ def beam_against_gain(parameters: Any) -> list[str]:
         widths_deg = p.azimuth_resolution_deg, p.elevation_resolution_deg
         whose = "no beamwidths are given, and the grid that stands for the beam is"
     azimuth_deg, elevation_deg = widths_deg
-    if not (azimuth_deg and elevation_deg):
+    if p.antenna_gain_db is None or not (azimuth_deg and elevation_deg):
         return []
     gain_db = 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg))
     if abs(gain_db - p.antenna_gain_db) <= MOST_GAIN_DISAGREEMENT_DB:

@@ -10,7 +10,12 @@ from pydantic import Field, model_validator
 from components.radar.detection.cfar import FEWEST_CELLS, MOST_CELLS
 from components.radar.detection.probability import detection_probability, required_snr
 from components.radar.doppler import FEWEST_PULSES, MOST_PULSES
-from components.radar.link_budget import LinkBudget, calibrated_bandwidth, implausible
+from components.radar.link_budget import (
+    LinkBudget,
+    calibrated_bandwidth,
+    gain_of_beam_db,
+    implausible,
+)
 from components.radar.measurement import check_signal_errors
 from components.radar.resolution import ResolutionParameters
 from components.radar.timing import TimeBudgetParameters
@@ -227,8 +232,16 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         description="How errors = 'signal' has angles measured: by beams at the same time, or by "
         "splitting one beam that scans over the target.",
     )
-    power_w: float = Field(gt=0, description="Transmitted power, W.")
-    antenna_gain_db: float = Field(description="Gain of the antenna, both ways the same, dB.")
+    power_w: float | None = Field(
+        default=None,
+        gt=0,
+        description="Transmitted power, W; with calibrate it changes nothing and may be left out.",
+    )
+    antenna_gain_db: float | None = Field(
+        default=None,
+        description="Gain of the antenna, both ways the same, dB; with calibrate it changes only "
+        "the antenna's far field (minimum_range_m) and is by default that of the beamwidths.",
+    )
     wavelength_m: float | None = Field(default=None, gt=0, description="Wavelength, m.")
     frequency_hz: float | None = Field(
         default=None, gt=0, description="Frequency instead of the wavelength, Hz."
@@ -280,6 +293,13 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
     def _complete(self) -> Self:
         if (self.wavelength_m is None) == (self.frequency_hz is None):
             raise ValueError("exactly one of wavelength_m and frequency_hz must be given")
+        if self.calibrate is None:
+            missing = [k for k in ("power_w", "antenna_gain_db") if getattr(self, k) is None]
+            if missing:
+                raise ValueError(
+                    f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not given: "
+                    "only calibrate, a known detection range, stands for them"
+                )
         if (self.bandwidth_hz is None) == (self.calibrate is None):
             raise ValueError("exactly one of bandwidth_hz and calibrate must be given")
         if self.pulses > 1 and self.integration_gain_db > 0:
@@ -334,6 +354,12 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
 
     def _stated_link_budget(self) -> LinkBudget:
         given = {one.name: getattr(self, one.name) for one in fields(LinkBudget)}
+        if self.power_w is None:  # the bandwidth that is calibrated makes up for it
+            given["power_w"] = 1.0
+        if self.antenna_gain_db is None:
+            given["antenna_gain_db"] = gain_of_beam_db(
+                self.azimuth_beamwidth_deg, self.elevation_beamwidth_deg
+            )
         budget = LinkBudget(**{**given, "bandwidth_hz": self.bandwidth_hz or 1.0})
         if self.calibrate is None:
             return budget

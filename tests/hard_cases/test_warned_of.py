@@ -24,6 +24,7 @@ antenna_gain_db = 30
 wavelength_m = 0.03
 bandwidth_hz = 1e6
 false_alarm_probability = 1e-6
+fluctuation_correlation_s = 1      # without it 5 Hz is warned of
 """
 
 

@@ -96,7 +96,7 @@ class Tests:
         rest += [file for file in _naming(fault) if file not in of_file and file not in known]
         return [
             partial(self._start, files=some, tests=[t for file in some for t in of_file[file]])
-            for some in (near, rest)
+            for some in (near, rest if near or rest else ["tests"])
             if some
         ]
 

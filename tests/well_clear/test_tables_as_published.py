@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from components.well_clear.severity import collision_probability
 from components.well_clear.tcas import recovery_sizes_m, tcas_span
@@ -89,7 +90,7 @@ def test_chance_of_a_collision_is_the_sum_over_the_errors(place, mode_c):
         for other_share, other in scales[mode_c[1]]:
             gaps = np.arange(-100.0, 100.5, 2.0)
             dense = np.array([density(gap - height_ft, one, other) for gap in gaps])
-            wanted += share * other_share * np.trapezoid(dense, gaps)
+            wanted += share * other_share * trapezoid(dense, gaps)
     above = (top - 1.0) * FOOT_M, top * FOOT_M
     found = collision_probability(10.0, height_ft * FOOT_M, above, mode_c)
     assert float(found) == pytest.approx(wanted, rel=2e-3)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.special import spherical_jn, spherical_yn
 
 from components.radar.ground_clutter import ground_ring_rcs_m2
@@ -52,7 +53,7 @@ def test_up_to_35_ghz_it_is_that_of_spheres_after_mie(frequency_hz, index, withi
     wave = LIGHT_M_S / frequency_hz
     diameter_mm = np.linspace(0.1, 6.5, 120)
     count = 8000.0 * np.exp(-4.1 * rate_mm_h**-0.21 * diameter_mm)
-    eta = np.trapezoid(count * backscatter_m2(1e-3 * diameter_mm, wave, index), diameter_mm)
+    eta = trapezoid(count * backscatter_m2(1e-3 * diameter_mm, wave, index), diameter_mm)
     assert abs(10.0 * math.log10(rain_reflectivity_per_m(rate_mm_h, wave) / eta)) < within_db
 
 
