@@ -248,15 +248,17 @@ def managed(
     updated_tick = np.where(hit, changed.tick, changed.updated_tick)
     spread_m2, life_ticks = position_variance(changed), part.life_ticks
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
-    if hit.any():
-        sees = misdetections < BLIND_AFTER
-        life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
     ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
-    ended |= changed.tick - updated_tick > life_ticks
     counted_tick = part.counted_tick
     if rules.promises is not None:
         counts = looked | (by >> np.arange(len(looked))[:, np.newaxis] & 1).astype(bool)
         counted_tick = np.where(counts, np.maximum(counted_tick, changed.tick), counted_tick)
+    if hit.any():
+        # Who has not missed it, and has looked at it lately.
+        lately = changed.tick - counted_tick <= rules.lives_ticks
+        sees = (misdetections == 0) & (lately if rules.promises is not None else True)
+        life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
+    ended |= changed.tick - updated_tick > life_ticks
     return changed.with_columns(
         history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
         updated_tick=updated_tick, status=np.where(ended, DELETED, status),

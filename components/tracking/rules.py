@@ -237,7 +237,8 @@ class TrackerParameters(Parameters):
     delete_after_s: float | None = Field(
         default=None, gt=0,
         description="Time without a detection after which any track ends, s. By default 6 s, or "
-        "three times as long as a sensor that sees it promises to report it in, if that is more.",
+        "three times as long as the soonest of those that see it promises a report in, if that is "
+        "more.",
     )  # fmt: skip
     delete_above_m: float = Field(
         default=3000.0, gt=0,
@@ -338,16 +339,23 @@ class TrackerRules:
         """Probability of the gate outside of which a track has no say."""
         return max(self.p.gate_probability, self.p.start_gate_probability)
 
+    @property
+    def lives_ticks(self) -> int:
+        """How long a track lives whose sensors report at every look."""
+        return int(_LIVES_S * self.ticks_per_s)
+
     def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
         """Return how long tracks live without a detection; `sees` (sensors, n) is who sees them."""
         after_s = _LIVES_S if self.p.delete_after_s is None else self.p.delete_after_s
         life = np.full(len(range_m), int(after_s * self.ticks_per_s))
         if self.promises is None or self.p.delete_after_s is not None:
             return life
+        soonest = np.full(len(range_m), np.inf)
         for sensor, mine in enumerate(sees):
             promised = _LIVES_PROMISES * self.promises.ticks(sensor, range_m)
-            life = np.maximum(life, np.where(mine, promised, 0.0).astype(np.int64))
-        return life
+            soonest = np.minimum(soonest, np.where(mine, promised, np.inf))
+        soonest = np.where(np.isinf(soonest), 0.0, soonest)
+        return np.maximum(life, soonest.astype(np.int64))
 
     def start_deviation(self, size: int) -> float:
         """Standard deviation, in a new track, of what a model has besides position and velocity."""

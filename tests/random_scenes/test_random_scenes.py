@@ -9,6 +9,7 @@ import dataclasses
 import numpy as np
 import pytest
 import run_loops
+import run_tracks
 import studies
 from comparisons import difference, judge, recorded
 from dice import Dice
@@ -93,3 +94,10 @@ def test_the_generator_leaves_nothing_out(tmp_path):
         if not wanted:
             break
     assert wanted == set()
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_a_random_tracked_scene_has_no_track_of_nobody(seed):
+    """More: ``python tests/random_scenes/run_tracks.py --count 300``."""
+    wrong, _, _ = run_tracks.judged(seed)
+    assert wrong == ""

@@ -153,8 +153,7 @@ def _closing() -> list[dict[str, Any]]:
 
 
 ADS_B = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "range_km": 40.0}
-ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0],
-          "far_every": 1}  # fmt: skip
+ACTIVE = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60.0, 60.0]}
 #: Of the navigation of aircraft: categories of position and velocity, in turn.
 _EQUIPPED = [
     {"mode_s": True, "ads_b": {"nacp": nacp, "nacv": nacv}}
