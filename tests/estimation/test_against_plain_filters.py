@@ -130,12 +130,12 @@ def test_interacting_filters(kind):
         assert np.allclose(whole[1][:, :, n], spread, rtol=1e-3, atol=1e-3)
 
 
-def test_rates_by_default_leave_straight_flight_every_minute():
+def test_rates_by_default_leave_every_model_after_a_quarter_of_a_minute():
     for models in (("velocity", "turn"), ("turn", "velocity", "acceleration")):
         estimator = estimator_of(InteractingModels, InteractingParameters(models=models))
         for i, name in enumerate(models):
             leaves = sum(estimator.rates_per_s[i][j] for j in range(len(models)) if j != i)
-            assert leaves == pytest.approx(1 / 60 if name == "velocity" else 1 / 100)
+            assert leaves == pytest.approx(1 / 15), name
 
 
 @pytest.mark.parametrize("shape", [(1.0, 2.0, 0.0), (0.4, 1.5, 1.0)], ids=str)

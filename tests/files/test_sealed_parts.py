@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 
 from dsa_des.cli import main
 from dsa_des.files.sealed_files import is_sealed, parquet, sealed
+from tests.studies.conftest import small
+
+__all__ = ["small"]
 
 STUDY = """
 scene = "small.toml"

@@ -19,14 +19,21 @@ def test_each_is_found_by_its_name_and_scenes_are_whole():
             assert dsa_des.load_scene(example.name).title == example.title
 
 
+#: What two of them leave out is said: the thesis draws a fade a scan, a data sheet has no air.
+LEFT_OUT = {"fig_4_21": "each scan draws a fade of its own", "data_sheet": "gas attenuation"}
+
+
 def test_shipped_scenes_are_quiet():
-    """They are right, or say that they mean it: no run of one begins with notes."""
+    """They are right, or say that they mean it: no run of another begins with notes."""
     notes = {
         example.name: notes_of_scene(Simulation(load_scene(example.path)))
         for example in examples()
         if example.kind == "scene"
     }
     assert len(notes) > 40
+    for name, said in LEFT_OUT.items():
+        (note,) = notes.pop(name)
+        assert said in note
     assert {name: said for name, said in notes.items() if said} == {}
 
 
