@@ -140,7 +140,8 @@ def _unit(name: str, value: ArrayLike) -> Any:
     return array
 
 
-MOST_PER_FRAME = 1e5
+#: More say nothing of targets, and a second of them takes minutes to look at.
+MOST_PER_FRAME = 1e4
 # Draw 0 of a frame says how many; of each, by its number, where, how strong and which contrast.
 _HOW_MANY, _AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST = range(5)
 # Draws that belong to the frame and to no target.
