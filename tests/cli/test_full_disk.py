@@ -44,8 +44,12 @@ def test_a_full_disk(
     scene = configs / "first_light.toml"
     done = limited(limit, *(word.format(scene=scene) for word in words))
     assert done.returncode == (1 if limit else 2), done.stderr
-    # What blocks warn of was said before.
-    said = [line for line in done.stderr.splitlines() if not re.match(r"note: |\d+ notes?: ", line)]
+    # What blocks warn of, and how long it takes, was said before.
+    said = [
+        line
+        for line in done.stderr.splitlines()
+        if not re.match(r"note: |\d+ notes?: |about \d", line)
+    ]
     assert len(said) == 1 and said[0].startswith("error: "), done.stderr
     assert "cannot be written: File too large" in done.stderr
     assert list(tmp_path.iterdir()) == []
@@ -106,5 +110,9 @@ def test_our_own_output_on_a_full_disk(
         started = ["-m", "dsa_des", *(word.format(scene=scene) for word in words)]
         done = warm_process.run(started, stdout=full)
     assert done.returncode == 1
-    said = [line for line in done.stderr.splitlines() if not re.match(r"note: |\d+ notes?: ", line)]
+    said = [
+        line
+        for line in done.stderr.splitlines()
+        if not re.match(r"note: |\d+ notes?: |about \d", line)
+    ]
     assert said == ["error: the output cannot be written: No space left on device"]
