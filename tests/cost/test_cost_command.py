@@ -200,7 +200,7 @@ def test_what_a_scene_cannot_have_is_said(tmp_path):
     boundary = Variants(
         str(SCENE), swaps=["radar=radar.range_boundary"], sets=["blocks.radar.range_km=5"]
     )
-    with pytest.raises(Unavailable, match="power_w"):
+    with pytest.raises(Unavailable, match="wavelength_m"):
         climb(boundary, "radar", DETECTION, repeats=1)
 
 
