@@ -6,8 +6,9 @@ the same.
 
 import gc
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -211,16 +212,7 @@ def _foreseen(
             raise
         if len(replicas) == 1:
             return {}, {0: f"before it is flown: {error_text(error)}"}
-    result: dict[str, AnyArray] = {}
-    errors: dict[int, str] = {}
-    for k, replica in enumerate(replicas):
-        values, wrong = _foreseen(scene, metrics, [replica])
-        if wrong:
-            errors[k] = wrong[0]
-        for name, column in values.items():
-            nothing = _nothing(len(replicas), text=column.dtype == object)
-            result.setdefault(name, nothing)[k] = column[0]
-    return result, errors
+    return _one_by_one(partial(_foreseen, scene, metrics), replicas)
 
 
 def _flown(
@@ -322,18 +314,19 @@ def _measured(
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
-            return _one_by_one(scene, metrics, runs)
+            return _one_by_one(partial(_measured, scene, metrics), runs)
     return values, {}
 
 
 def _one_by_one(
-    scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
+    measure: Callable[[Sequence[Any]], tuple[dict[str, AnyArray], dict[int, str]]],
+    runs: Sequence[Any],
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
     result: dict[str, AnyArray] = {}
     errors: dict[int, str] = {}
     for k, run in enumerate(runs):
-        values, wrong = _measured(scene, metrics, [run])
+        values, wrong = measure([run])
         if wrong:
             errors[k] = wrong[0]
         for name, column in values.items():

@@ -1,5 +1,6 @@
 """A chunk whose rows do not fit in memory at once is run in parts, with the same bytes."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
         except ValueError as error:
             if len(runs) == 1:
                 return {}, {0: str(error)}
-            return chunks._one_by_one(scene, metrics, runs)
+            return chunks._one_by_one(partial(broken, scene, metrics), runs)
 
     plain = chunks._measured
     monkeypatch.setattr(chunks, "run_replicas", run)
