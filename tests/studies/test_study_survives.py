@@ -68,9 +68,11 @@ def released(small: Path) -> Path:
 
 def test_a_killed_study_continues_to_the_same_bytes(released: Path) -> None:
     released.touch()
-    whole = undisturbed()
+    words = ("study", "study.toml", "--workers", "2", "--out")
+    assert dsa_des(*words, "alone").wait() == 0
+    whole = contents(Path("alone"))
     released.unlink()
-    process = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--quiet")
+    process = dsa_des(*words, "killed", "--quiet")
     parts = Path("killed/parts")
     wait_for(lambda: len(list(parts.glob("*.parquet"))) >= 2)
     assert process.poll() is None  # at work until it is killed
@@ -82,9 +84,7 @@ def test_a_killed_study_continues_to_the_same_bytes(released: Path) -> None:
     released.touch()
     (parts / ".dsa_des-0123456789ab").write_bytes(b"half a par")  # as a kill leaves it
     (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # of an earlier version
-    again = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--resume")
-    again.communicate()
-    assert again.returncode == 0
+    assert dsa_des(*words, "killed", "--resume").wait() == 0
     assert contents(Path("killed")) == whole
     after = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
     assert before.items() <= after.items()  # what was finished is not run again
