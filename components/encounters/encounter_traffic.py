@@ -387,7 +387,7 @@ def _pairs_of(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
 
 
 #: So many encounters of a model make one set: their arrays stay small.
-_PAIRS_AT_ONCE = 2048
+_PAIRS_AT_ONCE = 4096
 _PAIRS = MadeTogether(_pairs_of)
 
 

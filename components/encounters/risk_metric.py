@@ -178,9 +178,9 @@ class RiskRatios(Mitigated):
         meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._of_nominal(group)
-            values = self.of_flights(group, nominal_geometry, steered=False)
+            closest = self.of_flights(group, nominal_geometry, steered=False)
         else:
-            values, result = meeting.closest, self._of_meeting(meeting)
+            closest, result = meeting.closest, self._of_meeting(meeting)
             unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._between_classes(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
@@ -190,7 +190,7 @@ class RiskRatios(Mitigated):
             result |= self._weight.measure(group)
         if self.p.needless:
             result[_KEPT] = 1.0 - result["well_clear_lost_nominal"]
-        *values, course_deg, bearing_deg = values
+        *values, course_deg, bearing_deg = closest
         angles = np.radians([course_deg, bearing_deg])
         values += [part for angle in angles for part in (np.cos(angle), np.sin(angle))]
         result |= dict(zip(self.geometry, values, strict=False))

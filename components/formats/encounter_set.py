@@ -189,14 +189,11 @@ def pair_paths(
     for pairs in alike.values():
         for start in range(0, len(pairs), _PAIRS_AT_ONCE):
             some = pairs[start : start + _PAIRS_AT_ONCE]
-            (time_s, *own), (times_s, *other) = (
-                flown_events([(pair[1], pair[which]) for pair in some], dynamics)
-                for which in (2, 3)
-            )
-            shorter = min(len(time_s), len(times_s))
-            paths = PairPaths(
-                time_s[:shorter], np.array(own)[:, :shorter], np.array(other)[:, :shorter]
-            )
+            one = flown_events([(of, row) for _, of, row, _ in some], dynamics)
+            two = flown_events([(of, row) for _, of, _, row in some], dynamics)
+            shorter = min(len(one[0]), len(two[0]))
+            own_m, other_m = (np.array(each[1:])[:, :shorter] for each in (one, two))
+            paths = PairPaths(one[0][:shorter], own_m, other_m)
             yield np.array([pair[0] for pair in some]), paths
 
 
