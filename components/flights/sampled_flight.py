@@ -163,11 +163,14 @@ class SampledTrajectory:
         pieces = []
         for first, end in pairwise([0, *ends, len(path[0])]):
             part = slice(first, end)
-            velocity = self.velocity_enu_mps
+            velocity: Vector | None = None
+            if self.velocity_enu_mps is not None:
+                east, north, up = (along[part] for along in self.velocity_enu_mps)
+                velocity = east, north, up
             pieces.append(
                 attitude_from_path(
                     *(column[part] for column in path),
-                    velocity_enu_mps=None if velocity is None else tuple(v[part] for v in velocity),
+                    velocity_enu_mps=velocity,
                     wind_east_north_mps=wind_east_north_mps,
                 )
             )
