@@ -10,6 +10,7 @@ from pydantic import Field
 from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.guidance.daidalus import ConfParameters, changes_out, smaller, why_never_steers
 from components.messages.alerts import AlertLevels
+from components.messages.detections import without_range
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
@@ -79,6 +80,14 @@ class TurnOut(Component):
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
+        #: How often nothing led out, of how often something had to.
+        self._stuck = self._due = 0
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often it was to steer, and no change led clear."""
+        if not self._due:
+            return {}
+        return {"no change leads clear and the ownship is left alone": (self._stuck, self._due)}
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
@@ -109,6 +118,8 @@ class TurnOut(Component):
             result = changes_out(kind, self._configuration, self._alerter, alerts, rows)
             for (run, index), changes in zip(now.items(), result, strict=True):
                 change = None if changes is None else smaller(changes)
+                self._due += changes is not None
+                self._stuck += changes is not None and change is None
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre(change)
                     self._free_from[run] = int(wake.ticks[index]) + self._pause_ticks
@@ -198,6 +209,21 @@ class TurnAway(Component):
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
+        #: How many tracks had no range, of how many.
+        self._rangeless = self._heard = 0
+
+    def warnings(self) -> list[str]:
+        """Say that nobody measures the range by which it goes."""
+        blind = "" if self.p.without_range else without_range(self.context.producers)
+        if not blind:
+            return []
+        return [f"without_range is false and {blind} measures no range: it never turns"]
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how many tracks had no range and were not acted on."""
+        if self.p.without_range or not self._heard:
+            return {}
+        return {"a track has no range and is not acted on": (self._rangeless, self._heard)}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look for the nearest track at every instant."""
@@ -205,6 +231,8 @@ class TurnAway(Component):
         if tracks is None:
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
+        self._heard += len(near)
+        self._rangeless += int(np.count_nonzero(np.isnan(tracks.range_m)))
         if self.p.without_range:
             near |= np.isnan(tracks.range_m)
         row = tracks.row_of_entries

@@ -236,6 +236,14 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
+        #: How often it was to steer, and nothing led out.
+        self._due = self._stuck = 0
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often it was to steer, and no change led clear."""
+        if not self._due:
+            return {}
+        return {"no change leads clear and the ownship is left alone": (self._stuck, self._due)}
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
@@ -344,6 +352,7 @@ class Stochastic(Component):
                 by_turn[index] = self._draw(mind, self._steering, 0) < self.p.turn_share
                 draws[index] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
         result: dict[int, Manoeuvre] = {}
+        needed: set[int] = set()
         # Who finds no way out by one kind tries the other.
         for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
             for turns in (True, False):
@@ -357,6 +366,7 @@ class Stochastic(Component):
                 for row, changes in zip(rows, every, strict=True):
                     change = 0.0
                     if changes is not None:
+                        needed.add(row)
                         change = steering(changes, turns, draws[row], self.p.goes_beyond)
                     if change != 0.0 and turns:
                         result[row] = self._turn(change, alerts, row)
@@ -364,6 +374,7 @@ class Stochastic(Component):
                         result[row] = Manoeuvre(
                             climb_m=change, climb_rate_mps=self.p.vertical_rate_mps
                         )
+        self._due, self._stuck = self._due + len(needed), self._stuck + len(needed - set(result))
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:

@@ -37,6 +37,13 @@ class ConesAhead:
     def __init__(self) -> None:
         #: Of the cones at the scans of one wake: their scan, axis, and cosine of the half angle.
         self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None
+        #: Scans at which all cones had run out, of those that had any.
+        self._old: IntArray = np.zeros(2, dtype=np.int64)
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return at how many scans no cone counted any more."""
+        times, of = self._old.tolist()
+        return {"the cues that it has are older than their lasts_s": (times, of)} if of else {}
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
         """Return which targets lie in a cone at each scan, (scans, targets), or None for none."""
@@ -54,6 +61,8 @@ class ConesAhead:
         entry = np.arange(len(scan)) + (cones.offsets[at] - first)[scan]
         time_s = wake.time_s[scan]
         live = time_s <= cones.until_s[entry]
+        cued_scans = np.count_nonzero(counts)
+        self._old += cued_scans - len(np.unique(scan[live])), cued_scans
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None

@@ -362,6 +362,10 @@ class StoneSoupTracker(Component):
             **moments,
         )  # fmt: skip
 
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return whose looks came too late."""
+        return self._count.undone()
+
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""
         return {"late_looks": {self.name: self._count.late()}}

@@ -84,6 +84,14 @@ class Cues(Component):
         #: Of each run, when cues were sent last, and whether there were none.
         self._last_tick: IntArray = np.empty(0, dtype=np.int64)
         self._silent: BoolArray = np.empty(0, dtype=bool)
+        #: Tracks whose cone would be too wide, of how many.
+        self._wide: IntArray = np.zeros(2, dtype=np.int64)
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how many tracks were too uncertain to cue."""
+        times, of = self._wide.tolist()
+        what = f"a track's cone is wider than most_half_angle_deg ({self.p.most_half_angle_deg:g})"
+        return {f"{what} and cues none": (times, of)} if of else {}
 
     def run(self, wake: Wake) -> CueCones | None:
         """Send the cones of the tracks at every instant at which they are due."""
@@ -139,6 +147,7 @@ class Cues(Component):
         half = np.where(tracks.has_range[entry], half, self.p.sigmas * np.sqrt(angular))
         half = np.maximum(half, math.radians(self.p.least_half_angle_deg))
         kept = half <= math.radians(self.p.most_half_angle_deg)
+        self._wide += int(np.count_nonzero(~kept)), len(kept)
         row = tracks.row_of_entries[entry]
         return row[kept], entry[kept], half[kept]
 

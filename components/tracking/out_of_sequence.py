@@ -236,6 +236,13 @@ class LookCount:
         )
         return LookCount(*counts)
 
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how many looks of each sensor came too late, of how many."""
+        return {
+            f"a look of {name} comes too late and is left out": (lost, self.came[name])
+            for name, lost in sorted(self.left_out.items())
+        }
+
     def late(self) -> dict[str, dict[str, float]]:
         """Return looks, those left out and their share, by sensor; of those that lost any."""
         return {

@@ -6,8 +6,9 @@ the same.
 
 import gc
 import json
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -55,6 +56,8 @@ class Done:
     runs: int
     failed: int
     crashed: int = 0
+    #: What they took of the processor; in no file, for it is another each time.
+    cpu_s: float = 0.0
 
 
 def schema_of(study: Study) -> pa.Schema:
@@ -71,6 +74,7 @@ def schema_of(study: Study) -> pa.Schema:
 
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
+    began_s = time.process_time()
     schema = schema_of(study)
     undone: list[Undone] = []
     tables = [
@@ -80,7 +84,7 @@ def run_chunk(study: Study, chunk: Chunk) -> Done:
     del tables
     if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
         gc.collect()
-    return done
+    return replace(done, cpu_s=time.process_time() - began_s)
 
 
 def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
@@ -109,7 +113,8 @@ def joined(name: str, parts: Sequence[Done]) -> Done:
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
     undone = added(map(undone_of, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
-    return done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
+    done = done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
+    return replace(done, cpu_s=sum(part.cpu_s for part in parts))
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:

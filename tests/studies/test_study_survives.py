@@ -38,8 +38,9 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def undisturbed(name: str = "alone") -> dict[str, bytes]:
+def undisturbed(name: str = "alone", repeat: str = "") -> dict[str, bytes]:
     study = read_study("study.toml")
+    study.repeat = repeat
     finish(study, run_into(study, Path(name), 1, False), quiet=True)
     return contents(Path(name))
 
@@ -68,11 +69,9 @@ def released(small: Path) -> Path:
 
 def test_a_killed_study_continues_to_the_same_bytes(released: Path) -> None:
     released.touch()
-    words = ("study", "study.toml", "--workers", "2", "--out")
-    assert dsa_des(*words, "alone").wait() == 0
-    whole = contents(Path("alone"))
+    whole = undisturbed(repeat=f"dsa-des study {Path('study.toml').resolve()}")
     released.unlink()
-    process = dsa_des(*words, "killed", "--quiet")
+    process = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--quiet")
     parts = Path("killed/parts")
     wait_for(lambda: len(list(parts.glob("*.parquet"))) >= 2)
     assert process.poll() is None  # at work until it is killed
@@ -84,7 +83,9 @@ def test_a_killed_study_continues_to_the_same_bytes(released: Path) -> None:
     released.touch()
     (parts / ".dsa_des-0123456789ab").write_bytes(b"half a par")  # as a kill leaves it
     (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # of an earlier version
-    assert dsa_des(*words, "killed", "--resume").wait() == 0
+    again = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--resume")
+    again.communicate()
+    assert again.returncode == 0
     assert contents(Path("killed")) == whole
     after = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
     assert before.items() <= after.items()  # what was finished is not run again
