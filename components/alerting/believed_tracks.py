@@ -22,7 +22,7 @@ from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import counted
+from dsa_des.record.undone import with_cases
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -60,7 +60,7 @@ class EstimatedFlights:
         """Take in tracks of a tracker, and when each row came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
         run = came.run[row_of_entries(tracks.offsets)]
-        self.rangeless = counted(self.rangeless, run[good & ~tracks.has_range], run[good])
+        self.rangeless = with_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
@@ -198,7 +198,7 @@ class BelievedTracks:
         # Without two poses the ownship's own velocity is not known, and no relative one.
         known = np.isfinite(own["east_mps"])
         moving = known.nonzero()[0]
-        self._unmoving = counted(self._unmoving, asked.run[~known], asked.run)
+        self._unmoving = with_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         result = self._estimates.states(now, times_s[moving], poses.place(now))
         scan, number, state, deviations, age_s = moving[result[0]], *result[1:]

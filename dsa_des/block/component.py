@@ -321,7 +321,7 @@ class Component:
         """Return how often this block could not do its work: by what lacked, times, of how many.
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
-        runs gives both of each run, (2, runs) (`dsa_des.record.undone.counted`).
+        runs gives both of each run, (2, runs) (`dsa_des.record.undone.with_cases`).
         """
         return {}
 

@@ -19,7 +19,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 # Replicas that run together, and scans that they have together.
-_MOST_TOGETHER, _MOST_ROWS = 1024, 4e6
+_MOST_TOGETHER, _MOST_ROWS = 4096, 4e6
 _A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None

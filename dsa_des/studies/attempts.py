@@ -37,11 +37,11 @@ class Piece:
 
 
 class Attempts:
-    """What is still to be run, by so many workers."""
+    """What is still to be run: chunks that are run together (`run_together`)."""
 
-    def __init__(self, study: Study, chunks: Iterable[Chunk], workers: int) -> None:
+    def __init__(self, study: Study, together: Iterable[tuple[Chunk, ...]]) -> None:
         self._study = study
-        self._todo = iter(run_together(study, list(chunks), workers))
+        self._todo = iter(together)
         self._again: list[Piece] = []
         self._alone: deque[Piece] = deque()
         self._running = 0

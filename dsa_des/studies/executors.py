@@ -68,7 +68,7 @@ class Local:
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks; two pieces per worker are under way at a time."""
-        attempts = Attempts(study, chunks, self._count)
+        attempts = Attempts(study, run_together(study, list(chunks), self._count))
         if not self._workers or any(w.study is not study or len(w) for w in self._workers):
             self.close()
             self._workers = [_Worker(study) for _ in range(self._count)]
@@ -270,7 +270,7 @@ class Dask:
         from distributed.scheduler import KilledWorker
 
         workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
-        attempts = Attempts(study, chunks, max(1, workers))
+        attempts = Attempts(study, run_together(study, list(chunks), max(1, workers)))
         given: dict[Any, Piece] = {}
         running = as_completed(loop=self._client.loop)
         most = max(8, 4 * workers)
