@@ -67,6 +67,8 @@ class StoredRows:
         #: The first rows without result, and the first row of all, as column → value.
         self.failed: list[dict[str, Any]] = []
         self.first: dict[str, Any] = {}
+        #: Of a sample: by cell, for how many those without result stand; NaN where nothing is known.
+        self.unheard: dict[int, list[float]] = {}
         self._order: IntArray | None = None
         self._held: OrderedDict[str, AnyArray] = OrderedDict()
         rows = max(1, folder.record.cells * folder.record.replicas)
@@ -117,6 +119,10 @@ class StoredRows:
             key=_cell_and_replica,
         )
         if not good.all():
+            if STANDS_FOR in table.column_names:
+                others = table.filter(~good).select(["cell", STANDS_FOR]).to_pydict()
+                for cell, many in zip(others["cell"], others[STANDS_FOR], strict=True):
+                    self.unheard.setdefault(cell, []).append(np.nan if many is None else many)
             bad = table.filter(~good).slice(0, MOST_FAILED).to_pylist()
             self.failed = sorted([*self.failed, *bad], key=_cell_and_replica)[:MOST_FAILED]
 
@@ -175,8 +181,22 @@ class Rows:
 
     @cached_property
     def stands_for(self) -> FloatArray | None:
-        """For how many runs each one stands, 0 for one not flown; None where all are flown."""
-        return self.column(STANDS_FOR) if STANDS_FOR in self.stored.names else None
+        """For how many runs each one stands, 0 for one not flown; None where all are flown.
+
+        The flown runs of a cell that gave no result leave out themselves, as in any study; the others
+        for which they were to stand are shared by those that gave one.
+        """
+        if STANDS_FOR not in self.stored.names:
+            return None
+        result = self.column(STANDS_FOR)
+        for cell, many in self.stored.unheard.items():
+            mine = (self.column("cell") == cell) & (result > 0.0)
+            others = np.where(mine, result - 1.0, 0.0)
+            if (total := float(others.sum())) > 0.0:
+                # Whose process died may have been any of those flown.
+                lost = np.nan_to_num(np.array(many), nan=1.0 + total / mine.sum()) - 1.0
+                result = result + others * (float(np.maximum(lost, 0.0).sum()) / total)
+        return result
 
     def is_sampled(self, name: str) -> bool:
         """Return whether only runs that were flown have a result."""

@@ -178,7 +178,7 @@ def test_chances_are_those_that_a_grid_search_finds_likeliest() -> None:
     def loss(a: float, b: float) -> float:
         p = 1.0 / (1.0 + np.exp(-(a + b * terms[0] + np.log(0.25))))
         likely = -(happened * np.log(p) + (1 - happened) * np.log(1 - p)).sum()
-        return float(likely + a * a / 18.0 + b * b / 0.5)
+        return float(likely + a * a / 18.0 + b * b / 0.125)
 
     grid = np.linspace(-0.05, 0.05, 21)
     found = min((loss(level + a, slope + b), a, b) for a in grid for b in grid)
