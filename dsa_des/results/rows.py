@@ -15,7 +15,13 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
+from dsa_des.results.ratio import (
+    PairedRatio,
+    influences,
+    paired_ratio,
+    taken_over,
+    unseen_variance,
+)
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -67,7 +73,7 @@ class StoredRows:
         #: The first rows without result, and the first row of all, as column → value.
         self.failed: list[dict[str, Any]] = []
         self.first: dict[str, Any] = {}
-        #: Of a sample: by cell, for how many those without result stand; NaN where nothing is known.
+        #: Of a sample: by cell, for how many those without result were to stand; NaN: unknown.
         self.unheard: dict[int, list[float]] = {}
         self._order: IntArray | None = None
         self._held: OrderedDict[str, AnyArray] = OrderedDict()
@@ -181,21 +187,12 @@ class Rows:
 
     @cached_property
     def stands_for(self) -> FloatArray | None:
-        """For how many runs each one stands, 0 for one not flown; None where all are flown.
-
-        The flown runs of a cell that gave no result leave out themselves, as in any study; the others
-        for which they were to stand are shared by those that gave one.
-        """
+        """For how many runs each one stands, 0 for one not flown; None where all are flown."""
         if STANDS_FOR not in self.stored.names:
             return None
         result = self.column(STANDS_FOR)
-        for cell, many in self.stored.unheard.items():
-            mine = (self.column("cell") == cell) & (result > 0.0)
-            others = np.where(mine, result - 1.0, 0.0)
-            if (total := float(others.sum())) > 0.0:
-                # Whose process died may have been any of those flown.
-                lost = np.nan_to_num(np.array(many), nan=1.0 + total / mine.sum()) - 1.0
-                result = result + others * (float(np.maximum(lost, 0.0).sum()) / total)
+        for cell, lost in self.stored.unheard.items():
+            result = taken_over(result, lost, self.column("cell") == cell)
         return result
 
     def is_sampled(self, name: str) -> bool:
