@@ -1,7 +1,7 @@
 """Which runs are flown where all are known without flying: drawn by what they can contribute.
 
-A study of a ratio knows of every run what happens without a remedy, and its geometry, for an
-eighth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
+A study of a ratio knows of every run what happens without a remedy, and its geometry, for a
+twentieth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
 them the chance p(x) of each event is learnt, by a logistic model of the geometry x, and then a run
 is flown with a probability π(x) of its own and stands for 1/π runs (`dsa_des.results.ratio`). A
 wrong p(x) costs width, never truth. With weights w and nominal flags n the variance of a ratio R is
