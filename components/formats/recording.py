@@ -115,9 +115,12 @@ class Recording:
         usual_s = float(np.median(steps)) if len(steps) else 0.0
         silent_s = max(_SILENT_S, _SILENT_STEPS * usual_s)
         limit_s = silent_s if longest_gap_s is None else longest_gap_s
+        away = np.append(steps > limit_s, False)
+        if "away" in columns:
+            away |= columns["away"] > 0.0
         trajectory = SampledTrajectory(
             name, columns["time"], columns["lat"], columns["lon"], columns["alt"],
-            velocity_enu_mps=velocity, longest_gap_s=limit_s, **angles,
+            velocity_enu_mps=velocity, away=away, **angles,
         )  # fmt: skip
         if trajectory.velocity_was_ignored:
             self.notes.of_one(

@@ -1,7 +1,7 @@
 """Reports of aircraft one by one, as receivers, trackers and autopilots log them."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from components.formats.recording import Recording
@@ -39,6 +39,8 @@ class Log(NamedTuple):
     reports: Iterator[tuple[int, Report]]
     callsigns: Mapping[str, str]
     rows: str = "reports"
+    #: What its reader has to say of it, when the reports are read.
+    warnings: Sequence[str] = ()
 
 
 _MOVES = {"trk": "track", "gs": "speed", "vs": "climb rate"}
@@ -74,6 +76,7 @@ def recording_of(
     places = [_PLACE[str(heights.get(key, key))] for key in headers]
     for number, one in log.reports:
         table.add_numbers(number, one.name, [_number(one[place]) for place in places])
+    table.notes.warnings += log.warnings
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
     return table.recording(

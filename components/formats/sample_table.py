@@ -124,10 +124,15 @@ class SampleTable:
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
-        for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
-            if not low <= value <= high and value == value and quantity not in self._optional:
+        for k, ((quantity, _, _, low, high), value) in enumerate(
+            zip(self._plan, values, strict=True)
+        ):
+            if low <= value <= high or value != value:
+                continue
+            if quantity not in self._optional:
                 self._number(line, quantity, self._columns[quantity], repr(value))
                 return
+            values = [*values[:k], math.nan, *values[k + 1 :]]
         rows.lines.append(line)
         for column, value in zip(rows.values.values(), values, strict=True):
             column.append(value)
