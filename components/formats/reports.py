@@ -71,6 +71,7 @@ def recording_of(
     table = SampleTable(
         problems, ("name", *headers.values()), 0, columns, optional=(*_MOVES, *_ANGLES), gaps=True,
         instead={} if altitude else {"alt": "alt instead"}, rows=log.rows, least=1,
+        seldom=(*_MOVES, *_ANGLES),
     )  # fmt: skip
     table.notes.harmless.append(f"read as {log.kind}, {log.units}")
     places = [_PLACE[str(heights.get(key, key))] for key in headers]

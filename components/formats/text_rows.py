@@ -132,6 +132,8 @@ class TrafficFile:
     start_time_s: float
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    #: When what was chosen of it ends.
+    end_s: float | None = None
 
     @property
     def aircraft(self) -> list[SampledTrajectory]:
