@@ -165,7 +165,7 @@ class RecordedTraffic(TrafficSource):
     Time 0 is the file's earliest sample.
     """
 
-    Parameters: ClassVar[Any] = RecordedParameters
+    Parameters: ClassVar[Any] = FileParameters
     effects = (CrabAngles(),)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
