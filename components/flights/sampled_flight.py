@@ -292,19 +292,30 @@ class SampledFleet(Fleet):
 
     def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
         self._flights = list(trajectories)
+
+    @cached_property
+    def _bases(self) -> list[tuple[FloatArray, list[int]]]:
+        """Sample times, and which flights have them."""
         by_bytes: dict[bytes, list[int]] = {}
         for i, flight in enumerate(self._flights):
             by_bytes.setdefault(flight.sample_times_s.tobytes(), []).append(i)
-        self._bases = [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
-        #: What is known of each segment, one after the other: in a row of the memory.
-        self._table = _side_by_side([flight.coefficients for flight in self._flights])
+        return [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
+
+    @cached_property
+    def _table(self) -> FloatArray:
+        """What is known of each segment, one after the other: in a row of the memory."""
+        return _side_by_side([flight.coefficients for flight in self._flights])
+
+    @cached_property
+    def _away(self) -> BoolArray | None:
+        """In which segments, one after the other, an aircraft is away; None where none ever is."""
         gaps = [flight.away for flight in self._flights]
-        self._away: BoolArray | None = None
-        if any(one is not None for one in gaps):
-            none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
-            self._away = np.concatenate(
-                [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
-            )
+        if all(one is None for one in gaps):
+            return None
+        none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
+        return np.concatenate(
+            [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
+        )
 
     def __len__(self) -> int:
         return len(self._flights)
