@@ -55,15 +55,17 @@ def told_apart(samples: Samples, note: Callable[[str, str], None]) -> Samples:
         order = np.argsort(columns["time"], kind="stable")
         of = np.empty(len(lines), dtype=np.int64)
         of[order] = aircraft_of(*(columns[key][order] for key in ("time", "lat", "lon")))
+        if not of.any():
+            result[name] = lines, columns
+            continue
         names = [name]
-        while len(names) <= of.max(initial=0):
+        while len(names) <= of.max():
             free = (f"{name} ({k})" for k in range(len(names) + 1, len(samples) + 10**6))
             names.append(next(one for one in free if one not in samples and one not in names))
         for number, one in enumerate(names):
             mine = of == number
             result[one] = lines[mine], {key: values[mine] for key, values in columns.items()}
-        if len(names) > 1:
-            counts = [f"{one!r} with {np.count_nonzero(of == k)}" for k, one in enumerate(names)]
-            note(name, f"is {len(names)} aircraft, for none flies so far from one sample to the "
-                       f"next: {', '.join(counts)} samples")  # fmt: skip
+        counts = [f"{one!r} with {np.count_nonzero(of == k)}" for k, one in enumerate(names)]
+        note(name, f"is {len(names)} aircraft, for none flies so far from one sample to the "
+                   f"next: {', '.join(counts)} samples")  # fmt: skip
     return result
