@@ -101,7 +101,7 @@ def read_csv(
     knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise). Latitude
     and longitude may stand in one cell. Rows without a time or a position are left out; heading,
     pitch, roll and velocity are used for aircraft where they have no gaps. One name of several
-    aircraft that no one could be is told apart (`components.formats.shared_names`). With
+    aircraft that no one could be is told apart (`components.formats.recording.told_apart`). With
     `altitude` the column of that kind is read, else the one whose name comes first. The ownship is
     the first aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
     """

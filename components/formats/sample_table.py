@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.formats.recording import Notes, Recording
+from components.formats.recording import Notes, Recording, told_apart
 from components.formats.sample_columns import SampleColumn, is_missing
-from components.formats.shared_names import told_apart
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.text.safe_text import shortened
@@ -52,7 +51,7 @@ class SampleTable:
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
     `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
-    With `shared` names several aircraft may have one (`components.formats.shared_names`).
+    With `shared` names several aircraft may have one (`told_apart`).
     `parse_time` reads a time cell where a plain number will not do.
     """
 
@@ -155,7 +154,7 @@ class SampleTable:
         """Check each aircraft's samples and return them as columns, in the order of time."""
         kept = self._without_gaps()
         if self._shared:
-            kept = told_apart(kept, lambda name, text: self.notes.of_one(name, "shared", text))
+            kept = told_apart(kept, self.notes)
         names = list(kept)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
