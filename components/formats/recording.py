@@ -214,6 +214,6 @@ def told_apart(samples: WithLines, notes: Notes) -> WithLines:
             mine = of == number
             result[one] = lines[mine], {key: values[mine] for key, values in columns.items()}
         counts = [f"{one!r} with {np.count_nonzero(of == k)}" for k, one in enumerate(names)]
-        notes.of_one(name, "shared", f"is {len(names)} aircraft, for none flies so far from one sample to the "
-                   f"next: {', '.join(counts)} samples")  # fmt: skip
+        said = "aircraft, for none flies so far from one sample to the next"
+        notes.of_one(name, "shared", f"is {len(names)} {said}: {', '.join(counts)} samples")
     return result
