@@ -131,8 +131,8 @@ class DaidalusAlerting(Component):
             said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often a flight could not be judged."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often a flight could not be judged, by run."""
         return {} if self._roster is None else self._belief.undone()
 
     def run(self, wake: Wake) -> AlertLevels | None:

@@ -108,8 +108,8 @@ class Fusion(Component):
             for one in self.context.producers
         }
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return in how many runs it never put detections of two sensors together."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it never put detections of two sensors together."""
         return self._tries.undone(
             "two sensors or more detect, and it never puts two of them together", of_two=True
         )

@@ -29,7 +29,7 @@ class PassThrough(Fusion):
         """Return 0: nothing waits for anything."""
         return 0
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def undone(self) -> dict[str, Any]:
         """Return nothing: to put nothing together is its work."""
         return {}
 

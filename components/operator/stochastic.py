@@ -17,10 +17,11 @@ from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -236,14 +237,12 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
-        #: How often it was to steer, and nothing led out.
-        self._due = self._stuck = 0
+        #: How often nothing led out, of how often it was to steer, by run.
+        self._stuck = NO_COUNTS
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often it was to steer, and no change led clear."""
-        if not self._due:
-            return {}
-        return {"no change leads clear and the ownship is left alone": (self._stuck, self._due)}
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often it was to steer, and no change led clear, by run."""
+        return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
@@ -374,7 +373,9 @@ class Stochastic(Component):
                         result[row] = Manoeuvre(
                             climb_m=change, climb_rate_mps=self.p.vertical_rate_mps
                         )
-        self._due, self._stuck = self._due + len(needed), self._stuck + len(needed - set(result))
+        due = np.array(sorted(needed), dtype=np.int64)
+        stuck = np.array([row not in result for row in due.tolist()], dtype=bool)
+        self._stuck = with_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:

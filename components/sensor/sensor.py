@@ -334,7 +334,7 @@ class Sensor(Measuring):
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def undone(self) -> dict[str, IntArray]:
         """Return how often the cues that it had were too old."""
         return {} if self._cueing is None else self._cueing.undone()
 

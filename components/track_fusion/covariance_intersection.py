@@ -153,8 +153,8 @@ class CovarianceIntersection(Component):
         self._reported = no_fused_tracks()
         self._tries = Tries()
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return in how many runs it never put tracks of two trackers together."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it never put tracks of two trackers together."""
         return self._tries.undone(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )

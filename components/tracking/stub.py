@@ -80,8 +80,8 @@ class TrackerStub(Component):
             for name, one in sensor_offers(self.context.producers).items()
         }
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return in how many runs it heard of nobody but false alarms."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it heard of nobody but false alarms."""
         return self._tries.undone("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:

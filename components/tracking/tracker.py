@@ -160,8 +160,8 @@ class Tracker(Component):
             for name, one in offers.items()
         }
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return whose looks came too late, and in how many runs no track was confirmed."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return whose looks came too late, and in which runs no track was confirmed."""
         return self._count.undone() | self._tries.undone(
             "detections came, and no track was ever confirmed"
         )
@@ -237,7 +237,7 @@ class Tracker(Component):
             plan, left_out, kept = plan_of_late(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
-        self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
+        self._count = self._count.of(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
@@ -267,8 +267,8 @@ class Tracker(Component):
                     LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
-                late_sensors = scans.sensors[plan.look[late[gone]]]
-                self._count = self._count.of(fused.sensors, late_sensors[:0], late_sensors)
+                too_late = plan.look[late[gone]]
+                self._count = self._count.of(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)

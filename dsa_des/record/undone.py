@@ -1,6 +1,6 @@
 """What blocks could not do: counted by what their work lacked, so that counts of runs add up."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +10,11 @@ from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
 Undone = Mapping[str, Mapping[str, tuple[int, int]]]
+#: The same for each run: both counts, (2, runs).
+UndoneByRun = Mapping[str, Mapping[str, IntArray]]
+#: No case of any run, and no counts of any.
+NO_RUNS: IntArray = np.empty(0, dtype=np.int64)
+NO_COUNTS: IntArray = np.zeros((2, 0), dtype=np.int64)
 #: Smaller shares are not worth a sentence: a flight is not known at its first position.
 _LEAST_SHARE = 0.1
 
@@ -28,6 +33,41 @@ def added(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]:
         for block, counts in sorted(result.items())
         if counts
     }
+
+
+def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
+    """Return counts (2, runs) with more cases: the run of each that lacked something, and of all.
+
+    The counts may end before the last run.
+    """
+    cases = lacking, every
+    runs = max(known.shape[1], *(1 + int(run.max(initial=-1)) for run in cases))
+    result = np.zeros((2, runs), dtype=np.int64)
+    result[:, : known.shape[1]] = known
+    result += [np.bincount(run, minlength=runs) for run in cases]
+    return result
+
+
+def by_run(undone: Mapping[str, IntArray | tuple[int, int]], runs: int) -> dict[str, IntArray]:
+    """Return what a block says (`Component.undone`) as counts of all runs."""
+    result: dict[str, IntArray] = {}
+    for what, counts in undone.items():
+        said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
+        result[what] = np.zeros((2, runs), dtype=np.int64)
+        result[what][:, : said.shape[1]] = said
+    return result
+
+
+def of_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
+    """Return the counts of some runs together."""
+    some = runs if isinstance(runs, slice) else list(runs)
+    result: dict[str, dict[str, tuple[int, int]]] = {}
+    for block, counts in undone.items():
+        for what, of_each in counts.items():
+            times, of = of_each[:, some].sum(axis=1).tolist()
+            if of:
+                result.setdefault(block, {})[what] = times, of
+    return added([result])
 
 
 def undone_sentences(undone: Undone) -> list[str]:
@@ -58,11 +98,10 @@ class Tries:
         done[run[did]] = True
         return Tries(every, done)
 
-    def undone(self, what: str, *, of_two: bool = False) -> dict[str, tuple[int, int]]:
-        """Return in how many runs it was never done, of those that had a source, or two."""
+    def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
+        """Return in which runs it was never done, of those that had a source, or two."""
         enough = has_two(self.had) if of_two else self.had != 0
-        of = int(enough.sum())
-        return {what: (int((enough & ~self.did).sum()), of)} if of else {}
+        return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
 
 
 def has_two(mask: Any) -> BoolArray:
