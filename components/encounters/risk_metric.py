@@ -174,6 +174,13 @@ class RiskRatios(Mitigated):
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
+    def unit_weights(self, group: Group) -> FloatArray:
+        """Return the weights of the encounters."""
+        if self._weight is None:
+            return super().unit_weights(group)
+        weights: FloatArray = self._weight.measure(group)["encounter_weight"]
+        return weights
+
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what no manoeuvre changes, and the geometry of the closest approach."""
         make_together(group.scenes)

@@ -9,6 +9,7 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
+from components.metrics.nearness import SCORES, first_reached_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     RelativeFlight,
@@ -43,6 +44,8 @@ class FlownMetric(TargetMetric):
 
     Refused where manoeuvres reach the traffic block by wires of any but a fixed delay.
     """
+
+    scores = SCORES
 
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
@@ -86,6 +89,21 @@ class FlownMetric(TargetMetric):
         """Return what `read` makes of every replica's flights, (values, replicas)."""
         runs, run_of = self._flights(group, steered, to_the_end)
         return read(runs)[:, run_of]
+
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return of each event that is a cylinder about the ownship its radius and half height."""
+        return {}
+
+    def scored_events(self) -> Sequence[str]:
+        """Return those events, where the ownship is steered."""
+        return list(self.cylinders_m()) if self.delays_s else []
+
+    def reached_s(
+        self, group: Group, event: str, score: str, levels: Sequence[float]
+    ) -> FloatArray:
+        """Return when the first target reaches each level of a score of an event's cylinder."""
+        read = partial(first_reached_s, score, self.cylinders_m()[event], levels)
+        return self.of_flights(group, read, to_the_end=True)
 
     def of_each_flight(
         self, group: Group, read: "Read", *, to_the_end: bool = False

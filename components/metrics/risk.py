@@ -65,6 +65,11 @@ class Mitigated(FlownMetric):
         """Return all of it for every replica."""
         return {**self.losses(group, steered=False), **self.losses(group, steered=True)}
 
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return the sizes of the events as steered."""
+        cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m("_mitigated")
+        return cylinders
+
     def losses(self, group: Group, *, steered: bool) -> Mapping[str, AnyArray]:
         """Return both events of every replica's flights, nominal or as steered."""
         which = "mitigated" if steered else "nominal"

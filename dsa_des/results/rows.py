@@ -35,6 +35,7 @@ from dsa_des.results.statistics import (
     quantile,
     share,
     symmetric,
+    unseen_anywhere,
 )
 
 if TYPE_CHECKING:
@@ -246,7 +247,11 @@ class Rows:
                 return quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
                 return fraction(of_units, confidence), missing
-            return mean(of_units, confidence, method), missing
+            estimate = mean(of_units, confidence, method)
+            if result.unseen is not None and estimate.count and not estimate.value:
+                _, more = self.by_unit(result.unseen, rows)
+                estimate = unseen_anywhere(estimate, more, confidence)
+            return estimate, missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:
             trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))

@@ -148,6 +148,18 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     return Estimate(value, low, high, count, count < FEW)
 
 
+def unseen_anywhere(estimate: Estimate, more: FloatArray, confidence: float) -> Estimate:
+    """Return an estimate that is 0 in all units, up to what may have been missed by chance.
+
+    `more` is what one event would have added in each. So few events that none is seen are expected
+    at most, -log of half the error, which Poisson's law lets happen as often as an end may err.
+    """
+    known = more[~np.isnan(more)]
+    expected = -math.log((1.0 - confidence) / 2.0)
+    high = expected * float(known.mean()) / len(known) if len(known) else math.nan
+    return replace(estimate, high=high)
+
+
 def quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
     """Return a quantile over independent units, whose interval lies between two order statistics.
 

@@ -37,6 +37,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
 from dsa_des.studies.metric import Group, Metric, wanted_by
+from dsa_des.studies.splitting import split
 from dsa_des.studies.study import Chunk, Study, set_text
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
@@ -181,6 +182,15 @@ def _run_cell(
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
     key = str(study.path), cell
+    if study.splitting is not None:
+
+        def measure(
+            metric: Metric, runs: Sequence[Replica], errors: list[str | None]
+        ) -> dict[str, AnyArray]:
+            return _flown(scene, [metric], runs, errors, key, undone)
+
+        rows["error"], values = split(study, cell, numbers, metrics[0], measure)
+        return _table(study, schema, cell, rows, values)
     if not study.allocate:
         values = _flown(scene, metrics, replicas, rows["error"], key, undone)
         return _table(study, schema, cell, rows, values)

@@ -174,6 +174,9 @@ class Metric:
     #: Names of numbers that tell runs apart before they are run, which `foresee` gives besides.
     #: Those that `expected_column` names are the chances that it expects of an event.
     geometry: tuple[str, ...] = ()
+    #: Scores that tell how near a run comes to `scored_events` → levels that may be chosen by a
+    #: pilot, falling; the last is the event itself.
+    scores: Mapping[str, FloatArray] = {}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         self.p = parameters
@@ -196,6 +199,24 @@ class Metric:
         The group has recorded nothing. Results are those that `measure` would give, to the bit.
         """
         raise NotImplementedError
+
+    def scored_events(self) -> Sequence[str]:
+        """Return the events of which it knows how near a run comes (`reached_s`)."""
+        return ()
+
+    def reached_s(
+        self, group: Group, event: str, score: str, levels: Sequence[float]
+    ) -> FloatArray:
+        """Return when each replica first reached levels of a score, s, (levels, replicas).
+
+        NaN where it never did. Levels fall, the last one of `scores` is the event itself, and what
+        is reached by an instant depends on nothing later.
+        """
+        raise NotImplementedError
+
+    def unit_weights(self, group: Group) -> FloatArray:
+        """Return how often each replica's encounter happens, (replicas,)."""
+        return np.ones(len(group))
 
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Raise ValueError for what is wrong and only blocks that are set up can tell.

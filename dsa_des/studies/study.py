@@ -25,6 +25,7 @@ from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
+from dsa_des.studies.split_event import SplitEvent, Splitting
 from dsa_des.studies.study_tables import existing_file
 from dsa_des.text.safe_text import shell_line
 
@@ -37,6 +38,8 @@ class MetricSpec:
     keys: Mapping[str, Any] = field(default_factory=dict)
     #: Its position in the study's list, for messages.
     index: int = 0
+    #: The event that splitting is for, of which repetitions then tell; none of a plain study.
+    splits: str = ""
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene."""
@@ -46,7 +49,8 @@ class MetricSpec:
         try:
             with foreign_code(ValueError):
                 check_tables(cls, scene)
-                return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+                metric = cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+                return SplitEvent(metric, self.splits) if self.splits else metric
         except ForeignFailure as error:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
 
@@ -104,6 +108,8 @@ class Study:
     compare_weight: str | None = None
     #: Names of the ratios for whose sake a sample of the runs is flown, or `AUTO`; none: all are.
     allocate: tuple[str, ...] = ()
+    #: Where replicas are repetitions of splitting.
+    splitting: Splitting | None = None
     #: The command line that runs it again, whatever was changed of its file.
     repeat: str = ""
 
@@ -123,6 +129,11 @@ class Study:
     def cell_at(self, indices: Sequence[int]) -> int:
         """Return the cell with these indices."""
         return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
+
+    @property
+    def begun(self) -> int:
+        """How many runs of a cell are begun: replicas, or with splitting those of their stage."""
+        return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
     @property
     def batch(self) -> int:

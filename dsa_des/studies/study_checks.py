@@ -18,6 +18,7 @@ from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.foreseen import why_not_foreseen
 from dsa_des.studies.metric import Metric, check_recorded
+from dsa_des.studies.splitting import why_not_split
 from dsa_des.studies.study import AUTO, Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -58,6 +59,9 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
             break
     if whole:
         _check_names(study, results, file)
+    if whole and study.splitting is not None and (wrong := why_not_split(study, first)):
+        key, said, value = wrong
+        file.report(("splitting", key) if key else ("splitting",), said, *([value] if key else []))
     if len(file.problems) == before:
         _check_set_up(study, scenes, file)
     if len(file.problems) == before:
@@ -73,7 +77,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
 
 def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
     """Set up the last run of each sequence: what it counts may end before, as a file does."""
-    last = study.replicas - 1
+    last = study.begun - 1
     for draw in study.draws:
         if draw.kind != "sequence" or not last:
             continue
@@ -88,14 +92,14 @@ def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
             else:
                 continue
             file.report(
-                ("draws", draw.key), f"of the last of {study.replicas} replicas: {text}", value
+                ("draws", draw.key), f"of the last of {study.begun} replicas: {text}", value
             )
             break
 
 
 def _endless(study: Study, scans: float) -> str:
     """Return why a study whose runs have so many scans is not begun, nothing if it is."""
-    runs = study.replicas * len(study.cells)
+    runs = study.begun * len(study.cells)
     if runs * scans <= MOST_STUDY_SCANS:
         return ""
     return (
@@ -229,7 +233,7 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     if draw.kind == "choice":
         return list(draw.values)
     if draw.kind == "sequence":
-        return [draw.value(study.seed, number, study.batch) for number in (0, study.replicas - 1)]
+        return [draw.value(study.seed, number, study.batch) for number in (0, study.begun - 1)]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
     cells = study.cells if study.over else range(1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
