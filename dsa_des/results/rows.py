@@ -33,9 +33,9 @@ from dsa_des.results.statistics import (
     mean,
     normal_error,
     quantile,
+    rare,
     share,
     symmetric,
-    unseen_anywhere,
 )
 
 if TYPE_CHECKING:
@@ -247,11 +247,10 @@ class Rows:
                 return quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
                 return fraction(of_units, confidence), missing
-            estimate = mean(of_units, confidence, method)
-            if result.unseen is not None and estimate.count and not estimate.value:
-                _, more = self.by_unit(result.unseen, rows)
-                estimate = unseen_anywhere(estimate, more, confidence)
-            return estimate, missing
+            if result.unseen is not None:
+                more = self.by_unit(result.unseen, rows)[1]
+                return rare(of_units, more, confidence), missing
+            return mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:
             trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))

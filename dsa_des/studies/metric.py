@@ -22,6 +22,7 @@ from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import scenes_of
 from dsa_des.replicas.replicas import Recorded
+from dsa_des.replicas.splitting import Repeated
 from dsa_des.results.record import (
     CLASS,
     EVENT,
@@ -227,6 +228,64 @@ class Metric:
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return the analytic answer for a scene, for results that have one."""
         return {}
+
+
+class Nearness(Metric):
+    """When each run first reached levels of the score of an event, and how much it weighs."""
+
+    def __init__(self, metric: Metric, event: str, score: str, levels: Sequence[float]) -> None:
+        self._metric, self._asked = metric, (event, score, levels)
+        self.tables = metric.tables
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return the times, s, by the number of the level; NaN for never."""
+        times_s = self._metric.reached_s(group, *self._asked)
+        weights = self._metric.unit_weights(group)
+        return {"weight": weights} | {str(k): one for k, one in enumerate(times_s)}
+
+
+class SplitEvent(Metric):
+    """What a repetition tells of an event, which a metric gives of a run."""
+
+    def __init__(self, metric: Metric, event: str) -> None:
+        super().__init__(metric.p, metric.scene)
+        self.metric, self.event = metric, event
+        self.tables = metric.tables
+
+    def results(self) -> list[Result]:
+        """Return the probability, and how a repetition came to it."""
+        of = {result.name: result.meaning for result in self.metric.results()}
+        name = self.event
+        return [
+            Result(name, NUMBER, f"probability by splitting: {of.get(name, name)}",
+                   least=0.0, most=1.0, unseen=f"{name}.unseen"),
+            Result(f"{name}.unseen", NUMBER, "what one run more that comes to it would add"),
+            Result(f"{name}.collapsed", EVENT, "no run came to it: its P is 0, and counts"),
+            Result(f"{name}.runs", NUMBER, "runs that were flown", least=0.0),
+            Result(f"{name}.levels", CLASS, "levels of the score"),
+        ]  # fmt: skip
+
+    def nearness(self, score: str, levels: Sequence[float]) -> Nearness:
+        """Return what tells when runs reach some levels of a score."""
+        return Nearness(self.metric, self.event, score, levels)
+
+    def told(self, found: Sequence[Repeated], levels: Sequence[float]) -> dict[str, AnyArray]:
+        """Return result → values of some repetitions; NaN and None of those that failed."""
+        text = ", ".join(f"{level:.4g}" for level in levels[:-1]) or "none"
+        values = {
+            "": [one.probability for one in found],
+            ".unseen": [one.unseen for one in found],
+            ".collapsed": [float(one.probability == 0.0) for one in found],
+            ".runs": [float(one.flown) for one in found],
+        }
+        failed = np.array([one.error is not None for one in found])
+        return {
+            f"{self.event}{name}": np.where(failed, np.nan, some) for name, some in values.items()
+        } | {f"{self.event}.levels": np.array([None if f else text for f in failed], dtype=object)}
+
+    def check(self, blocks: Mapping[str, Component]) -> None:
+        """Raise ValueError for what the metric itself finds wrong."""
+        self.metric.check(blocks)
 
 
 def expected_column(event: str) -> str:

@@ -24,8 +24,7 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.split_event import Splitting
-from dsa_des.studies.study import MetricSpec, Study, changed_scene
+from dsa_des.studies.study import MetricSpec, Splitting, Study, changed_scene
 from dsa_des.studies.study_checks import check_cells
 from dsa_des.studies.study_tables import (
     AXES_OF_FIGURES,
@@ -356,6 +355,7 @@ class _StudyReader:
             shown = ", ".join(registered(METRICS))
             self.file.report(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
+        event = splitting.event if splitting is not None and len(items) == 1 else ""
         specs: list[MetricSpec] = []
         for number, item in enumerate(items):
             key: Key = ("metrics", number)
@@ -373,7 +373,7 @@ class _StudyReader:
                 self.file.report(key, str(error), name)
                 continue
             if read_table(self.file, key, model, keys, f"metric {name}") is not None:
-                specs.append(MetricSpec(name, keys, number, splitting.event if splitting else ""))
+                specs.append(MetricSpec(name, keys, number, event))
         if splitting is not None and len(items) > 1:
             said = "splitting is for one event: leave the one metric that gives it"
             self.file.report(("metrics",), said)
