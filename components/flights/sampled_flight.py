@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,7 @@ from components.geometry import (
     wrap_heading_rad,
     wrap_longitude_deg,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""
@@ -91,7 +92,8 @@ class SampledTrajectory:
 
     Columns are (n,), n of at least 1; times strictly increase, longitudes may have any number of
     turns. Attitude that is not given is derived from the path through the air, which moves by
-    `wind_east_north_mps`. ValueError names what cannot be.
+    `wind_east_north_mps`. Between samples further apart than `longest_gap_s` it is not there.
+    ValueError names what cannot be.
     """
 
     def __init__(
@@ -107,6 +109,7 @@ class SampledTrajectory:
         pitch_rad: npt.ArrayLike | None = None,
         roll_rad: npt.ArrayLike | None = None,
         wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
+        longest_gap_s: float = np.inf,
     ) -> None:
         east, north, up = velocity_enu_mps if velocity_enu_mps is not None else (None,) * 3
         given = checked_samples(
@@ -141,23 +144,47 @@ class SampledTrajectory:
         self.derived_attitude = tuple(
             angle for angle in ("yaw", "pitch", "roll") if f"{angle}_rad" not in given
         )
-        attitude = attitude_from_path(
-            *path,
-            velocity_enu_mps=self.velocity_enu_mps,
-            wind_east_north_mps=wind_east_north_mps,
-        )
+        self.longest_gap_s = longest_gap_s
+        #: After which samples it is not there until the next one; None where there is no such.
+        self.away = _gaps(self.sample_times_s, longest_gap_s)
+        attitude = self._attitude(path, wind_east_north_mps)
         yaw, pitch, roll = (
             given.get(key, derived)
             for key, derived in zip(("yaw_rad", "pitch_rad", "roll_rad"), attitude, strict=True)
         )
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
-        self.coefficients = fit_segments(
+        self.max_speed_mps = self._speed_bound()
+
+    def _attitude(
+        self, path: tuple[FloatArray, ...], wind_east_north_mps: tuple[float, float]
+    ) -> tuple[FloatArray, ...]:
+        """Return yaw, pitch and roll along a path, of each piece between gaps by itself."""
+        ends = [] if self.away is None else (np.flatnonzero(self.away) + 1).tolist()
+        pieces = []
+        for first, end in pairwise([0, *ends, len(path[0])]):
+            part = slice(first, end)
+            velocity: Vector | None = None
+            if self.velocity_enu_mps is not None:
+                east, north, up = (along[part] for along in self.velocity_enu_mps)
+                velocity = east, north, up
+            pieces.append(
+                attitude_from_path(
+                    *(column[part] for column in path),
+                    velocity_enu_mps=velocity,
+                    wind_east_north_mps=wind_east_north_mps,
+                )
+            )
+        return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """Each segment's polynomials, (25, samples)."""
+        return fit_segments(
             self.sample_times_s,
             (self.lat_deg, self.lon_deg, self.alt_m),
             (self.yaw_rad, self.pitch_rad, self.roll_rad),
             self.velocity_enu_mps,
         )
-        self.max_speed_mps = self._speed_bound()
 
     @classmethod
     def together(
@@ -224,6 +251,7 @@ class SampledTrajectory:
             self.alt_m,
             velocity_enu_mps=self.velocity_enu_mps,
             wind_east_north_mps=(east_mps, north_mps),
+            longest_gap_s=self.longest_gap_s,
             **known,
         )
 
@@ -232,6 +260,8 @@ class SampledTrajectory:
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
         segment, elapsed, present = locate(self.sample_times_s, flat)
+        if self.away is not None:
+            present &= ~self.away[segment] | (elapsed == 0.0)
         state = evaluate_segments(self.coefficients[:, segment], elapsed, present)
         return state.reshaped(times.shape)
 
@@ -264,6 +294,13 @@ class SampledFleet(Fleet):
         self._bases = [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
         tables = [np.zeros((25, 0)), *(flight.coefficients for flight in self._flights)]
         self._table = np.ascontiguousarray(np.concatenate(tables, axis=1))
+        gaps = [flight.away for flight in self._flights]
+        self._away: BoolArray | None = None
+        if any(one is not None for one in gaps):
+            none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
+            self._away = np.concatenate(
+                [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
+            )
 
     def __len__(self) -> int:
         return len(self._flights)
@@ -291,6 +328,8 @@ class SampledFleet(Fleet):
                 index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
                 elapsed[:, columns] = since[:, np.newaxis]
                 present[:, columns] = there[:, np.newaxis]
+            if self._away is not None:
+                present &= ~self._away[index] | (elapsed == 0.0)
             values = evaluate_segments(
                 self._table[:, index.reshape(-1)], elapsed.reshape(-1), present.reshape(-1)
             ).reshaped(shape)
@@ -309,9 +348,16 @@ class SampledFleet(Fleet):
         inside = np.where(inside < end, inside, end)
         segment = self._find(aircraft, inside)
         present = (time_s >= start) & (time_s <= end)
-        return evaluate_segments(
-            self._table.take(segment, axis=1), inside - samples[segment], present
-        )
+        elapsed = inside - samples[segment]
+        if self._away is not None:
+            present &= ~self._away[segment] | (elapsed == 0.0)
+        return evaluate_segments(self._table.take(segment, axis=1), elapsed, present)
+
+
+def _gaps(time_s: FloatArray, longest_gap_s: float) -> BoolArray | None:
+    """Return after which samples the next one is too far away; None where there is no such."""
+    apart = np.diff(time_s, append=time_s[-1]) > longest_gap_s
+    return apart if apart.any() else None
 
 
 def _mean_speed_bound(

@@ -96,7 +96,7 @@ def read_asterix(
         problems, ("name", *headers), 0, cells, optional=_MOVES, gaps=True,
         instead={} if altitude else {"alt": "alt instead"}, rows="records",
     )  # fmt: skip
-    table.warnings += warnings
+    table.notes.warnings += warnings
     rows: dict[tuple[object, ...], dict[float, int]] = {}
     samples: dict[int, list[str]] = {}
     for k, record in enumerate(records):

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.receiver_logs import read_log
+from components.formats.receiver_logs import log_of
+from components.formats.recording import Recording
+from components.formats.reports import recording_of
 from components.formats.sample_columns import (
     VELOCITIES,
     Altitude,
@@ -30,9 +32,10 @@ from components.formats.text_rows import (
     TrafficFile,
     clean_token,
     did_you_mean,
-    lines_of,
+    each_line,
     read_content,
     shown_columns,
+    text_of,
 )
 from dsa_des.arrays.types import FloatArray
 
@@ -103,19 +106,26 @@ def read_csv(
     """
     problems = Problems(str(path))
     data = read_content(Path(path), problems)
-    return read_log(problems, data, ownship, altitude) or _read_table(
-        problems, lines_of(data, problems, comments=True), ownship, altitude
-    )
+    log = log_of(problems, data)
+    if log is not None:
+        return recording_of(problems, log, ownship, altitude).flights()
+    text = text_of(data, problems)
+    del data  # of many rows it is not held beside their samples
+    return record_table(problems, text, ownship, altitude).flights()
 
 
-def _read_table(
-    problems: Problems, lines: list[tuple[int, str]], ownship: str | None, altitude: Altitude | None
-) -> TrafficFile:
-    lines = lines[_header_among(lines) :]
-    header_line, header_text = lines[0]
+def record_table(
+    problems: Problems,
+    text: str,
+    ownship: str | None = None,
+    altitude: Altitude | None = None,
+    least: int = 2,
+) -> Recording:
+    """Return the aircraft of a table, `least` or more, see `read_csv`."""
+    (header_line, header_text), body = _header_and_rows(problems, each_line(text))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
-    ((_, headers),) = _rows(problems, [(header_line, header_text)], delimiter)
+    ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
     at, position = len(headers), _single_position(headers)
     if position is not None:
         headers[position : position + 1] = ["lat", "lon"]
@@ -123,17 +133,16 @@ def _read_table(
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [_name_and_unit(header)[0] for header in headers]
     date = next((plain.index(name) for name in _DATES if name in plain), None)
-    body = [(number, text) for number, text in lines[1:] if not text.startswith("#")]
-    rows = _rows(problems, body, delimiter)
+    rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
     first = next(rows, None)
     if first is not None and len(first[1]) > time:
         columns["time"] = _epoch(columns["time"], first[1][time], headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, _time_parser(columns["time"]),
         columns.keys() - _NEEDED, gaps=True,
-        instead={"alt": "alt instead"} if "alt instead" in columns else {},
+        instead={"alt": "alt instead"} if "alt instead" in columns else {}, least=least,
     )  # fmt: skip
-    table.notes += notes
+    table.notes.harmless += notes
     for number, row in chain([] if first is None else [first], rows):
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
@@ -143,59 +152,79 @@ def _read_table(
         if date is not None and len(row) == len(headers) and ":" in row[time]:
             row[time] = f"{row[date]} {row[time]}"
         table.add_row(number, row)
-    file = table.finish(ownship, _with_velocity)
     height = columns["alt"].header
-    if f"{height} in m" in "".join(notes) and _seem_feet(file):
+    units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
+    recording = table.recording(
+        ownship, _with_velocity, kind="a table", units=units or "the units of its header",
+        height=height,
+    )  # fmt: skip
+    if f"{height} in m" in units and _seem_feet(recording):
         said = "all its numbers are multiples of 25, as feet are"
-        file.warnings.append(
+        recording.notes.warnings.append(
             f"{height} has no unit and is read in m, but {said}: {height}_ft would say so"
         )
-    return file
+    return recording
 
 
-def _seem_feet(file: TrafficFile) -> bool:
+def _seem_feet(recording: Recording) -> bool:
     """Tell whether altitudes come in steps of 25, as transponders report feet."""
-    heights = np.unique(np.concatenate([craft.alt_m for craft in file.aircraft]))
+    heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
     steps = not np.any(heights % 25.0)
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))
 
 
-def _header_among(lines: list[tuple[int, str]]) -> int:
-    """Return which line names the columns: the first, or the last comment before it that does."""
-    first = next((k for k, (_, text) in enumerate(lines) if not text.startswith("#")), 0)
-    if lines[first][1].lower().startswith("sep=") and first + 1 < len(lines):
-        return first + 1
-    known = {name for spec in COLUMNS.values() for name in spec.names}
+_KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
+
+
+def _header_and_rows(
+    problems: Problems, lines: Iterator[tuple[int, str]]
+) -> tuple[tuple[int, str], Iterator[tuple[int, str]]]:
+    """Return the line that names the columns, and those below it.
+
+    It is the first that is no comment, or the comment before it where only that names columns.
+    """
 
     def count(text: str) -> int:
-        return sum(_name_and_unit(w)[0] in known for w in re.split(r"[,;|\t]+", text.lstrip("# ")))
+        words = re.split(r"[,;|\t]+", text.lstrip("# "))
+        return sum(_name_and_unit(word)[0] in _KNOWN for word in words)
 
-    if first and count(lines[first][1]) < 2 <= count(lines[first - 1][1]):
-        return first - 1
-    return first
+    comment: tuple[int, str] | None = None
+    for one in lines:
+        if one[1].startswith("#"):
+            comment = one
+        elif comment is not None and count(one[1]) < 2 <= count(comment[1]):
+            return comment, chain([one], lines)
+        elif not one[1].lower().startswith("sep="):
+            return one, lines
+    problems.fail("the file is empty: a row of column names and rows of samples are needed")
 
 
 def _with_velocity(samples: dict[str, FloatArray]) -> dict[str, FloatArray]:
     return {**samples, **enu_velocity(samples)}
 
 
-def _rows(
-    problems: Problems, lines: list[tuple[int, str]], delimiter: str
-) -> Iterator[tuple[int, list[str]]]:
+def _rows(lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
     """Return each row's cells and the line where it begins; a quoted cell may go over several."""
     if delimiter == " ":
         yield from ((number, text.split()) for number, text in lines)
         return
-    reader = csv.reader((text + "\n" for _, text in lines), delimiter=delimiter)
+    begun: list[int] = []
+
+    def fed() -> Iterator[str]:
+        for number, text in lines:
+            begun.append(number)
+            yield text + "\n"
+
+    reader = csv.reader(fed(), delimiter=delimiter)
     while True:
-        begins = reader.line_num
+        begun.clear()
         try:
             row = next(reader, None)
         except csv.Error:  # a cell of over 131,072 characters: no row of ours
             row = []
         if row is None:
             return
-        yield lines[begins][0], [cell.strip() for cell in row]
+        yield begun[0], [cell.strip() for cell in row]
 
 
 def _single_position(headers: list[str]) -> int | None:

@@ -87,7 +87,7 @@ def read_daa(
     wrong is one `TrafficFileError`.
     """
     table, columns = _table(path, ("yaw",))
-    notes = table.notes
+    notes = table.notes.harmless
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
     if "sx" in columns:
         notes.append(
@@ -133,7 +133,7 @@ def _table(
         factor = unit_factor(problems, spec, token, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
     table = SampleTable(problems, headers, indices["name"], columns, optional=_OPTIONAL)
-    table.notes[:0] = notes
+    table.notes.harmless[:0] = notes
     for number, text in body:
         table.add_row(number, cells(text, len(headers), indices["name"]))
     return table, columns

@@ -242,22 +242,36 @@ def lines_of(
 ) -> list[tuple[int, str]]:  # fmt: skip
     """Return the lines that hold something, but `comments` on request, numbered from 1.
 
-    Text may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end
-    in LF, CR LF or CR.
+    Text may be as `text_of` says; lines may end in LF, CR LF or CR.
     """
-    text = _decoded(data)
-    if text is None:
-        problems.fail(f"this is a binary file: {needed} is needed")
-    lines = [
-        # Not tabs: one at either end delimits an empty cell.
-        (number, line.strip(" "))
-        for number, line in enumerate(re.split(r"\r\n|\r|\n", text or ""), start=1)
-    ]
-    kept = [(n, line) for n, line in lines if line.strip()]
+    kept = list(each_line(text_of(data, problems, needed)))
     rows = [(n, line) for n, line in kept if not line.lstrip().startswith("#")]
     if not rows:
         problems.fail(f"the file is empty: {holds} are needed")
     return kept if comments else rows
+
+
+def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
+    """Return text in UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1."""
+    text = _decoded(data)
+    if text is None:
+        problems.fail(f"this is a binary file: {needed} is needed")
+    return text
+
+
+_LINE = re.compile(r"[^\r\n]+|\r\n|\r|\n")
+
+
+def each_line(text: str) -> Iterator[tuple[int, str]]:
+    """Give the lines that hold something, numbered from 1, as they are wanted."""
+    number = 1
+    for match in _LINE.finditer(text):
+        line = match[0]
+        if line[0] in "\r\n":
+            number += 1
+        elif line.strip():
+            # Not tabs: one at either end delimits an empty cell.
+            yield number, line.strip(" ")
 
 
 def _decoded(data: bytes) -> str | None:

@@ -13,7 +13,6 @@ from components.metrics.losses import first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     RelativeFlight,
-    prepare_traffic,
     separations,
     traffic_block,
 )
@@ -197,9 +196,11 @@ def flights_of(
     or as long as it was meant to last.
     """
     steering = steering or {}
-    block = f"blocks.{traffic_block(group.scene).name}."
+    traffic = traffic_block(group.scene)
+    block = f"blocks.{traffic.name}."
     if any(key.startswith(block) for replica in group.replicas for key in replica.changes):
-        prepare_traffic(group.scenes)
+        cls: Any = traffic.cls
+        cls.prepare(group.parameters_of(traffic.name))
     runs: list[list[RelativeFlight]] = []
     known: dict[Any, int] = {}
     run_of, steered = np.empty(len(group), dtype=np.int64), []

@@ -281,7 +281,7 @@ class StoneSoupTracker(Component):
         newest = np.maximum.accumulate(np.append(self._newest, scans.tick))
         in_time = scans.tick >= newest[:-1]
         self._newest = int(newest[-1])
-        self._count = self._count.of(sensors, scans.sensors, scans.sensors[~in_time])
+        self._count = self._count.of(sensors, scans, slice(None), np.flatnonzero(~in_time))
         return np.flatnonzero(in_time).tolist()
 
     def _looked(
@@ -361,6 +361,10 @@ class StoneSoupTracker(Component):
             sensors=sensors,
             **moments,
         )  # fmt: skip
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return whose looks came too late."""
+        return self._count.undone()
 
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""

@@ -182,6 +182,7 @@ class Active(CooperativeSensor):
     """
 
     Parameters = ActiveParameters
+    hears_of = ("mode_s", "mode_c")
     lockstep = True
     ladders = (REPLIES, MEASUREMENT)
 

@@ -200,6 +200,7 @@ class AdsB(CooperativeSensor):
     """
 
     Parameters = AdsBParameters
+    hears_of = ("ads_b",)
     lockstep = True
     ladders = (RECEPTION, ERRORS)
 

@@ -53,8 +53,9 @@ class Flown:
     errors: Sequence[str | None]
 
 
-#: Flies runs and looks when they reach some levels, which fall.
-Fly = Callable[[Sequence[Replica], Sequence[float]], Flown]
+#: Flies runs, each of a repetition of some number (the pilot is -1), and looks when they reach some
+#: levels, which fall.
+Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], Flown]
 
 
 @dataclass(frozen=True)
@@ -138,12 +139,13 @@ def repeated(
     """
     every = [_Repetition(*both) for both in zip(seeds, repetitions, strict=True)]
     for level in levels:
-        going = [one for one in every if one.runs and not one.error]
+        going = [k for k, one in enumerate(every) if one.runs and not one.error]
         if not going:
             break
-        flown = fly([run for one in going for run in one.runs], [level])
-        end = 0
-        for one in going:
+        runs = [run for k in going for run in every[k].runs]
+        of = np.repeat(going, [len(every[k].runs) for k in going])
+        flown, end = fly(runs, of, [level]), 0
+        for one in (every[k] for k in going):
             mine = slice(end, end := end + len(one.runs))
             one.error = next((text for text in flown.errors[mine] if text), None)
             if one.error is None:
@@ -165,7 +167,7 @@ def find_levels(
     pilot = _Repetition(seed, roots)
     levels: list[float] = []
     for _ in range(_MOST_STAGES):
-        flown = fly(pilot.runs, candidates.tolist())
+        flown = fly(pilot.runs, np.full(len(roots), -1), candidates.tolist())
         if said := next((text for text in flown.errors if text), None):
             raise ValueError(f"of the pilot of splitting: {said}")
         pilot.fly(flown.weights)

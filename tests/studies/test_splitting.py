@@ -26,7 +26,7 @@ CANDIDATES = np.array([*range(LAST, -1, -1)], dtype=float)
 RARE = STAYS**LAST
 
 
-def chain(runs, levels, weights=None):
+def chain(runs, of, levels, weights=None):
     """When runs reach some times to go, s."""
     number, second = np.arange(len(runs)).repeat(LAST), np.tile(np.arange(LAST), len(runs))
     stream = Streams([run.seed for run in runs]).stream("pilot", "turn").of_runs(number, second * S)
@@ -82,9 +82,9 @@ def test_repetitions_are_what_each_is_alone():
 def test_weights_of_the_first_runs_count():
     """Runs of odd seeds never turn before second 10, weigh 1/9 each, and are half of all."""
 
-    def flown(runs, levels):
+    def flown(runs, of, levels):
         said = chain(
-            runs, levels, lambda some: np.array([1.0 + 8.0 * (r.seed % 2 == 0) for r in some])
+            runs, of, levels, lambda some: np.array([1.0 + 8.0 * (r.seed % 2 == 0) for r in some])
         )
         odd = np.array([run.seed % 2 == 1 for run in runs])
         return Flown(np.where(odd, np.nan, said.reached_s), said.weights, said.errors)
@@ -120,7 +120,7 @@ def test_the_interval_of_a_skewed_mean_is_that_of_its_logarithm():
 
 
 def test_a_score_that_never_rises_is_said():
-    def stuck(runs, levels):
+    def stuck(runs, of, levels):
         at = np.where(np.array(levels)[:, np.newaxis] >= 12.0, 3.0, np.nan)
         return Flown(at.repeat(len(runs), axis=1), np.ones(len(runs)), [None] * len(runs))
 
@@ -131,8 +131,8 @@ def test_a_score_that_never_rises_is_said():
 
 
 def test_a_run_that_fails_fails_its_repetition_alone():
-    def failing(runs, levels):
-        said = chain(runs, levels)
+    def failing(runs, of, levels):
+        said = chain(runs, of, levels)
         errors = ["radar failed" if run.seed == 1003 else None for run in runs]
         return Flown(said.reached_s, said.weights, errors)
 
