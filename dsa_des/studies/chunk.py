@@ -251,7 +251,7 @@ def _split(
 
     def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> Flown:
         wrong: list[str | None] = [None] * len(runs)
-        near, said = [metric.nearness(score, levels)], [*undone, []]  # that of the pilot is lost
+        near, said = [metric.scored(score, levels)], [*undone, []]  # that of the pilot is lost
         known = _flown(scene, near, runs, wrong, key, np.append(of, len(undone))[number], said)
         nothing = np.full(len(runs), np.nan)
         times_s = [known.get(str(k), nothing) for k in range(len(levels))]

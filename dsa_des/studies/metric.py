@@ -275,7 +275,7 @@ class SplitEvent(Metric):
             Result(f"{name}.levels", CLASS, "levels of the score"),
         ]  # fmt: skip
 
-    def nearness(self, score: str, levels: Sequence[float]) -> Nearness:
+    def scored(self, score: str, levels: Sequence[float]) -> Nearness:
         """Return what tells when runs reach some levels of a score."""
         return Nearness(self.metric, self.event, score, levels)
 
