@@ -70,6 +70,11 @@ class TurnOut(Component):
     lockstep = True
     rewindable = True
 
+    @classmethod
+    def may_climb(cls, parameters: TurnOutParameters) -> bool:
+        """Return whether it ever commands another altitude."""
+        return parameters.manoeuvre in ("climb", "vertical_speed")
+
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
@@ -204,6 +209,11 @@ class TurnAway(Component):
     windowed = True
     lockstep = True
     rewindable = True
+
+    @classmethod
+    def may_climb(cls, parameters: TurnAwayParameters) -> bool:
+        """Return that it never commands another altitude."""
+        return False
 
     def setup(self) -> None:
         """Start free to turn."""

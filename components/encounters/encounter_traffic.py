@@ -24,7 +24,7 @@ from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
 from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
 from components.geometry import enu_to_geodetic, line_of_sight
-from components.traffic.files import FileParameters, RecordedTraffic
+from components.traffic.recorded import FileParameters, RecordedTraffic
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, ScenePath

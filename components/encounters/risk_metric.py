@@ -19,6 +19,7 @@ from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.plane_pairs import Meetings, meetings
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     CLASS,
@@ -88,9 +89,12 @@ _EVENTS = ("nmac", "well_clear_lost")
 # Of needless manoeuvres.
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
-# which was just missed, and that one is flown where well clear is just kept; falling with the miss
-# distance. Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
-_STAYS, _INDUCED, _NEEDS = 0.2, 0.02, 0.1
+# which the nominal flights just miss, and that a manoeuvre is flown where well clear is just kept.
+# Turns move the ownship by some `_TURNED_M` and hardly up or down, climbs by `_CLIMBED_M` and
+# hardly to the side (`_SLACK` of a size). Wrong ones cost width, never truth
+# (`dsa_des.studies.allocation`).
+_STAYS, _INDUCED, _NEEDS = 0.2, 0.004, 0.1
+_TURNED_M, _CLIMBED_M, _SLACK = 250.0, 100.0, 0.15
 _LEAST_SIZES = 0.01
 # No sector of courses or bearings is so narrow, degrees.
 _WIDE_DEG = 35.0
@@ -130,6 +134,7 @@ class RiskRatios(Mitigated):
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         self._weight = EncounterWeight((), scene) if has_weights(scene) else None
+        self._climbs = any(map(may_climb, (scene.blocks[name] for name in self.delays_s)))
 
     def results(self) -> list[Result]:
         """Return flags, encounter and weight, classes, and the ratios of all and of each class."""
@@ -206,11 +211,10 @@ class RiskRatios(Mitigated):
         )
         for name, sizes in (("well_clear", clear), ("nmac", nmac)):
             result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
-        for event, sizes in zip(_EVENTS, (nmac, clear), strict=True):
+        for event, limits in zip(("well_clear_lost", "nmac"), sizes_m, strict=True):
             there = result[f"{event}_nominal"] > 0.0
-            result[expected_column(f"{event}_mitigated")] = np.where(
-                there, _STAYS, _INDUCED * np.maximum(np.nan_to_num(sizes, nan=np.inf), 1.0) ** -8.0
-            )
+            induced = _INDUCED * led_into(limits, values[1], values[2], climbs=self._climbs)
+            result[expected_column(f"{event}_mitigated")] = np.where(there, _STAYS, induced)
         kept = 1.0 - result["well_clear_lost_nominal"]
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
@@ -263,6 +267,28 @@ class RiskRatios(Mitigated):
         if self._weight is not None:
             result |= self._weight.measure(group)
         return result | self._classes(group)
+
+
+def may_climb(block: Block) -> bool:
+    """Return whether a block that steers may command another altitude, as far as it says so."""
+    asked = getattr(block.cls, "may_climb", None)
+    return asked is None or bool(asked(block.parameters))
+
+
+def led_into(
+    size_m: tuple[float, float], level_m: FloatArray, up_m: FloatArray, *, climbs: bool
+) -> FloatArray:
+    """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
+
+    Of encounters that pass so far to the side and above; 0 where nobody is met.
+    """
+    limits = zip((level_m, up_m), size_m, strict=True)
+    level, up = (np.maximum(np.nan_to_num(at, nan=np.inf) - size, 0.0) for at, size in limits)
+    radius_m, half_m = size_m
+    turned = np.exp(-((level / _TURNED_M) ** 2) - (up / (_SLACK * half_m)) ** 2)
+    climbed = np.exp(-((level / (_SLACK * radius_m)) ** 2) - (up / _CLIMBED_M) ** 2)
+    result: FloatArray = np.maximum(turned, climbed) if climbs else turned
+    return result
 
 
 def side_of(bearing_deg: FloatArray) -> AnyArray:

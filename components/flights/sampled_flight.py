@@ -92,7 +92,7 @@ class SampledTrajectory:
 
     Columns are (n,), n of at least 1; times strictly increase, longitudes may have any number of
     turns. Attitude that is not given is derived from the path through the air, which moves by
-    `wind_east_north_mps`. Between samples further apart than `longest_gap_s` it is not there.
+    `wind_east_north_mps`. After samples that are `away` (n,) it is not there until the next one.
     ValueError names what cannot be.
     """
 
@@ -109,7 +109,7 @@ class SampledTrajectory:
         pitch_rad: npt.ArrayLike | None = None,
         roll_rad: npt.ArrayLike | None = None,
         wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
-        longest_gap_s: float = np.inf,
+        away: BoolArray | None = None,
     ) -> None:
         east, north, up = velocity_enu_mps if velocity_enu_mps is not None else (None,) * 3
         given = checked_samples(
@@ -144,9 +144,8 @@ class SampledTrajectory:
         self.derived_attitude = tuple(
             angle for angle in ("yaw", "pitch", "roll") if f"{angle}_rad" not in given
         )
-        self.longest_gap_s = longest_gap_s
         #: After which samples it is not there until the next one; None where there is no such.
-        self.away = _gaps(self.sample_times_s, longest_gap_s)
+        self.away = away if away is not None and away.any() else None
         attitude = self._attitude(path, wind_east_north_mps)
         yaw, pitch, roll = (
             given.get(key, derived)
@@ -251,7 +250,7 @@ class SampledTrajectory:
             self.alt_m,
             velocity_enu_mps=self.velocity_enu_mps,
             wind_east_north_mps=(east_mps, north_mps),
-            longest_gap_s=self.longest_gap_s,
+            away=self.away,
             **known,
         )
 
@@ -352,12 +351,6 @@ class SampledFleet(Fleet):
         if self._away is not None:
             present &= ~self._away[segment] | (elapsed == 0.0)
         return evaluate_segments(self._table.take(segment, axis=1), elapsed, present)
-
-
-def _gaps(time_s: FloatArray, longest_gap_s: float) -> BoolArray | None:
-    """Return after which samples the next one is too far away; None where there is no such."""
-    apart = np.diff(time_s, append=time_s[-1]) > longest_gap_s
-    return apart if apart.any() else None
 
 
 def _mean_speed_bound(

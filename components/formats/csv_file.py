@@ -126,6 +126,21 @@ def record_table(
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
+    rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
+    return record_rows(problems, headers, header_line, rows, ownship, altitude, least)
+
+
+def record_rows(
+    problems: Problems,
+    headers: list[str],
+    header_line: int,
+    rows: Iterator[tuple[int, list[str]]],
+    ownship: str | None = None,
+    altitude: Altitude | None = None,
+    least: int = 2,
+    kind: str = "a table",
+) -> Recording:
+    """Return the aircraft of rows of cells, each with its line."""
     at, position = len(headers), _single_position(headers)
     if position is not None:
         headers[position : position + 1] = ["lat", "lon"]
@@ -133,7 +148,6 @@ def record_table(
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [_name_and_unit(header)[0] for header in headers]
     date = next((plain.index(name) for name in _DATES if name in plain), None)
-    rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
     first = next(rows, None)
     if first is not None and len(first[1]) > time:
         columns["time"] = _epoch(columns["time"], first[1][time], headers[time], notes)
@@ -155,7 +169,7 @@ def record_table(
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
     recording = table.recording(
-        ownship, _with_velocity, kind="a table", units=units or "the units of its header",
+        ownship, _with_velocity, kind=kind, units=units or "the units of its header",
         height=height,
     )  # fmt: skip
     if f"{height} in m" in units and _seem_feet(recording):

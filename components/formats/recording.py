@@ -77,14 +77,19 @@ class Recording:
     height: str = ""
     callsigns: Mapping[str, str] = field(default_factory=dict)
 
-    def flights(self, longest_gap_s: float | None = math.inf) -> TrafficFile:
+    def flights(
+        self, longest_gap_s: float | None = math.inf, start_s: float | None = None
+    ) -> TrafficFile:
         """Return the flights; the first aircraft is the ownship.
 
+        Their times count from `start_s`, by default from the earliest sample.
         Where samples are further apart than `longest_gap_s`, an aircraft is not there in between;
         None takes 30 s, or ten times the aircraft's usual step where that is longer.
         TrafficFileError says all that is wrong.
         """
-        start = min((float(columns["time"][0]) for columns in self.samples.values()), default=0.0)
+        start = start_s
+        if start is None:
+            start = min(float(columns["time"][0]) for columns in self.samples.values())
         made = []
         for name in list(self.samples):
             columns = self.samples.pop(name)  # columns of many rows are not held twice
@@ -115,9 +120,12 @@ class Recording:
         usual_s = float(np.median(steps)) if len(steps) else 0.0
         silent_s = max(_SILENT_S, _SILENT_STEPS * usual_s)
         limit_s = silent_s if longest_gap_s is None else longest_gap_s
+        away = np.append(steps > limit_s, False)
+        if "away" in columns:
+            away |= columns["away"] > 0.0
         trajectory = SampledTrajectory(
             name, columns["time"], columns["lat"], columns["lon"], columns["alt"],
-            velocity_enu_mps=velocity, longest_gap_s=limit_s, **angles,
+            velocity_enu_mps=velocity, away=away, **angles,
         )  # fmt: skip
         if trajectory.velocity_was_ignored:
             self.notes.of_one(

@@ -1,7 +1,7 @@
 """Reports of aircraft one by one, as receivers, trackers and autopilots log them."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from components.formats.recording import Recording
@@ -39,6 +39,8 @@ class Log(NamedTuple):
     reports: Iterator[tuple[int, Report]]
     callsigns: Mapping[str, str]
     rows: str = "reports"
+    #: What its reader has to say of it, when the reports are read.
+    warnings: Sequence[str] = ()
 
 
 _MOVES = {"trk": "track", "gs": "speed", "vs": "climb rate"}
@@ -69,11 +71,13 @@ def recording_of(
     table = SampleTable(
         problems, ("name", *headers.values()), 0, columns, optional=(*_MOVES, *_ANGLES), gaps=True,
         instead={} if altitude else {"alt": "alt instead"}, rows=log.rows, least=1,
+        seldom=(*_MOVES, *_ANGLES),
     )  # fmt: skip
     table.notes.harmless.append(f"read as {log.kind}, {log.units}")
     places = [_PLACE[str(heights.get(key, key))] for key in headers]
     for number, one in log.reports:
         table.add_numbers(number, one.name, [_number(one[place]) for place in places])
+    table.notes.warnings += log.warnings
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
     return table.recording(

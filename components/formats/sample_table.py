@@ -52,7 +52,8 @@ class SampleTable:
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
     `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
-    `parse_time` reads a time cell where a plain number will not do.
+    That an aircraft has none of a `seldom` column is not worth a word. `parse_time` reads a time
+    cell where a plain number will not do.
     """
 
     def __init__(
@@ -68,8 +69,9 @@ class SampleTable:
         instead: Mapping[str, str] | None = None,
         rows: str = "rows",
         least: int = 2,
+        seldom: Collection[str] = (),
     ) -> None:
-        self._kind_of_rows, self._least = rows, least
+        self._kind_of_rows, self._least, self._seldom = rows, least, frozenset(seldom)
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
@@ -124,10 +126,15 @@ class SampleTable:
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
-        for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
-            if not low <= value <= high and value == value and quantity not in self._optional:
+        for k, ((quantity, _, _, low, high), value) in enumerate(
+            zip(self._plan, values, strict=True)
+        ):
+            if low <= value <= high or value != value:
+                continue
+            if quantity not in self._optional:
                 self._number(line, quantity, self._columns[quantity], repr(value))
                 return
+            values = [*values[:k], math.nan, *values[k + 1 :]]
         rows.lines.append(line)
         for column, value in zip(rows.values.values(), values, strict=True):
             column.append(value)
@@ -194,6 +201,9 @@ class SampleTable:
                 continue
             for key in sorted(self._optional & columns.keys()):
                 if missing := int(np.count_nonzero(np.isnan(columns[key]))):
+                    if missing == len(lines) and key in self._seldom:
+                        del columns[key]
+                        continue
                     self.notes.of_one(
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "

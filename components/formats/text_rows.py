@@ -132,6 +132,8 @@ class TrafficFile:
     start_time_s: float
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    #: When what was chosen of it ends.
+    end_s: float | None = None
 
     @property
     def aircraft(self) -> list[SampledTrajectory]:
@@ -142,18 +144,19 @@ class TrafficFile:
 class Problems:
     """Collects what is wrong with one file, to be reported at once.
 
-    Its rows are lines of text, unless `of` calls them something else. The first `most` are listed.
+    Its rows are lines of text, unless `of` calls them something else, which a reader may set. The
+    first `most` are listed.
     """
 
     def __init__(self, path: str, of: str = "line", most: int = MOST_PROBLEMS) -> None:
-        self.path, self._of, self._most = path, of, most
+        self.path, self.of, self._most = path, of, most
         #: Line (infinite for none) and text.
         self._lines: list[tuple[float, str]] = []
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         """Note a problem, with its line and column where it has them."""
-        where = [f"{self._of} {line}"] if line is not None else []
+        where = [f"{self.of} {line}"] if line is not None else []
         where += [f"column {column}"] if column is not None else []
         if len(self._lines) < self._most:
             text = f"{', '.join(where)}: {problem}" if where else problem

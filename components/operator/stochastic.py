@@ -230,6 +230,11 @@ class Stochastic(Component):
     )  # fmt: skip
     rewindable = True
 
+    @classmethod
+    def may_climb(cls, parameters: StochasticParameters) -> bool:
+        """Return whether it ever commands another altitude."""
+        return parameters.turn_share < 1.0
+
     def setup(self) -> None:
         """Read the configuration; start without an alert."""
         self._configuration, self._alerter = self.p.read()

@@ -39,7 +39,8 @@ SAID = {
     "tracking.ekf": "check run", "tracking.hold_last": "run", "tracking.imm": "check run",
     "tracking.stonesoup": "run", "tracking.stub": "run", "tracking.ukf": "check run",
     "traffic.asterix": "refused", "traffic.csv": "refused", "traffic.daa_file": "refused",
-    "traffic.encounter_model": "", "traffic.encounters": "", "traffic.host": "refused",
+    "traffic.encounter_model": "", "traffic.encounters": "", "traffic.file": "refused",
+    "traffic.host": "refused",
     "traffic.random": "", "traffic.scripted": "", "visual.acquisition": "",
 }  # fmt: skip
 TARGETS = [

@@ -1,6 +1,7 @@
 """What is known of encounters before they are flown is what flying them finds, to the bit."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from wired import sensor
 
 import dsa_des
 from components.encounters import risk_metric
+from components.encounters.risk_metric import led_into, may_climb
+from dsa_des.block.registry import find
 from dsa_des.studies.foreseen import foresee
 from dsa_des.studies.study_file import read_study
 from tests.encounters.scenes.test_closed_loop_risk import SCENE
@@ -105,3 +108,34 @@ def test_a_set_of_many_gives_each_encounter_as_alone(tmp_path: Path) -> None:
         pair = encounter_flights(of, index, "euler"), encounter_flights(alone, at, "euler")
         for one, other in zip(*pair, strict=True):
             assert one.coefficients.tobytes() == other.coefficients.tobytes()
+
+
+def test_turns_lead_to_the_side_and_climbs_up_or_down() -> None:
+    nmac, e = (152.4, 30.48), np.exp(-1.0)
+    level_m = np.array([100.0, 402.4, 152.4, 152.4, np.nan])
+    up_m = np.array([10.0, 30.0, 130.48, 30.48 * 1.15, np.nan])
+    turned = led_into(nmac, level_m, up_m, climbs=False)
+    assert turned == pytest.approx([1.0, e, 0.0, e, 0.0], abs=1e-12)
+    climbed = led_into(nmac, level_m, up_m, climbs=True)
+    assert climbed[:3] == pytest.approx([1.0, e, e]) and climbed[4] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "climbs"),
+    [
+        ("operator.stochastic", {"conf": "C", "turn_share": 1}, False),
+        ("operator.stochastic", {"conf": "C", "turn_share": 0.9}, True),
+        ("avoidance.daidalus", {"conf": "C"}, False),
+        ("avoidance.daidalus", {"conf": "C", "manoeuvre": "vertical_speed"}, True),
+        ("avoidance.turn_away", {"range_km": 2}, False),
+        ("operator.human", {}, True),
+    ],
+)
+def test_what_steers_says_whether_it_may_climb(
+    name: str, keys: dict[str, Any], climbs: bool
+) -> None:
+    cls = find(name)
+    conf = Path(__file__).parents[3] / "configs/alerting/do365b.conf"
+    parameters = cls.Parameters(**{k: conf if v == "C" else v for k, v in keys.items()})
+    block: Any = SimpleNamespace(cls=cls, parameters=parameters)
+    assert may_climb(block) is climbs
