@@ -107,11 +107,13 @@ class Navigation(Parameters):
     """Errors of the ownship's navigation (TECVOL, thesis §2.3.1), believed minus true."""
 
     position_bias_m: tuple[PositionError, PositionError, PositionError] = Field(
-        default=(0.0, 0.0, 0.0), description="Constant error north, east and down, m."
+        default=(0.0, 0.0, 0.0),
+        description="Constant error north, east and down, m; these turn near a pole.",
     )
     position_noise_m: tuple[PositionNoise, PositionNoise, PositionNoise] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Standard deviation of the noise north, east and down, m.",
+        description="Standard deviation of the noise north, east and down, m; where it lasts it is "
+        "fixed to the Earth, and does not turn near a pole.",
     )
     position_correlation_time_s: float = Field(
         default=60.0,

@@ -53,9 +53,9 @@ _CLIMBS = (
     "vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate", "geomrate", "barorate",
 )  # fmt: skip
 # An address is one aircraft's, which a callsign need not be.
+_ADDRESSES = ("icao24", "icao", "hex", "hexident", "icaoaddress", "address")
 _IDENTITIES = (
-    "icao24", "icao", "hex", "hexident", "icaoaddress", "address", "id", "name", "callsign",
-    "aircraft", "acid", "flight", "ident",
+    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident",
 )  # fmt: skip
 #: When positions were received: state vectors repeat one until the next comes.
 _OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
@@ -106,9 +106,10 @@ def read_csv(
     tables with columns that only readsb, FlightRadar24 or BaseStation write, which are in feet,
     knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise). Latitude
     and longitude may stand in one cell. Rows without a time or a position are left out; heading,
-    pitch, roll and velocity are used for aircraft where they have no gaps. With `altitude` the
-    column of that kind is read, else the one whose name comes first. The ownship is the first
-    aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
+    pitch, roll and velocity are used for aircraft where they have no gaps. One name of several
+    aircraft that no one could be is told apart (`components.formats.recording.told_apart`). With
+    `altitude` the column of that kind is read, else the one whose name comes first. The ownship is
+    the first aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
     """
     problems = Problems(str(path))
     data = read_content(Path(path), problems)
@@ -170,7 +171,7 @@ def record_rows(
         columns["time"] = _epoch(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, _time_parser(columns["time"]),
-        columns.keys() - _NEEDED, gaps=True,
+        columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
         instead={"alt": "alt instead"} if "alt instead" in columns else {},
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
