@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.geometry import POSITION_FIELDS, line_of_sight_ned
+from components.geometry import POSITION_FIELDS, line_of_sight_ned, turned_by_meridians
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer, promises_of_looks
 from components.messages.reach import Reach
@@ -28,7 +28,6 @@ from components.surveillance.broadcast import (
     Broadcasts,
     Sent,
     Transponders,
-    turned_by_meridians,
 )
 from components.surveillance.cooperative import (
     STEP_S,
