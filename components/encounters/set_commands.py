@@ -13,6 +13,7 @@ from components.encounters.model_commands import check_origin
 from components.encounters.splitting import expected_copies, nearness, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
 from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
+from components.formats.recorded.encounter_tracks import recorded_tracks
 from components.formats.set_file import EncounterSetError, read_set, write_set
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
@@ -39,7 +40,9 @@ def convert_sets(
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
     check_file(path)
     try:
-        encounters = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
+        encounters = read_encounters(
+            [resolve_home(text) for text in files], at, skip_damaged, recorded_tracks
+        )
         if weights is not None:
             options = "--weights", "--weights"
             new = _by_encounter(encounters, weights, "weight", *options, least=False)
@@ -137,7 +140,9 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
         check_ending(path, PICTURES, "--figure")
         check_file(path, "--figure")
     try:
-        encounters = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
+        encounters = read_encounters(
+            [resolve_home(text) for text in files], None, skip_damaged, recorded_tracks
+        )
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
     indices = np.unique(

@@ -56,7 +56,9 @@ _IDENTITIES = (
     "icao24", "icao", "hex", "hexident", "icaoaddress", "address", "id", "name", "callsign",
     "aircraft", "acid", "flight", "ident",
 )  # fmt: skip
-_TIMES = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime", "timeposition")
+#: When positions were received: state vectors repeat one until the next comes.
+_OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
+_TIMES = (*_OF_POSITIONS, "time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
 _DATES = ("date", "utcdate")
 #: Latitude and longitude in one cell.
 _POSITIONS = ("position", "latlon", "latlng")
@@ -119,15 +121,17 @@ def record_table(
     text: str,
     ownship: str | None = None,
     altitude: Altitude | None = None,
-    least: int = 2,
+    stem: str | None = None,
 ) -> Recording:
-    """Return the aircraft of a table, `least` or more, see `read_csv`."""
+    """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
+    where there is no column of names.
+    """
     (header_line, header_text), body = _header_and_rows(problems, each_line(text))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
     rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
-    return record_rows(problems, headers, header_line, rows, ownship, altitude, least)
+    return record_rows(problems, headers, header_line, rows, ownship, altitude, stem)
 
 
 def record_rows(
@@ -137,11 +141,16 @@ def record_rows(
     rows: Iterator[tuple[int, list[str]]],
     ownship: str | None = None,
     altitude: Altitude | None = None,
-    least: int = 2,
+    stem: str | None = None,
     kind: str = "a table",
 ) -> Recording:
-    """Return the aircraft of rows of cells, each with its line."""
+    """Return the aircraft of rows of cells, each with its line, see `record_table`."""
     at, position = len(headers), _single_position(headers)
+    is_nameless = stem is not None and _KNOWN_NAMES.isdisjoint(
+        _name_and_unit(header)[0] for header in headers
+    )
+    if is_nameless:
+        headers.append("id")
     if position is not None:
         headers[position : position + 1] = ["lat", "lon"]
     columns, notes = _find_columns(problems, headers, header_line, altitude)
@@ -154,7 +163,8 @@ def record_rows(
     table = SampleTable(
         problems, headers, identity, columns, _time_parser(columns["time"]),
         columns.keys() - _NEEDED, gaps=True,
-        instead={"alt": "alt instead"} if "alt instead" in columns else {}, least=least,
+        instead={"alt": "alt instead"} if "alt instead" in columns else {},
+        least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
     for number, row in chain([] if first is None else [first], rows):
@@ -163,8 +173,10 @@ def record_rows(
         if position is not None and len(row) == at:
             pair = re.split(r"[,;\s]+", row[position].strip("()[] "))
             row[position : position + 1] = pair if len(pair) == 2 else [row[position]] * 2
-        if date is not None and len(row) == len(headers) and ":" in row[time]:
+        if date is not None and len(row) >= at and ":" in row[time]:
             row[time] = f"{row[date]} {row[time]}"
+        if is_nameless and len(row) == len(headers) - 1:
+            row.append(str(stem))
         table.add_row(number, row)
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
@@ -187,6 +199,7 @@ def _seem_feet(recording: Recording) -> bool:
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))
 
 
+_KNOWN_NAMES = frozenset(_IDENTITIES)
 _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
 
 

@@ -103,7 +103,10 @@ class Recording:
         self.problems.raise_if_any()
         self.notes.settle()
         notes = [*self.notes.harmless, *self.notes.warnings]
-        return TrafficFile(made[0], made[1:], start, notes, self.notes.warnings)
+        return TrafficFile(
+            made[0], made[1:], start, notes, self.notes.warnings, None, self.kind, self.units,
+            self.height,
+        )  # fmt: skip
 
     def _flight(
         self, name: str, columns: Samples, longest_gap_s: float | None

@@ -52,8 +52,9 @@ class SampleTable:
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
     `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
-    That an aircraft has none of a `seldom` column is not worth a word. `parse_time` reads a time
-    cell where a plain number will not do.
+    Where a position `repeats` until the next one comes, its height need not be the same. That an
+    aircraft has none of a `seldom` column is not worth a word. `parse_time` reads a time cell where
+    a plain number will not do.
     """
 
     def __init__(
@@ -70,7 +71,9 @@ class SampleTable:
         rows: str = "rows",
         least: int = 2,
         seldom: Collection[str] = (),
+        repeats: bool = False,
     ) -> None:
+        self._repeats = repeats
         self._kind_of_rows, self._least, self._seldom = rows, least, frozenset(seldom)
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
@@ -146,6 +149,11 @@ class SampleTable:
         if self._gaps and is_missing(cell):
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
+
+    def of_second(self, key: str) -> int | None:
+        """Return how many aircraft have the second column of two; None for all of them."""
+        whom = len(self._second.get(key, []))
+        return None if whom and whom == len(self._aircraft) else whom
 
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
@@ -300,13 +308,13 @@ class SampleTable:
             )
             lines = lines[order]
             columns = {key: values[order] for key, values in columns.items()}
-        where = [values for key, values in columns.items() if key not in self._optional]
+        apart = self._optional | ({"alt"} if self._repeats else frozenset())
+        where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
         if again.any():
             count = int(np.count_nonzero(again))
-            self.notes.of_one(
-                name, "again", f"{count} of its samples stand there again and count once"
-            )
+            said = f"{count} of its samples stand there again and count once"
+            self.notes.of_one(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
         times, header = columns["time"], self._columns["time"].header

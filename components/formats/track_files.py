@@ -69,6 +69,17 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
     return values
 
 
+def is_track_file(path: Path) -> bool:
+    """Tell whether a file is one of these formats, or cannot be told from them."""
+    if path.suffix.lower() == ".mat":
+        return True
+    try:
+        names = {*re.split(r"[,;\s]+", read_input_text(path)[:4096].split("\n")[0])}
+    except InputFileError:
+        return True
+    return any(len(names & {*wanted}) >= len(wanted) - 1 for wanted in (_PAIRED, _GEODETIC, _PLANE))
+
+
 def _indices(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     for name in wanted:
         if name not in names:

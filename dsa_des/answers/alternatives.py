@@ -6,7 +6,7 @@ draws and encounters, and is run as any cell of a study.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dsa_des.block.ladder import Ladder, Rung, Unavailable
@@ -44,7 +44,7 @@ class Alternative:
 class Alternatives:
     """What a study is compared with."""
 
-    #: Those that can run and differ from the scene as it is.
+    #: Those that can run and differ from the scene as it is, and from each other.
     these: list[Alternative]
     #: Names of those that the scene has already.
     own: list[str]
@@ -52,6 +52,8 @@ class Alternatives:
     unavailable: list[tuple[str, str]]
     #: Ladders that change nothing, and what is otherwise than in the study itself.
     notes: list[str]
+    #: The scenes with each of `these`, every default written out.
+    scenes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
 
 def comparable(study: Study) -> tuple[Study, list[str]]:
@@ -177,6 +179,10 @@ def _of_rung(
     if any(one != changes[0] for one in changes):
         raise Unavailable("it is set otherwise at other values of the study's axes")
     sets = [(f"blocks.{block}.{key}", value) for key, value in changes[0].items()]
+    numbers = {key: value for key, value in changes[0].items() if type(value) in (int, float)}
+    if numbers and all(table["type"] == rung.type_name for table in tables):
+        # The scene has this model with other numbers.
+        label += f" ({', '.join(f'{key} = {short(value)}' for key, value in numbers.items())})"
     sets += [(f"{table}.{key}", value) for table, keys in rung.sections.items()
              for key, value in keys.items()]  # fmt: skip
     return Alternative(label, tuple(sets), ((block, rung.type_name),) * bool(rung.type_name))
@@ -234,13 +240,14 @@ def _try(
 ) -> None:  # fmt: skip
     """Set a model up in every scene, and put it where it belongs."""
     two = with_models(study, [alternative])
-    same = True
+    owns, others = [], []
     for cell in cells:
         try:
             own, other = two.scene(2 * cell), two.scene(2 * cell + 1)
-            if own.resolved() == other.resolved():
+            owns.append(own.resolved())
+            others.append(other.resolved())
+            if owns[-1] == others[-1]:
                 continue
-            same = False
             _set_up(two, other, 2 * cell + 1, answers)
         except SceneError as error:
             found.unavailable.append((alternative.name, "; ".join(map(_brief, error.problems))))
@@ -251,10 +258,14 @@ def _try(
         except (ValueError, Unavailable) as error:
             found.unavailable.append((alternative.name, str(error)))
             return
-    if same:
+    twin = next((name for name, scenes in found.scenes.items() if scenes == others), None)
+    if owns == others:
         found.own.append(alternative.name)
-    elif alternative.name not in {one.name for one in found.these}:
+    elif twin is None:
         found.these.append(alternative)
+        found.scenes[alternative.name] = others
+    elif twin != alternative.name:
+        found.notes.append(f"{alternative.name} is {twin}")
 
 
 def _set_up(study: Study, scene: Scene, cell: int, answers: Sequence[str]) -> None:

@@ -276,7 +276,10 @@ class AnswerReport:
         ]
         if self.own:
             lines.append(f"The scene as it is: {', '.join(self.own)}.")
-        lines += [f"Not available here: {name} ({why})." for name, why in self.unavailable]
+        whys: dict[str, list[str]] = {}
+        for name, why in self.unavailable:
+            whys.setdefault(why, []).append(name)
+        lines += [f"Not available here: {', '.join(them)} ({why})." for why, them in whys.items()]
         lines += [f"Note: {note}." for note in self.notes]
         return lines
 

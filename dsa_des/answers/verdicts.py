@@ -171,7 +171,8 @@ def _wanted(change: PairedChange, limit: float) -> float:
 def mark_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> list[bool]:
     """Return which models no other beats: as cheap, and surely changing as little.
 
-    The scene as it is, of cost 1, changes nothing; costs that differ by less than a tenth are one.
+    The scene as it is, of cost 1, changes nothing, and who is its equal is not better; costs that
+    differ by less than a tenth are one.
     """
     points = [(1.0, 0.0)]
     for verdict in verdicts:
@@ -179,7 +180,9 @@ def mark_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> 
         cost = 1.0 if 1.0 / _APART < cost < _APART else cost
         known = cost == cost and verdict.kind != NOTHING
         points.append((cost, verdict.weight if known else math.nan))
-    return on_front(points)[1:]
+    return [
+        best and point != points[0] for point, best in zip(points, on_front(points), strict=True)
+    ][1:]
 
 
 def amount_text(change: PairedChange) -> str:

@@ -228,7 +228,8 @@ class AnswerOfStudy:
         rows = Rows(StoredRows(folder), [axis.column for axis in study.axes], study.over)
         notes = [*self._notes, *self._found.notes]
         if rows.failed:
-            notes.append(f"{rows.failed:,} runs failed; {_RUNS}/parts says why")
+            died = f", {rows.crashed:,} as their process died" if rows.crashed else ""
+            notes.append(f"{rows.failed:,} runs failed{died}; {_RUNS}/parts says why")
         return AnswerReport(
             title=study.title,
             unit="encounters" if study.over else "replicas",

@@ -48,7 +48,7 @@ def made(study, tmp_path_factory):
     done = call(
         "cost", study, "--answer", RANGE, "--answer", "declared.radar", "--block", "radar",
         "--vary", "blocks.radar.scan_rate_hz=[2, 5]",
-        "--vary", "swap.transform=geometry.flat_earth",
+        "--vary", "swap.transform=geometry.flat_earth", "--vary", "swap.radar=radar.threshold",
         "--budget", "400m", "--repeats", "2", "--workers", "1", "--out", out,
     )  # fmt: skip
     assert done.exit_code == 0, done.output
@@ -98,6 +98,8 @@ def test_it_is_printed_what_the_files_hold(made):
     assert f"{RANGE}, m: each model in place of the scene's own" in told
     assert "The scene as it is: radar detection: exact, radar.scan_rate_hz = 5." in told
     assert "Note: radar, rcs: changes nothing here, no target has an rcs_table." in told
+    # What is listed and is a rung too is run once.
+    assert "Note: radar = radar.threshold is radar detection: threshold." in told
     said = json.loads((out / "run.json").read_text())["cost"]
     flat = " ".join(told.split())
     for sentence in [line for lines in said["sentences"].values() for line in lines]:
