@@ -99,9 +99,9 @@ def repeated(kind: str, sigma: float, repetitions: int) -> tuple[float, float, f
 @pytest.mark.parametrize("kind", ["nmac", "loss", "needless"])
 def test_over_500_studies_ratios_are_unbiased_and_intervals_cover(kind: str, sigma: float) -> None:
     covered, bias, _, _ = repeated(kind, sigma, 500)
-    # The share has a standard error of 1 %, the bias of 0.045.
-    assert 0.93 <= covered <= 0.975
-    assert abs(bias) < 0.1
+    # Three standard errors of the share, 1 % each, about 95 %; the bias has one of 0.045.
+    assert 0.92 <= covered <= 0.98
+    assert abs(bias) < 0.135
 
 
 def test_the_gain_that_a_study_says_is_there() -> None:
