@@ -60,8 +60,17 @@ def convert_sets(
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {len(encounters)} encounters")
+    _say_more(encounters)
+
+
+def _say_more(encounters: EncounterSet) -> None:
+    """Say what was left out of a set, and what was done to the rows of its files."""
     if encounters.skipped:
         say(f"{encounters.skipped} damaged encounters were skipped")
+    for note in encounters.notes[:_MOST_NOTES]:
+        say(f"note: {note}", err=True)
+    if len(encounters.notes) > _MOST_NOTES:
+        say(f"note: and {len(encounters.notes) - _MOST_NOTES} more", err=True)
 
 
 def _by_encounter(
@@ -84,7 +93,7 @@ def _by_encounter(
     return np.array([known[n] for n in encounters.numbers.tolist()])
 
 
-_DRAWN = 12
+_DRAWN, _MOST_NOTES = 12, 20
 
 
 @dataclass(frozen=True)
@@ -156,8 +165,7 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
     )
     say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
         else "all weights are 0")  # fmt: skip
-    if encounters.skipped:
-        say(f"{encounters.skipped} damaged encounters were skipped")
+    _say_more(encounters)
     if len(indices) < len(encounters):
         say(f"closest approaches of {len(indices)} of them, evenly spread")
     headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]

@@ -164,6 +164,7 @@ def read_encounters(
             "recorded aircraft)"
         )
     wrong: list[str] = []
+    notes: list[str] = []
     encounters: list[_Encounter] = []
     origins: list[tuple[float, float]] = []
     numbers: list[int] = []
@@ -171,10 +172,11 @@ def read_encounters(
     number = 0
     for path in paths:
         try:
-            tracks, origin = _tracks(path, at if alone is None else alone[1][1] or at, others)
+            tracks, origin, said = _tracks(path, at if alone is None else alone[1][1] or at, others)
+            notes += said
             if len(tracks) == 1 and path.suffix.lower() != TEXT:
                 if alone is None:
-                    alone = path, (tracks, origin)
+                    alone = path, (tracks, origin, said)
                     continue
                 tracks, origin = [*alone[1][0], *tracks], alone[1][1]
                 alone = None
@@ -194,7 +196,8 @@ def read_encounters(
         raise EncounterSetError("\n".join(wrong[:_MOST_SAID]))
     where = at or (origins[0] if origins else (0.0, 0.0))
     weights = [1.0] * len(numbers)
-    return set_of_tracks(str(paths[0].parent), numbers, weights, encounters, where, len(wrong))
+    found = set_of_tracks(str(paths[0].parent), numbers, weights, encounters, where, len(wrong))
+    return replace(found, notes=tuple(notes))
 
 
 def _one_aircraft(path: Path) -> EncounterSetError:
@@ -221,7 +224,7 @@ def _tracks(path: Path, at: tuple[float, float] | None, others: TrackReader | No
         return read_track_csv(path, at)
     if kind == MATRIX:
         return read_track_matrices(path)
-    return [track for _, track in read_paired_text(path)], None
+    return read_paired_text(path)
 
 
 def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> EncounterSet:

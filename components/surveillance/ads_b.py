@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.geometry import POSITION_FIELDS, line_of_sight_ned
+from components.geometry import POSITION_FIELDS, line_of_sight_ned, turned_by_meridians
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer, promises_of_looks
 from components.messages.reach import Reach
@@ -28,7 +28,6 @@ from components.surveillance.broadcast import (
     Broadcasts,
     Sent,
     Transponders,
-    turned_by_meridians,
 )
 from components.surveillance.cooperative import (
     STEP_S,
@@ -301,7 +300,7 @@ class AdsB(CooperativeSensor):
             return none, none, none
         ahead_s = (sent_ns[row, column] - now_ns[row]) / NANOSECONDS
         then = cells.seen_at(asked[row], ahead_s)
-        stream = self._received[kind].of_runs(senders.run[row])
+        stream = self._received[kind].of_runs(senders.run[row], sent_ns[row, column])
         drawn = stream.uniform(senders.keys[row], number[row, column])
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:

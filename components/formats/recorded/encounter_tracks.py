@@ -18,9 +18,10 @@ def recorded_tracks(path: Path, at: tuple[float, float] | None = None) -> Tracks
     are the file's own. EncounterSetError says what is wrong with it.
     """
     try:
-        samples = record(path).samples
+        recording = record(path)
     except TrafficFileError as error:
         raise EncounterSetError(str(error)) from None
+    samples = recording.samples
     first = next(iter(samples.values()))
     origin = at or (float(first["lat"][0]), float(first["lon"][0]))
     tracks = []
@@ -28,4 +29,5 @@ def recorded_tracks(path: Path, at: tuple[float, float] | None = None) -> Tracks
         lat, lon = columns["lat"], columns["lon"]
         north, east, _ = line_of_sight_ned(*origin, 0.0, lat, lon, np.zeros_like(lat))
         tracks.append((columns["time"], north, east, columns["alt"]))
-    return tracks, origin
+    recording.notes.settle()
+    return tracks, origin, [f"{path}: {note}" for note in recording.notes.warnings]
