@@ -17,7 +17,7 @@ from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
@@ -243,6 +243,8 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
+        #: From which tick on each has something to do while an alert lasts; infinity without one.
+        self._next: FloatArray = np.empty(0)
         #: How often nothing led out, of how often it was to steer, by run.
         self._stuck = NO_COUNTS
 
@@ -262,22 +264,39 @@ class Stochastic(Component):
         if alerts is None:
             return None
         highest, runs = alerts.highest(), wake.run
-        # Without an alert, now or before, there is nothing to do.
-        alerted = highest >= self.p.level
-        busy = [run for run, mind in self._minds.items() if mind.since is not None]
-        followed = np.isin(runs, np.union1d(runs[alerted], np.array(busy, dtype=np.int64)))
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
-        for index in np.flatnonzero(followed).tolist():
+        for index in np.flatnonzero(self._has_to_do(wake, highest)).tolist():
             run = int(runs[index])
             mind = self._minds.get(run, Mind(run))
             mind, chooses, acts = self._followed(mind, int(wake.ticks[index]), int(highest[index]))
-            self._minds[run] = mind
+            self._minds[run], self._next[run] = mind, self._next_tick(mind)
             if chooses:
                 choosing.append((index, mind))
             if acts:
                 acting.append((index, run))
         return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
+
+    def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
+        """Tell at which rows something may change: nothing does without an alert, now or before,
+        nor while one lasts and a decision waits.
+        """
+        missing = int(wake.run.max(initial=-1)) + 1 - len(self._next)
+        self._next = np.concatenate([self._next, np.full(max(0, missing), np.inf)])
+        alerted, due = highest >= self.p.level, self._next[wake.run]
+        has_alert = due < np.inf
+        if len(wake.instants.last_of_each) < len(wake):  # who is followed at one row is so later
+            return np.isin(wake.run, wake.run[alerted | has_alert])
+        return (alerted != has_alert) | (alerted & (wake.ticks >= due))
+
+    def _next_tick(self, mind: Mind) -> float:
+        """Return a tick before which an alert that goes on changes nothing; never without one."""
+        if mind.since is None:
+            return math.inf
+        if mind.acts_at is None:
+            held = mind.since + self.p.held_s * self.context.ticks_per_s
+            return math.floor(max(held, mind.free_from))
+        return math.floor(mind.acts_at if mind.chooses_at is None else mind.chooses_at)
 
     def _sent(
         self,
