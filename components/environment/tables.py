@@ -204,10 +204,16 @@ class Terrain(Parameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to ground that there is not."""
+        """Say which keys belong to ground that there is not, and where ground is made up."""
         said = []
         if self.raster is None:
             said += self.idle("raster_offset_m", because="raster is not given")
+        elif filled := self.raster.raster.filled:
+            share = filled / self.raster.raster.height_m.size
+            said.append(
+                f"raster: {filled:,} nodes without a height ({share:.2%}) in "
+                f"{self.raster.raster.name} are filled from around them"
+            )
         if self.height_m is None:
             clutter = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
             said += self.idle(*clutter, because="height_m is not given")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import chain
 from os import PathLike
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.receiver_logs import log_of
+from components.formats.receiver_logs import UNKNOWN_JSON, log_of
 from components.formats.recording import Recording
 from components.formats.reports import recording_of
 from components.formats.sample_columns import (
@@ -23,6 +23,7 @@ from components.formats.sample_columns import (
     complete_velocity,
     enu_velocity,
     indices_of,
+    is_missing,
     unit_factor,
 )
 from components.formats.sample_table import SampleTable
@@ -58,7 +59,8 @@ _IDENTITIES = (
 )  # fmt: skip
 #: When positions were received: state vectors repeat one until the next comes.
 _OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
-_TIMES = (*_OF_POSITIONS, "time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
+_CLOCKS = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
+_TIMES = (*_OF_POSITIONS, *_CLOCKS)
 _DATES = ("date", "utcdate")
 #: Latitude and longitude in one cell.
 _POSITIONS = ("position", "latlon", "latlng")
@@ -82,6 +84,8 @@ _FAMILIES = (
     ("readsb", ({"altgeom"}, {"altbaro"}, {"geomrate"}, {"barorate"})),
     ("FlightRadar24", ({"timestamp", "utc", "callsign", "speed", "direction"},)),
     ("BaseStation", ({"hexident"},)),
+    # Of OpenSky's data, in Python.
+    ("the library traffic", ({"icao24", "altitude", "groundspeed", "verticalrate"},)),
 )
 #: Fewer different ones may be in steps of 25 by chance.
 _FEW_HEIGHTS = 5
@@ -112,6 +116,8 @@ def read_csv(
     log = log_of(problems, data)
     if log is not None:
         return recording_of(problems, log, ownship, altitude).flights()
+    if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
+        problems.fail(UNKNOWN_JSON)
     text = text_of(data, problems)
     del data  # of many rows it is not held beside their samples
     return record_table(problems, text, ownship, altitude).flights()
@@ -158,9 +164,11 @@ def record_rows(
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [_name_and_unit(header)[0] for header in headers]
     date = next((plain.index(name) for name in _DATES if name in plain), None)
-    first = next(rows, None)
-    if first is not None and len(first[1]) > time:
-        columns["time"] = _epoch(columns["time"], first[1][time], headers[time], notes)
+    # Where a position's own time is not known, that of its row must do.
+    other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
+    ahead = _until_a_time(rows, time, other)
+    if ahead and (begins := _time_cell(ahead[-1][1], time, other)):
+        columns["time"] = _epoch(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, _time_parser(columns["time"]),
         columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
@@ -168,7 +176,7 @@ def record_rows(
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
-    for number, row in chain([] if first is None else [first], rows):
+    for number, row in chain(ahead, rows):
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
         if position is not None and len(row) == at:
@@ -176,6 +184,8 @@ def record_rows(
             row[position : position + 1] = pair if len(pair) == 2 else [row[position]] * 2
         if date is not None and len(row) >= at and ":" in row[time]:
             row[time] = f"{row[date]} {row[time]}"
+        if other != time and len(row) >= at and is_missing(row[time]):
+            row[time] = row[other]
         if is_nameless and len(row) == len(headers) - 1:
             row.append(str(stem))
         table.add_row(number, row)
@@ -193,6 +203,29 @@ def record_rows(
     return recording
 
 
+#: How many rows may be without a time before the first that has one.
+_MOST_AHEAD = 1000
+
+
+def _until_a_time(
+    rows: Iterator[tuple[int, list[str]]], time: int, other: int
+) -> list[tuple[int, list[str]]]:
+    """Return the rows up to the first with a time, whose unit shows by it."""
+    ahead: list[tuple[int, list[str]]] = []
+    for one in rows:
+        ahead.append(one)
+        if _time_cell(one[1], time, other) or len(ahead) > _MOST_AHEAD:
+            break
+    return ahead
+
+
+def _time_cell(row: list[str], time: int, other: int) -> str:
+    for index in (time, other):
+        if len(row) > index and not is_missing(row[index]):
+            return row[index]
+    return ""
+
+
 def _seem_feet(recording: Recording) -> bool:
     """Tell whether altitudes come in steps of 25, as transponders report feet."""
     heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
@@ -202,6 +235,11 @@ def _seem_feet(recording: Recording) -> bool:
 
 _KNOWN_NAMES = frozenset(_IDENTITIES)
 _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
+
+
+def known_among(headers: Iterable[str]) -> int:
+    """Return how many names of columns are of those that a table may have."""
+    return len({_name_and_unit(header)[0] for header in headers} & _KNOWN)
 
 
 def _header_and_rows(

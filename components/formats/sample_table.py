@@ -155,7 +155,7 @@ class SampleTable:
     def of_second(self, key: str) -> int | None:
         """Return how many aircraft have the second column of two; None for all of them."""
         whom = len(self._second.get(key, []))
-        return None if whom and whom == len(self._aircraft) else whom
+        return None if whom and whom >= self._kept else whom
 
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
@@ -224,6 +224,7 @@ class SampleTable:
                     )  # fmt: skip
                     del columns[key]
             kept[name] = lines, columns
+        self._kept = len(kept)
         self._note_second_columns()
         if left_out:
             of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"

@@ -246,7 +246,7 @@ class SwerlingRadar(LinkBudgetRadar):
             if self._fading is not None and self._lasts(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
-            draws = self._rcs_draws.of_runs(cells.run[chosen])
+            draws = self._rcs_draws.of_runs(cells.run[chosen], cells.instant_ns[chosen])
             draw = partial(draws.uniform, keys[chosen], cells.scan[chosen])
             rcs[chosen] = scan_rcs(
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"

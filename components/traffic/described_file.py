@@ -51,7 +51,7 @@ def described(path: Path, content: TrafficFile) -> list[str]:
     begins, ends = (clock(content.start_time_s + time_s) for time_s in (first, last))
     word = shell_line([str(path)])
     lines = [
-        f"{path.name}: {content.kind}, in {content.units}",
+        f"{path.name}: {content.kind}; {content.units}",
         f"  aircraft  {len(aircraft)} in {count:,} samples: {names}{more}",
         f"  time      {begins} to {ends}, {last - first:g} s",
         f"  place     latitudes {edges[0]}, longitudes {edges[1]} deg",

@@ -14,6 +14,7 @@ from components.formats.recorded import ulog_file
 from components.formats.recorded.autopilot_logs import is_tlog, tlog_log, ulog_log
 from components.formats.recorded.captures import is_capture, udp_payloads
 from components.formats.recorded.igc_file import igc_log, is_igc
+from components.formats.recorded.json_records import is_json, record_json
 from components.formats.recorded.xml_tracks import xml_log
 from components.formats.recording import Recording
 from components.formats.reports import Log, recording_of
@@ -86,6 +87,8 @@ def record(
     log = _log_of(problems, data, stem)
     if log is not None:
         return recording_of(problems, log, None, altitude)
+    if is_json(data):
+        return record_json(problems, data, None, altitude, stem)
     for begins, said in _OTHERS:
         if data.startswith(begins):
             problems.fail(f"{said}; what is read: {KINDS}")

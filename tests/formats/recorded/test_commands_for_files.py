@@ -46,7 +46,7 @@ def test_check_says_what_a_file_is_and_what_to_type(tmp_path):
     assert result.exit_code == 0, result.stderr
     said = " ".join(result.stdout.split())
     for part in (
-        "my aircraft.json: aircraft.json of readsb, in ft and kt",
+        "my aircraft.json: aircraft.json of readsb; ft and kt",
         "2 in 60 samples: a1b2c3, d4e5f6",
         "2024-06-01 12:00:00 UTC to 2024-06-01 12:00:29 UTC, 29 s",
         "latitudes 47 to 47.04, longitudes 8 to 8.001 deg",

@@ -1,5 +1,6 @@
 """OpenSky's history in CSV and Parquet, tables of one flight, and ASTERIX in captures."""
 
+import json
 import random
 from datetime import UTC, datetime
 
@@ -57,10 +58,17 @@ def read(tmp_path, name, data, **options):
     return record(path, **options)
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet", "times"])
+def as_json(rows: dict[str, list], *, lines: bool) -> bytes:
+    records = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
+    return ("\n".join(map(json.dumps, records)) if lines else json.dumps(records)).encode()
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "times", "json", "jsonl"])
 def test_positions_of_opensky_count_when_they_were_received(tmp_path, kind):
     rows = history()
-    data = as_csv(rows) if kind == "csv" else as_parquet(
+    data = as_csv(rows) if kind == "csv" else as_json(rows, lines=kind == "jsonl") if (
+        kind.startswith("json")
+    ) else as_parquet(
         tmp_path, rows, **({"lastposupdate": pa.array(
             [datetime.fromtimestamp(t, UTC) for t in rows["lastposupdate"]]
         )} if kind == "times" else {}),
