@@ -211,7 +211,7 @@ class NavigationErrors(_Navigation[Believing]):
             instant = nanosecond_of(states.tick, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
-            drawn = stream.of_runs(states.run)
+            drawn = stream.of_runs(states.run, instant)
             normals: list[FloatArray] = []
             for number in range(6):
                 process = lasting[number // 3]

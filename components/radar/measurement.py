@@ -161,7 +161,7 @@ class Strength:
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
             keys = cells.roster.keys_of(cells.target[detected])
-            draws = self._draws.of_runs(cells.run[detected])
+            draws = self._draws.of_runs(cells.run[detected], cells.instant_ns[detected])
             tail = 1.0 - draws.uniform(keys, cells.scan[detected])
         else:
             tail = look.tail[detected]
