@@ -40,6 +40,7 @@ class GatedPairs:
     #: What else was measured, of tracks without a range: ranges and their variances.
     ranges: tuple[FloatArray, FloatArray] | None = None
     #: (3, pairs) or None: The ownship's velocity, of bearings coarse beside their ranges; else NaN.
+    #: None where no error is carried.
     own_m_s: FloatArray | None = None
 
     @property
@@ -82,7 +83,7 @@ def gated_pairs(
                 continue
             cells = batch.detection[entry]
             measured = _picked(scans.measured, rows, cells)
-            own_m_s = None
+            own_m_s = None if rules.carried is None else np.full((3, len(cells)), np.nan)
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
                 reported = rules.carried.reported(scans, cells)

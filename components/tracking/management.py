@@ -109,44 +109,15 @@ def initiated(
     """Return a track for each of the chosen detections, and the next number of each replica."""
     scans, looks, replica = batch.scans, batch.look, batch.replica
     detection, of, codes = batch.detection[chosen], batch.of[chosen], batch.code[chosen]
-    count = len(detection)
-    sizes = [model.size for model in rules.estimator.models]
-    measured, variance = (
-        selected(scans.measured[:3], detection),
-        selected(scans.variance[:3], detection),
-    )
+    count, pose = len(detection), batch.pose(of)
+    estimates = started(rules, scans, pose, codes, detection)
     ranged = codes % 2 == 1
-    mean, deviation = rules.start_range_m
-    measured[2] = np.where(ranged, measured[2], mean)
-    variance[2] = np.where(ranged, variance[2], deviation**2)
-    # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
-    measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
-    pose = batch.pose(of)
-    position, jacobian = position_of(measured, pose)
-    spread = np.zeros((6, 6, count))
-    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
-    spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
-    for i in range(3, 6):
-        spread[i, i] = rules.p.start_speed_m_s**2
-    if rules.p.start_climb_m_s is not None:
-        spread[5, 5] = rules.p.start_climb_m_s**2
-    states, covariances = [], []
-    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
-    known = 6 + rules.estimator.errors
-    for size in sizes:
-        state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
-        state[:known], covariance[:known, :known] = begin
-        for i in range(known, size):
-            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
-        _update_by_rates(scans, pose, codes, detection, state, covariance)
-        states.append(state)
-        covariances.append(covariance)
     counts = np.bincount(of, minlength=len(looks))
     within = np.arange(count) - (np.cumsum(counts) - counts)[of]
     tick, mask, ones = scans.tick[looks][of], scans.contributors[detection], np.ones(count)
     whole = ones.astype(np.int64)
     by = (mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1).astype(bool)
-    range_m = np.where(ranged, measured[2], np.inf)
+    range_m = np.where(ranged, scans.measured[2].take(detection), np.inf)
     born = TrackStore(
         replica=replica[of],
         number=next_number[of] + within,
@@ -169,15 +140,61 @@ def initiated(
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
         counted_tick=np.broadcast_to(tick, by.shape),
-        **estimate_columns(
-            Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
-        ),
+        own_m_s=_own_of_coarse(rules, scans, codes, detection),
+        **estimate_columns(estimates),
     )
     status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
     born = born.with_columns(
         status=status, updated_m2=position_variance(born), **now_seen(rules, born, pose, mask)
     )
     return born, next_number + counts
+
+
+def started(
+    rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
+) -> Estimates:
+    """Return what is known of a target by one detection alone, of several kinds `codes`."""
+    count = len(detection)
+    measured, variance = (
+        selected(scans.measured[:3], detection),
+        selected(scans.variance[:3], detection),
+    )
+    ranged = codes % 2 == 1
+    mean, deviation = rules.start_range_m
+    measured[2] = np.where(ranged, measured[2], mean)
+    variance[2] = np.where(ranged, variance[2], deviation**2)
+    # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
+    measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
+    position, jacobian = position_of(measured, pose)
+    spread = np.zeros((6, 6, count))
+    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
+    spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
+    for i in range(3, 6):
+        spread[i, i] = rules.p.start_speed_m_s**2
+    if rules.p.start_climb_m_s is not None:
+        spread[5, 5] = rules.p.start_climb_m_s**2
+    states, covariances = [], []
+    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
+    known = 6 + rules.estimator.errors
+    sizes = [model.size for model in rules.estimator.models]
+    for size in sizes:
+        state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
+        state[:known], covariance[:known, :known] = begin
+        for i in range(known, size):
+            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
+        _update_by_rates(scans, pose, codes, detection, state, covariance)
+        states.append(state)
+        covariances.append(covariance)
+    return Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
+
+
+def _own_of_coarse(
+    rules: TrackerRules, scans: Scans, codes: IntArray, detection: IntArray
+) -> FloatArray:
+    """Return how the ownship moved at detections with coarse bearings, (3, n); else NaN."""
+    if rules.carried is None or scans.reported is None:
+        return np.full((3, len(detection)), np.nan)
+    return np.where(codes & TELLS > 0, rules.carried.own_m_s(scans, detection), np.nan)
 
 
 def expected_looks(

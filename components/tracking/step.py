@@ -80,7 +80,7 @@ def associated(
     pose = batch.pose(of)
     kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
     looked = expected_looks(rules, part, of, batch, pose, direction)
-    pairs = Candidates(rules, part, kinds, batch.contributors, pose)
+    pairs = Candidates(rules, part, kinds, batch, pose)
     changed, hit, gain = association.update(pairs)
     return managed(rules, part, changed, pose, looked, hit, gain), held
 

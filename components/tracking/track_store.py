@@ -28,7 +28,9 @@ class TrackStore(KeyedTable):
     it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth, elevation and
     range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that was; NaN and
     -1 where it did not, or where all its errors are new at every look. ``counted_tick`` (sensors,
-    n) is when each sensor last hit it or was last counted as missing it.
+    n) is when each sensor last hit it or was last counted as missing it. ``own_m_s`` (3, n) is how
+    the ownship moved at the last detection, where that had a coarse bearing: then what is known of
+    the target lies on an arc; else NaN.
     """
 
     #: Columns beside states, with their types.
@@ -65,10 +67,10 @@ class TrackStore(KeyedTable):
             "misdetections": np.int64,
             "seen": float,
         }
-        types |= {"seen_tick": np.int64, "counted_tick": np.int64}
+        types |= {"seen_tick": np.int64, "counted_tick": np.int64, "own_m_s": float}
         shapes: dict[str, tuple[int, ...]] = {"weights": (len(sizes),), "misdetections": (sensors,)}
         shapes |= {"seen": (3, sensors), "seen_tick": (sensors,)}
-        shapes["counted_tick"] = (sensors,)
+        shapes |= {"counted_tick": (sensors,), "own_m_s": (3,)}
         for i, size in enumerate(sizes):
             types |= {f"state{i}": float, f"covariance{i}": float}
             shapes |= {f"state{i}": (size,), f"covariance{i}": (size, size)}
@@ -152,7 +154,7 @@ def tracks_after(store: TrackStore, records: KeyedTable, rows: IntArray) -> Trac
 #: Columns that no message shows.
 _UNSHOWN = {
     "history", "looks", "misses", "misdetections", "seen", "seen_tick", "counted_tick",
-    "life_ticks", "updated_m2",
+    "life_ticks", "updated_m2", "own_m_s",
 }  # fmt: skip
 
 
