@@ -261,9 +261,9 @@ def corrected(
                 pairs.rules, batch.scans, pose.take(track[anew]), batch.code[entry[anew]],
                 batch.detection[entry[anew]],
             )  # fmt: skip
-            for now, new in zip(estimates, begun, strict=True):
-                for whole, some in zip(now, new, strict=True):
-                    whole[..., anew] = some
+            now, new = ([*one.states, *one.covariances, one.weights] for one in (estimates, begun))
+            for whole, some in zip(now, new, strict=True):
+                whole[..., anew] = some
     if one.kind.has_range or len(angle_only) == 0:
         return
     which = track[angle_only]

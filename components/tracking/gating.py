@@ -1,7 +1,7 @@
 """Pairs of a track and a detection in its gate."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -64,13 +64,20 @@ def gated_pairs(
     held = np.zeros(len(batch.detection), dtype=bool)
     direction = None
     some_angle_only = bool((~part.ranged).any())
+    linear, on_arc = rules.estimator.linear, ~np.isnan(part.own_m_s[0])
+    apart = linear is not rules.estimator and bool(on_arc.any())
     spread = _PairVariance(rules, part, pose, scans)
     for code in np.bincount(batch.code).nonzero()[0].tolist():
         mine = (batch.code == code).nonzero()[0]
         # What an angle-only track expects of a range says nothing: there the direction decides.
-        for ranged in (True, False) if some_angle_only and code & 1 else (None,):
+        ways = product(
+            (True, False) if some_angle_only and code & 1 else (None,),
+            (True, False) if apart else (None,),
+        )
+        for ranged, arc in ways:
             kind, rows = kind_of(0 if ranged is False else code)
-            moments = rules.estimator.expect(kind, part.estimates(), pose)
+            estimator = linear if arc else rules.estimator
+            moments = estimator.expect(kind, part.estimates(), pose)
             # Moments of sigma points are means over them: not where the state itself is seen.
             direction = moments[0].expected[:2] if moments[0].left_over is None else None
             # The box of a kind that tells of errors is not about its gate, and decides itself.
@@ -78,6 +85,9 @@ def gated_pairs(
             track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread, few)
             if ranged is not None:
                 chosen = part.ranged[track] == ranged
+                track, entry = track[chosen], entry[chosen]
+            if arc is not None:
+                chosen = on_arc[track] == arc
                 track, entry = track[chosen], entry[chosen]
             if len(track) == 0:
                 continue
@@ -97,7 +107,7 @@ def gated_pairs(
                         ages.added(result, model, state, covariance), considered=reported.considered
                     )
                     for result, model, state, covariance in zip(
-                        rules.estimator.expect(kind, mine_then.estimates(), level_pose, reported),
+                        estimator.expect(kind, mine_then.estimates(), level_pose, reported),
                         rules.estimator.models, mine_then.states(), mine_then.covariances(),
                         strict=True,
                     )

@@ -3,10 +3,7 @@
 Two rules confirm: m hits among the last n expected looks, or the sequential likelihood ratio of
 Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): the logarithm of the
 odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every
-misdetection by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the
-sensor, and only of sensors that see it: one that never hit it, or that has missed it for a while
-where another one hits, may be too far away, and says nothing. Nor does one that has reported the
-track, or was counted as missing it, within the time in which it promises a report.
+misdetection by ln(1 - Pd Pg). Which looks count, `components.tracking.promises` says.
 """
 
 from typing import Any
@@ -17,15 +14,14 @@ from components.estimation.batched import (
     product,
     product_transposed,
     selected,
-    squared_length,
     symmetric,
 )
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, position_of
-from components.messages.reach import EVALUATE
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
+from components.tracking.promises import misdetection_counts, range_of
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import NEVER, TrackStore, estimate_columns
@@ -33,10 +29,6 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Odds are kept within this: a track of an hour must not take an hour to be doubted.
 LARGEST_SCORE = 20.0
-#: Looks come a little before their time where a clock jitters.
-_NEARLY = 0.9
-#: After so many misdetections a sensor is taken not to see a track that another one sees.
-BLIND_AFTER = 5
 
 
 def judged(
@@ -74,14 +66,6 @@ def _confirmed(
     low = np.log(p.missed_confirmation / (1.0 - p.false_confirmation))
     high = np.log((1.0 - p.missed_confirmation) / p.false_confirmation)
     return gained >= high, gained <= low
-
-
-def seeing(misdetections: IntArray) -> BoolArray:
-    """Return which sensors see which tracks, (sensors, n), from their misdetections."""
-    return np.asarray(
-        (misdetections < BLIND_AFTER)
-        | ((misdetections == misdetections.min(axis=0)) & (misdetections < NEVER))
-    )
 
 
 def bits_set(values: IntArray) -> IntArray:
@@ -197,46 +181,6 @@ def _own_of_coarse(
     return np.where(codes & TELLS > 0, rules.carried.own_m_s(scans, detection), np.nan)
 
 
-def expected_looks(
-    rules: TrackerRules,
-    part: TrackStore,
-    of: IntArray,
-    batch: LookBatch,
-    pose: SensorPose,
-    direction: FloatArray | None,
-) -> BoolArray:
-    """Return which sensors looked where the tracks are that they see, and when they were due.
-
-    (sensors, tracks)
-    """
-    scans = batch.scans
-    sensors = np.where(scans.tells_misses[batch.look], scans.sensors[batch.look], 0)
-    used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
-    looked = np.zeros((len(rules.fields), len(part)), dtype=bool)
-    if used == 0:
-        return looked
-    mine = sensors[of]
-    sees = seeing(part.misdetections)
-    where: tuple[FloatArray, FloatArray, FloatArray] | None = None
-    for i, field in enumerate(rules.fields):
-        if not used >> i & 1:
-            continue
-        looked[i] = (mine >> i & 1).astype(bool) & sees[i]
-        if rules.promises is not None:
-            promised = _NEARLY * rules.promises.ticks(i, range_of(part, pose))
-            looked[i] &= part.tick - part.counted_tick[i] >= promised
-        if field is None:
-            continue
-        if where is None:
-            if direction is None:
-                direction = expected(Kind(False), part.state0, pose)
-            away = range_of(part, pose)
-            where = (*direction, np.where(part.ranged, away, 0.0))
-        inside = np.ones(len(part), dtype=bool)
-        looked[i] &= field.decide(*where, inside) == EVALUATE
-    return looked
-
-
 def managed(
     rules: TrackerRules,
     part: TrackStore,
@@ -267,13 +211,13 @@ def managed(
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
     ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
     counted_tick = part.counted_tick
-    if rules.promises is not None:
+    if rules.promises:
         counts = looked | (by >> np.arange(len(looked))[:, np.newaxis] & 1).astype(bool)
         counted_tick = np.where(counts, np.maximum(counted_tick, changed.tick), counted_tick)
     if hit.any():
         # Who has not missed it, and has looked at it lately.
         lately = changed.tick - counted_tick <= rules.lives_ticks
-        sees = (misdetections == 0) & (lately if rules.promises is not None else True)
+        sees = (misdetections == 0) & (lately if rules.promises else True)
         life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
     ended |= changed.tick - updated_tick > life_ticks
     return changed.with_columns(
@@ -282,26 +226,6 @@ def managed(
         life_ticks=life_ticks, updated_m2=updated_m2, counted_tick=counted_tick,
         **now_seen(rules, changed, pose, by),
     )  # fmt: skip
-
-
-def range_of(part: TrackStore, pose: SensorPose) -> FloatArray:
-    """Return how far away tracks are that have a range, m; infinite for others."""
-    away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
-    return np.where(part.ranged, away, np.inf)
-
-
-def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
-    """Return each sensor's misdetections since its last hit, after a look.
-
-    `by` is the mask of the sensors that updated each track.
-    """
-    new = misdetections.copy()
-    hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
-    for i, mine in enumerate(looked):
-        new[i] += mine
-        if hitting >> i & 1:
-            new[i][(by >> i & 1).astype(bool)] = 0
-    return new
 
 
 def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
@@ -410,7 +334,9 @@ def _start_by_reports(
     own += product_transposed(effects, effects)
     speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
-        own += ages.errors(model, speeds)[0] / len(rules.estimator.models)
+        own += ages.errors(model, np.zeros((model.size, len(cells))), speeds)[0] / len(
+            rules.estimator.models
+        )
     covariance[:6, :6, telling] = symmetric(own)
     covariance[:6, 6:, telling] = -effects
     covariance[6:, :6, telling] = -effects.swapaxes(0, 1)

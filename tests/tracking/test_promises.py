@@ -8,7 +8,7 @@ from wired import chain, rows, run
 
 from components.messages.detections import promises_of_looks
 from components.surveillance.reception import certain, do_365, time_to_receive_s
-from components.tracking.rules import Promises
+from components.tracking.promises import Promises
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 2000, "heading_deg": 0, "speed_mps": 60}
 BESIDE = {"name": "beside", "up_m": 50, "heading_deg": 0, "speed_mps": 60, "mode_s": True,
