@@ -10,10 +10,13 @@ from pydantic import Field
 from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.guidance.daidalus import ConfParameters, changes_out, smaller, why_never_steers
 from components.messages.alerts import AlertLevels
+from components.messages.detections import without_range
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
@@ -67,6 +70,11 @@ class TurnOut(Component):
     lockstep = True
     rewindable = True
 
+    @classmethod
+    def may_climb(cls, parameters: TurnOutParameters) -> bool:
+        """Return whether it ever commands another altitude."""
+        return parameters.manoeuvre in ("climb", "vertical_speed")
+
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
@@ -79,6 +87,12 @@ class TurnOut(Component):
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
+        #: How often nothing led out, of how often something had to.
+        self._stuck = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often it was to steer, and no change led clear."""
+        return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
@@ -109,6 +123,9 @@ class TurnOut(Component):
             result = changes_out(kind, self._configuration, self._alerter, alerts, rows)
             for (run, index), changes in zip(now.items(), result, strict=True):
                 change = None if changes is None else smaller(changes)
+                if changes is not None:
+                    due = np.array([run])
+                    self._stuck = with_cases(self._stuck, due[: change is None], due)
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre(change)
                     self._free_from[run] = int(wake.ticks[index]) + self._pause_ticks
@@ -193,11 +210,33 @@ class TurnAway(Component):
     lockstep = True
     rewindable = True
 
+    @classmethod
+    def may_climb(cls, parameters: TurnAwayParameters) -> bool:
+        """Return that it never commands another altitude."""
+        return False
+
     def setup(self) -> None:
         """Start free to turn."""
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By run, from when on it may turn again.
         self._free_from: dict[int, int] = {}
+        #: How many tracks had no range, of how many.
+        self._rangeless = NO_COUNTS
+
+    def warnings(self) -> list[str]:
+        """Say that nobody measures the range by which it goes."""
+        blind = "" if self.p.without_range else without_range(self.context.producers)
+        if not blind:
+            return []
+        return [f"without_range is false and {blind} measures no range: it never turns"]
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how many tracks had no range and were not acted on."""
+        return (
+            {}
+            if self.p.without_range
+            else {"a track has no range and is not acted on": self._rangeless}
+        )
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look for the nearest track at every instant."""
@@ -205,9 +244,11 @@ class TurnAway(Component):
         if tracks is None:
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
+        row = tracks.row_of_entries
+        run = tracks.run[row]
+        self._rangeless = with_cases(self._rangeless, run[np.isnan(tracks.range_m)], run)
         if self.p.without_range:
             near |= np.isnan(tracks.range_m)
-        row = tracks.row_of_entries
         manoeuvres: dict[int, Manoeuvre] = {}
         rows = np.flatnonzero(np.bincount(row[near]))
         instants = wake.ticks[rows].tolist(), wake.run[rows].tolist()

@@ -100,23 +100,45 @@ def explain(**options: Any) -> None:
     explain_scene(**options)
 
 
+_workers_option = click.option(
+    "--workers", type=int, metavar="N", help="Processes [default: one per processor]."
+)
+
+
 @main.command()
 @scene_options(required=False)
+@click.option(
+    "--answer",
+    "answers",
+    multiple=True,
+    metavar="RESULT",
+    help="Of a study: by how much each model changes a result, on the same runs.",
+)
+@click.option(
+    "--vary",
+    "listed",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="With --answer, besides the ladders: swap.tracker=tracking.imm, "
+    "blocks.radar.scan_rate_hz=[1, 2].",
+)
+@_workers_option
 @click.option("--block", metavar="NAME", help="Climb only this block's ladders.")
 @click.option("--against", metavar="RUNG", help="Another reference than the ladder's own.")
 @click.option(
     "--repeats",
     type=click.IntRange(min=1),
-    default=10,
-    show_default=True,
-    help="How often each rung is timed; each counts the best of ten passes.",
+    metavar="N",
+    help="How often each rung is timed, the best of ten passes each [default: 10]; with --answer "
+    "in how many turns the runs are made.",
 )
 @click.option(
     "--budget",
     "budgets",
     multiple=True,
     metavar="ERROR",
-    help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m².",
+    help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m²; with --answer the "
+    "largest change: 300m, 0.02, 5% [default: 10%].",
 )
 @click.option(
     "--all",
@@ -133,11 +155,19 @@ def explain(**options: Any) -> None:
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-cost-NNN].")
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON only.")
 @plain_errors
-def cost(**options: Any) -> None:
-    """Run SCENE with each model of its blocks in turn: what accuracy costs, and what it buys."""
+def cost(answers: tuple[str, ...], listed: tuple[str, ...], **options: Any) -> None:
+    """Run SCENE with each model of its blocks in turn: what accuracy costs, and what it buys.
+
+    With --answer SCENE is a STUDY, and it is said by how much each model changes its results.
+    """
+    if answers:
+        from dsa_des.commands.cost_answer import cost_at_the_answer
+
+        cost_at_the_answer(answers=answers, listed=listed, **options)
+        return
     from dsa_des.commands.cost import cost_of_accuracy
 
-    cost_of_accuracy(**options)
+    cost_of_accuracy(listed=listed, **options)
 
 
 @main.command()
@@ -159,11 +189,6 @@ def examples(copy: str | None) -> None:
     from dsa_des.commands.catalogue import show_examples
 
     show_examples(copy)
-
-
-_workers_option = click.option(
-    "--workers", type=int, metavar="N", help="Processes [default: one per processor]."
-)
 
 
 _out_option = click.option(

@@ -88,8 +88,21 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     if wanted == "exhaustive":
         named = {line.partition("::")[0] for line in listed("exhaustive.txt")}
         return (collection_path.name.startswith("test_") and file not in named) or None
-    left_out = listed("exhaustive.txt") + (listed("slow.txt") if wanted == "not slow" else [])
-    return file in left_out or None
+    return file in left_out(wanted) or None
+
+
+@cache
+def left_out(wanted: str) -> set[str]:
+    """Return what is listed and not of the tier that is wanted."""
+    return {*listed("exhaustive.txt"), *(listed("slow.txt") if wanted == "not slow" else ())}
+
+
+def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str) -> list | None:
+    """Do not make the cases of tests that are left out: half of all."""
+    wanted, named = collector.config.getoption("markexpr"), "::" in " ".join(collector.config.args)
+    if named or wanted not in ("not slow", "not exhaustive"):
+        return None
+    return [] if f"{collector.nodeid}::{name}" in left_out(wanted) else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

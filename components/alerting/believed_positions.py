@@ -14,6 +14,7 @@ from components.messages.tracks import Tracks
 from dsa_des.arrays.run_ticks import RunTicks, first_of_run, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.record.undone import NO_RUNS, with_cases
 
 # Positions closer in time than this are one instant, from which no velocity follows, s.
 _SHORTEST_S = 1e-6
@@ -45,11 +46,12 @@ class BelievedPositions:
         self._keep_s, self._targets = keep_s, targets
         #: East, north, up (targets, 3, n); NaN where a target was not seen.
         self._seen = ReceivedRows.none(time_s=(), position_m=(targets, 3))
-        #: How many, of how many: sights without a range, and targets there without a velocity.
-        self._rangeless, self._unmoving = np.zeros((2, 2), dtype=np.int64)
+        #: How many, of how many, by run: sights without a range, and targets there without a
+        #: velocity.
+        self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often something could not be judged."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often something could not be judged, by run."""
         return judged_not(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
@@ -65,7 +67,8 @@ class BelievedPositions:
         if isinstance(sights, Tracks):
             new &= sights.updated  # others came with an earlier row
         with_range = np.isfinite(sights.range_m)
-        self._rangeless += np.count_nonzero(new & ~with_range), np.count_nonzero(new)
+        run = arrived.instants.run[row]
+        self._rangeless = with_cases(self._rangeless, run[new & ~with_range], run[new])
         new &= with_range
         # The attitude of when it was measured, of those that have arrived.
         came = arrived.instants.take(row)
@@ -134,7 +137,7 @@ class BelievedPositions:
             )
         if not known.all() and len(time_s):
             self._add_slow(now, now_s, known, state)
-        self._unmoving[1] += np.count_nonzero(known)
+        self._unmoving = with_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
         return known, state
 
     def _add_slow(
@@ -154,7 +157,8 @@ class BelievedPositions:
         known[scans[of], target] = found[0][:, 0]
         state[:, scans[of], target] = found[1][:, :, 0]
         there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
-        self._unmoving += np.count_nonzero(there & ~known[scans])
+        lacking = now.run[scans[(there & ~known[scans]).nonzero()[0]]]
+        self._unmoving = with_cases(self._unmoving, lacking, lacking)
 
     def _last_two(self, now: RunTicks) -> tuple[IntArray, IntArray]:
         """Return the last rows with a position of each target, of two instants, by some instants.
@@ -183,13 +187,13 @@ class BelievedPositions:
             before = np.where(alike, earlier(before - 1), before)
 
 
-def judged_not(rangeless: IntArray, unmoving: IntArray) -> dict[str, tuple[int, int]]:
-    """Return in words how often something could not be judged, and why."""
+def judged_not(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
+    """Return in words how often something could not be judged, and why, by run."""
     lacks = {
         "what it hears of has no range and is not judged": rangeless,
         "who is there has no velocity yet and is not judged": unmoving,
     }
-    return {what: (int(count[0]), int(count[1])) for what, count in lacks.items() if count[1]}
+    return {what: count for what, count in lacks.items() if count[1].any()}
 
 
 def true_positions_m(states: TrafficStates) -> FloatArray:

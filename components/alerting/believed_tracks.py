@@ -22,6 +22,7 @@ from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.record.undone import with_cases
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -38,8 +39,8 @@ class EstimatedFlights:
     """
 
     def __init__(self) -> None:
-        #: How many tracks have no range, of how many.
-        self.rangeless = np.zeros(2, dtype=np.int64)
+        #: How many tracks have no range, of how many, by run.
+        self.rangeless = np.zeros((2, 0), dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
         self._rows = ReceivedRows.none("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
@@ -58,13 +59,14 @@ class EstimatedFlights:
     def add(self, came: RunTicks, tracks: StateTracks) -> None:
         """Take in tracks of a tracker, and when each row came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
-        self.rangeless += np.count_nonzero(good & ~tracks.has_range), np.count_nonzero(good)
+        run = came.run[row_of_entries(tracks.offsets)]
+        self.rangeless = with_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
         self._rows = self._rows.with_more(came, begin=begin, count=np.diff(before))
         new = KeyedTable(
-            replica=came.run[row_of_entries(tracks.offsets)],
+            replica=run,
             number=tracks.track,
             time_s=tracks.state_s,
             updated_s=tracks.updated_s,
@@ -167,11 +169,11 @@ class BelievedTracks:
         self._estimates = EstimatedFlights()
         #: Where the targets are: a track is named by the nearest.
         self._true = ReceivedRows.none(position_m=(targets, 3))
-        #: At how many scans the ownship's velocity is not known yet, of how many.
-        self._unmoving = np.zeros(2, dtype=np.int64)
+        #: At how many scans the ownship's velocity is not known yet, of how many, by run.
+        self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often something could not be judged."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often something could not be judged, by run."""
         return judged_not(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
@@ -194,8 +196,9 @@ class BelievedTracks:
         `own` has the ownship's velocity, NaN where unknown yet.
         """
         # Without two poses the ownship's own velocity is not known, and no relative one.
-        moving = np.flatnonzero(np.isfinite(own["east_mps"]))
-        self._unmoving += len(asked) - len(moving), len(asked)
+        known = np.isfinite(own["east_mps"])
+        moving = known.nonzero()[0]
+        self._unmoving = with_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         result = self._estimates.states(now, times_s[moving], poses.place(now))
         scan, number, state, deviations, age_s = moving[result[0]], *result[1:]

@@ -21,6 +21,7 @@ from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
+from components.messages.detections import without_range
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
@@ -125,10 +126,13 @@ class DaidalusAlerting(Component):
                 f"scan_rate_hz is {float(self.p.scan_rate_hz):g}: in "
                 f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
             )
+        heard = [one for one in self.context.producers if one.port == self._source]
+        if blind := without_range(heard):
+            said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often a flight could not be judged."""
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often a flight could not be judged, by run."""
         return {} if self._roster is None else self._belief.undone()
 
     def run(self, wake: Wake) -> AlertLevels | None:

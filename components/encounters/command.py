@@ -157,8 +157,9 @@ def generate(**options: Any) -> None:
 def convert(**options: Any) -> None:
     """Turn encounters of public formats into a set, or a set into waypoints.
 
-    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat), one
-    encounter each; files of one aircraft are taken two by two, the ownship's first.
+    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat, or any
+    file of recorded aircraft), one encounter each; files of one aircraft are taken two by two, the
+    ownship's first.
     """
     from components.encounters.set_commands import convert_sets
 

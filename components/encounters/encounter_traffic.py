@@ -6,7 +6,7 @@ function of its number: the same in every scene and condition.
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -24,7 +24,7 @@ from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
 from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
 from components.geometry import enu_to_geodetic, line_of_sight
-from components.traffic.files import FileParameters, RecordedTraffic
+from components.traffic.recorded import FileParameters, RecordedTraffic
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, ScenePath
@@ -228,10 +228,19 @@ class _EncounterTraffic(RecordedTraffic):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
         self.encounter_set, self.index = _encounter_of(type(self), self.p)
         own, *others = encounter_flights(self.encounter_set, self.index, self.p.dynamics)
-        notes = [f"encounter {self.encounter_set.numbers[self.index]} of {len(self.encounter_set)}"]
+        notes = [f"encounter {self.encounter_set.numbers[self.index]}{self.of_how_many()}"]
         if self.encounter_set.skipped:
             notes.append(f"{self.encounter_set.skipped} damaged encounters of the set were skipped")
         return TrafficFile(own, others, 0.0, notes, notes[1:])
+
+    def of_how_many(self) -> str:
+        """Return how many encounters there are to choose from, in words; nothing if any number."""
+        return f" of {len(self.encounter_set)}"
+
+    @classmethod
+    def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
+        """Return the encounter of each of many blocks: its set and its index there."""
+        return [chosen_encounter(cls, p) for p in parameters]
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -283,17 +292,29 @@ class ModelTraffic(_EncounterTraffic):
         notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
         return notes + super().warnings()
 
+    def of_how_many(self) -> str:
+        """Return nothing: a model makes as many as are asked for."""
+        return ""
+
+    @classmethod
+    def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
+        """Return the encounters of many blocks, made at once."""
+        keys = [_pair_key(p) for p in parameters]
+        _PAIRS.prepare(keys)
+        return [_PAIRS[key] for key in keys]
+
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Make the encounters and flights that many blocks will ask for, all at once."""
-        _PAIRS.prepare([(_model_key(p), p.encounter) for p in parameters])
+        _PAIRS.prepare([_pair_key(p) for p in parameters])
         super().prepare(parameters)
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter that a block's parameters name, and its index there."""
     if issubclass(cls, ModelTraffic):
-        return _PAIRS[_model_key(parameters), parameters.encounter], 0
+        found: Encounter = _PAIRS[_pair_key(parameters)]
+        return found
     if parameters.file.suffix == ".toml":
         encounter_set = read_made(parameters.file)
     else:
@@ -315,36 +336,58 @@ def _moved(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> E
     return replace(encounter_set, reference_deg=reference_deg)
 
 
-#: What makes encounters of a model: both files, the seed, and how miss distances are drawn; and
-#: where their origin is put.
-_ModelKey = tuple[
-    Path, Path, int, MissDistances | None, MissDistances | None, float | None, float | None
-]
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """What makes encounters of a model, and where their origin is put.
+
+    It is itself a key, of one object for all that are alike (`_model_of`).
+    """
+
+    file: Path
+    intruder: Path
+    seed: int
+    horizontal: MissDistances | None
+    vertical: MissDistances | None
+    lat_deg: float | None
+    lon_deg: float | None
+
+    @property
+    def sampler(self) -> PairSampler:
+        return _sampler(self.file, self.intruder, self.seed, self.horizontal, self.vertical)
+
+    @property
+    def reference_deg(self) -> tuple[float, float]:
+        lat_deg, lon_deg = self.lat_deg, self.lon_deg
+        return (0.0, 0.0) if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)
 
 
-def _model_key(parameters: Any) -> _ModelKey:
+_model_of = lru_cache(maxsize=64)(_Model)
+
+
+def _pair_key(parameters: Any) -> tuple[_Model, int]:
     p = parameters
     made_by = p.file, p.intruder_file or p.file, p.model_seed, p.horizontal, p.vertical
-    return *made_by, p.lat_deg, p.lon_deg
+    return _model_of(*made_by, p.lat_deg, p.lon_deg), p.encounter
 
 
-def _pairs_of(keys: Sequence[tuple[_ModelKey, int]]) -> list[EncounterSet]:
-    """Return encounters of models, each a set of its own; numbers in a row are drawn together."""
-    made: dict[Any, EncounterSet] = {}
-    for model in dict.fromkeys(model for model, _ in keys):
-        numbers = np.array(sorted(n for of, n in keys if of == model), dtype=np.int64)
-        *made_by, lat_deg, lon_deg = model
-        sampler = _sampler(*made_by)
-        at = (0.0, 0.0) if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)
-        for some in np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1):
-            pairs = sampler.pairs(range(int(some[0]), int(some[-1]) + 1), paths=False)
-            for index, number in enumerate(some.tolist()):
-                one = pairs if len(some) == 1 else pairs.take(np.array([index]))
-                source = str(model[0])
-                made[model, number] = set_of_pairs(one, sampler.rules.closest_s, at, source)
+def _pairs_of(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
+    """Return encounters of models, in sets of many that are drawn together."""
+    numbers_of: dict[_Model, set[int]] = {}
+    for model, number in keys:
+        numbers_of.setdefault(model, set()).add(number)
+    made: dict[tuple[_Model, int], Encounter] = {}
+    for model, chosen in numbers_of.items():
+        sampler, numbers = model.sampler, np.array(sorted(chosen), dtype=np.int64)
+        for first in range(0, len(numbers), _PAIRS_AT_ONCE):
+            pairs = sampler.pairs(numbers[first : first + _PAIRS_AT_ONCE], paths=False)
+            closest_s, source = sampler.rules.closest_s, str(model.file)
+            some = set_of_pairs(pairs, closest_s, model.reference_deg, source)
+            made |= {(model, n): (some, index) for index, n in enumerate(pairs.numbers.tolist())}
     return [made[key] for key in keys]
 
 
+#: So many encounters of a model make one set: their arrays stay small.
+_PAIRS_AT_ONCE = 4096
 _PAIRS = MadeTogether(_pairs_of)
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from components.arguments.units import FOOT_M
 from components.encounters.model import EncounterModel
 from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
-from components.encounters.sampling import EncounterDraws, TrackSampler
+from components.encounters.sampling import EncounterDraws, Ints, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
 from components.flights.point_mass import fly_euler, summed
 from components.formats.encounter_set import EVENTS, NAMES, EncounterSet, geometry_class
@@ -34,7 +34,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Pairs that are made together, and attempts of them that are looked at together.
 PAIRS_AT_ONCE = 6144
-_FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 6144, 6, 256
+_FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 2048, 6, 256
 _COURSES, _COURSES_FROM = 40, 4
 _MOST_ATTEMPTS = 1_000_000
 
@@ -96,9 +96,9 @@ class PairSampler:
         for start in range(0, len(numbers), PAIRS_AT_ONCE):
             yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 
-    def pairs(self, numbers: range, *, paths: bool = True) -> Pairs:
-        """Return the pairs with these numbers."""
-        wanted = np.arange(numbers.start, numbers.stop, numbers.step)
+    def pairs(self, numbers: Ints, *, paths: bool = True) -> Pairs:
+        """Return the pairs with these numbers, which rise."""
+        wanted = np.asarray(numbers, dtype=np.int64)
         parts: list[Pairs] = []
         left, attempt = np.arange(len(wanted)), np.zeros(len(wanted), dtype=np.int64)
         passed = 1.0

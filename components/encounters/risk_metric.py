@@ -12,12 +12,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.encounters.encounter_traffic import chosen_encounter
-from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
+from components.encounters.encounter_traffic import Encounter, ModelTraffic, SetTraffic
+from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class, pair_paths
 from components.metrics.losses import FlightsTogether, nearest_of, ways_of
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight, prepare_traffic, traffic_block
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from components.metrics.separation import RelativeFlight, traffic_block
+from components.well_clear.plane_pairs import Meetings, meetings
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     CLASS,
@@ -38,11 +40,11 @@ def has_weights(scene: Scene) -> bool:
     return hasattr(traffic_block(scene).parameters, "encounter")
 
 
-def make_together(scenes: Sequence[Scene]) -> None:
-    """Make the encounters of many scenes at once: each will be asked for several times."""
-    blocks = [traffic_block(scene) for scene in scenes]
-    if blocks and hasattr(blocks[0].cls, "prepare"):
-        blocks[0].cls.prepare([block.parameters for block in blocks])
+def encounters_of(group: Group) -> list[Encounter]:
+    """Return the encounter of every replica, its set and its index there, made together."""
+    block = traffic_block(group.scene)
+    cls: Any = block.cls
+    return group.once("encounters", lambda: cls.choose(group.parameters_of(block.name)))
 
 
 class EncounterWeight(Metric):
@@ -68,10 +70,7 @@ class EncounterWeight(Metric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all three for every replica."""
         numbers, weights, families = np.empty((3, len(group)))
-        prepare_traffic(group.scenes)
-        for row, scene in enumerate(group.scenes):
-            block = traffic_block(scene)
-            encounter_set, index = chosen_encounter(block.cls, block.parameters)
+        for row, (encounter_set, index) in enumerate(encounters_of(group)):
             numbers[row], weights[row] = encounter_set.numbers[index], encounter_set.weights[index]
             families[row] = encounter_set.extra.get(FAMILY, encounter_set.numbers)[index]
         return {
@@ -80,7 +79,6 @@ class EncounterWeight(Metric):
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all three, which no flight changes."""
-        make_together(group.scenes)
         return self.measure(group)
 
 
@@ -91,10 +89,15 @@ _EVENTS = ("nmac", "well_clear_lost")
 # Of needless manoeuvres.
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
-# which was just missed, and that one is flown where well clear is just kept; falling with the miss
-# distance. Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
-_STAYS, _INDUCED, _NEEDS = 0.2, 0.02, 0.1
+# which the nominal flights just miss, and that a manoeuvre is flown where well clear is just kept.
+# Turns move the ownship by some `_TURNED_M` and hardly up or down, climbs by `_CLIMBED_M` and
+# hardly to the side (`_SLACK` of a size). Wrong ones cost width, never truth
+# (`dsa_des.studies.allocation`).
+_STAYS, _INDUCED, _NEEDS = 0.2, 0.004, 0.1
+_TURNED_M, _CLIMBED_M, _SLACK = 250.0, 100.0, 0.15
 _LEAST_SIZES = 0.01
+# No sector of courses or bearings is so narrow, degrees.
+_WIDE_DEG = 35.0
 # How far apart distances are looked at to choose runs by.
 _COARSE_S = 1.0
 # Courses are taken over this time to both sides of the closest approach.
@@ -131,6 +134,7 @@ class RiskRatios(Mitigated):
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         self._weight = EncounterWeight((), scene) if has_weights(scene) else None
+        self._climbs = any(map(may_climb, (scene.blocks[name] for name in self.delays_s)))
 
     def results(self) -> list[Result]:
         """Return flags, encounter and weight, classes, and the ratios of all and of each class."""
@@ -174,29 +178,86 @@ class RiskRatios(Mitigated):
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
+    def nominal(self, group: Group) -> dict[str, AnyArray]:
+        """Return both events without manoeuvres; flights tell where the plane is not sure."""
+        meeting = met_in_plane(group, self.p)
+        if meeting is None:
+            return super().nominal(group)
+        result = _events_of(meeting)
+        unsure = np.flatnonzero(meeting.unsure.any(axis=0))
+        if len(unsure):
+            for name, column in self.losses(group, steered=False, some=unsure).items():
+                result[f"{name}_nominal"][unsure] = column
+        return result
+
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what no manoeuvre changes, and the geometry of the closest approach."""
-        make_together(group.scenes)
-        result = dict(self.losses(group, steered=False))
-        result |= self._unsteered(group, result)
-        *values, course_deg, bearing_deg = self.of_flights(group, nominal_geometry, steered=False)
+        meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
+        if meeting is None:
+            result = self._of_nominal(group)
+            closest = self.of_flights(group, nominal_geometry, steered=False)
+        else:
+            closest, result = meeting.closest, self._of_meeting(meeting)
+            unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._between_classes(meeting))
+            if len(unsure):
+                few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
+                for name, column in self._of_nominal(few).items():
+                    result[name][unsure] = column
+        if self._weight is not None:
+            result |= self._weight.measure(group)
+        if self.p.needless:
+            result[_KEPT] = 1.0 - result["well_clear_lost_nominal"]
+        *values, course_deg, bearing_deg = closest
         angles = np.radians([course_deg, bearing_deg])
         values += [part for angle in angles for part in (np.cos(angle), np.sin(angle))]
         result |= dict(zip(self.geometry, values, strict=False))
         clear, nmac = (
-            np.maximum(values[1] / radius_m, values[2] / half_m)
-            for radius_m, half_m in self.p.sizes_m
+            np.maximum(values[1] / radius_m, values[2] / half_m) for radius_m, half_m in sizes_m
         )
         for name, sizes in (("well_clear", clear), ("nmac", nmac)):
             result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
-        for event, sizes in zip(_EVENTS, (nmac, clear), strict=True):
+        for event, limits in zip(("well_clear_lost", "nmac"), sizes_m, strict=True):
             there = result[f"{event}_nominal"] > 0.0
-            result[expected_column(f"{event}_mitigated")] = np.where(
-                there, _STAYS, _INDUCED * np.maximum(np.nan_to_num(sizes, nan=np.inf), 1.0) ** -8.0
-            )
+            induced = _INDUCED * led_into(limits, values[1], values[2], climbs=self._climbs)
+            result[expected_column(f"{event}_mitigated")] = np.where(there, _STAYS, induced)
         kept = 1.0 - result["well_clear_lost_nominal"]
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
+        return result
+
+    def _of_nominal(self, group: Group) -> dict[str, AnyArray]:
+        """Return events and classes of flights without manoeuvres."""
+        return {**super().nominal(group), **self._classes(group)}
+
+    def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
+        """Return the same of paths in the plane, as far as these are sure."""
+        return _events_of(meeting) | self._named(*meeting.closest[4:])
+
+    def _between_classes(self, meeting: Meetings) -> BoolArray:
+        """Return of which runs the plane does not tell the classes."""
+        if not self.p.by:
+            return np.zeros_like(meeting.unsure_angles)
+        low, high = meeting.angles_deg[:, 0], meeting.angles_deg[:, 1]
+        unsure = meeting.unsure_angles | (high - low > _WIDE_DEG).any(axis=0)
+        edges = zip(*(self._named(*angles).values() for angles in (low, high)), strict=True)
+        for one, other in edges:
+            unsure |= one != other
+        return unsure
+
+    def _classes(self, group: Group) -> dict[str, AnyArray]:
+        """Return the classes of encounters, as without manoeuvres."""
+        if not self.p.by:
+            return {}
+        return self._named(*self.of_flights(group, meeting_deg, steered=False))
+
+    def _named(self, course_deg: FloatArray, bearing_deg: FloatArray) -> dict[str, AnyArray]:
+        """Return the classes by courses and bearings; None where nobody is met."""
+        result: dict[str, AnyArray] = {}
+        for by in self.p.by:
+            named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
+            column: AnyArray = named.astype(object)
+            column[np.isnan(course_deg)] = None
+            result[f"encounter_{by}"] = column
         return result
 
     def _unsteered(self, group: Group, known: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
@@ -206,14 +267,36 @@ class RiskRatios(Mitigated):
             result[_KEPT] = 1.0 - known["well_clear_lost_nominal"]
         if self._weight is not None:
             result |= self._weight.measure(group)
-        if self.p.by:
-            course_deg, bearing_deg = self.of_flights(group, meeting_deg, steered=False)
-            for by in self.p.by:
-                named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
-                column: AnyArray = named.astype(object)
-                column[np.isnan(course_deg)] = None
-                result[f"encounter_{by}"] = column
-        return result
+        return result | self._classes(group)
+
+
+def _events_of(meeting: Meetings) -> dict[str, AnyArray]:
+    return {
+        f"{name}_nominal": inside.astype(float)
+        for name, inside in zip(("well_clear_lost", "nmac"), meeting.inside, strict=True)
+    }
+
+
+def may_climb(block: Block) -> bool:
+    """Return whether a block that steers may command another altitude, as far as it says so."""
+    asked = getattr(block.cls, "may_climb", None)
+    return asked is None or bool(asked(block.parameters))
+
+
+def led_into(
+    size_m: tuple[float, float], level_m: FloatArray, up_m: FloatArray, *, climbs: bool
+) -> FloatArray:
+    """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
+
+    Of encounters that pass so far to the side and above; 0 where nobody is met.
+    """
+    limits = zip((level_m, up_m), size_m, strict=True)
+    level, up = (np.maximum(np.nan_to_num(at, nan=np.inf) - size, 0.0) for at, size in limits)
+    radius_m, half_m = size_m
+    turned = np.exp(-((level / _TURNED_M) ** 2) - (up / (_SLACK * half_m)) ** 2)
+    climbed = np.exp(-((level / (_SLACK * radius_m)) ** 2) - (up / _CLIMBED_M) ** 2)
+    result: FloatArray = np.maximum(turned, climbed) if climbs else turned
+    return result
 
 
 def side_of(bearing_deg: FloatArray) -> AnyArray:
@@ -237,6 +320,23 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
         *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
     )
     return angles
+
+
+def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
+    """Return how runs meet as far as the plane tells; None where it cannot tell of any."""
+    block, scene = traffic_block(group.scene), group.scene
+    parameters = group.parameters_of(block.name)
+    one = parameters[0]
+    if (
+        block.cls not in (SetTraffic, ModelTraffic)
+        or one.scripted_ownship is not None
+        or p.step_s is not None
+        or p.tau_s > 0.0
+        or any(r.changes.keys() - {f"blocks.{block.name}.encounter"} for r in group.replicas)
+    ):
+        return None
+    paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
+    return meetings(paths, len(group), end_s, p.sizes_m)
 
 
 def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:

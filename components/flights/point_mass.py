@@ -31,6 +31,8 @@ _G_M_S2 = G_FT_S2 * FOOT_M
 _STEPS_PER_COMMAND = 10
 #: Less than this is left to chance by no rounding, and is turned at once: 0.2 arc seconds.
 _ALMOST_RAD = 1e-6
+#: Of more tracks instants are summed row by row: sums along the first axis jump in the memory.
+_FEW_TRACKS = 32
 _LONGEST_S = 600.0
 _SHORTEST_S = 1e-8
 #: An easing turn settles if the angle within which it eases is at least this long at full rate.
@@ -93,7 +95,12 @@ def summed(start: FloatArray, rates: FloatArray) -> FloatArray:
     """Return start, start + rates[0], start + rates[0] + rates[1], ... along the first axis."""
     total = np.empty_like(rates)
     total[0] = start
-    np.cumsum(rates[:-1], axis=0, out=total[1:])
+    if len(start) < _FEW_TRACKS or len(rates) < 3:
+        np.cumsum(rates[:-1], axis=0, out=total[1:])
+    else:  # the same sums, row by row
+        total[1] = rates[0]
+        for row in range(2, len(rates)):
+            np.add(total[row - 1], rates[row - 1], out=total[row])
     total[1:] += start
     return total
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,12 @@ from components.flights.fleet import (
     empty_state,
     in_blocks,
 )
-from components.flights.sampled_segments import evaluate_segments, fit_segments, locate
+from components.flights.sampled_segments import (
+    STRAIGHT_ROWS,
+    evaluate_segments,
+    fit_segments,
+    locate,
+)
 from components.geometry import (
     TrajectoryState,
     Vector,
@@ -26,7 +32,7 @@ from components.geometry import (
     wrap_heading_rad,
     wrap_longitude_deg,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""
@@ -91,7 +97,8 @@ class SampledTrajectory:
 
     Columns are (n,), n of at least 1; times strictly increase, longitudes may have any number of
     turns. Attitude that is not given is derived from the path through the air, which moves by
-    `wind_east_north_mps`. ValueError names what cannot be.
+    `wind_east_north_mps`. After samples that are `away` (n,) it is not there until the next one.
+    ValueError names what cannot be.
     """
 
     def __init__(
@@ -107,6 +114,7 @@ class SampledTrajectory:
         pitch_rad: npt.ArrayLike | None = None,
         roll_rad: npt.ArrayLike | None = None,
         wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
+        away: BoolArray | None = None,
     ) -> None:
         east, north, up = velocity_enu_mps if velocity_enu_mps is not None else (None,) * 3
         given = checked_samples(
@@ -141,23 +149,46 @@ class SampledTrajectory:
         self.derived_attitude = tuple(
             angle for angle in ("yaw", "pitch", "roll") if f"{angle}_rad" not in given
         )
-        attitude = attitude_from_path(
-            *path,
-            velocity_enu_mps=self.velocity_enu_mps,
-            wind_east_north_mps=wind_east_north_mps,
-        )
+        #: After which samples it is not there until the next one; None where there is no such.
+        self.away = away if away is not None and away.any() else None
+        attitude = self._attitude(path, wind_east_north_mps)
         yaw, pitch, roll = (
             given.get(key, derived)
             for key, derived in zip(("yaw_rad", "pitch_rad", "roll_rad"), attitude, strict=True)
         )
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
-        self.coefficients = fit_segments(
+        self.max_speed_mps = self._speed_bound()
+
+    def _attitude(
+        self, path: tuple[FloatArray, ...], wind_east_north_mps: tuple[float, float]
+    ) -> tuple[FloatArray, ...]:
+        """Return yaw, pitch and roll along a path, of each piece between gaps by itself."""
+        ends = [] if self.away is None else (np.flatnonzero(self.away) + 1).tolist()
+        pieces = []
+        for first, end in pairwise([0, *ends, len(path[0])]):
+            part = slice(first, end)
+            velocity: Vector | None = None
+            if self.velocity_enu_mps is not None:
+                east, north, up = (along[part] for along in self.velocity_enu_mps)
+                velocity = east, north, up
+            pieces.append(
+                attitude_from_path(
+                    *(column[part] for column in path),
+                    velocity_enu_mps=velocity,
+                    wind_east_north_mps=wind_east_north_mps,
+                )
+            )
+        return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """Each segment's polynomials, (25, samples)."""
+        return fit_segments(
             self.sample_times_s,
             (self.lat_deg, self.lon_deg, self.alt_m),
             (self.yaw_rad, self.pitch_rad, self.roll_rad),
             self.velocity_enu_mps,
         )
-        self.max_speed_mps = self._speed_bound()
 
     @classmethod
     def together(
@@ -224,6 +255,7 @@ class SampledTrajectory:
             self.alt_m,
             velocity_enu_mps=self.velocity_enu_mps,
             wind_east_north_mps=(east_mps, north_mps),
+            away=self.away,
             **known,
         )
 
@@ -232,6 +264,8 @@ class SampledTrajectory:
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
         segment, elapsed, present = locate(self.sample_times_s, flat)
+        if self.away is not None:
+            present &= ~self.away[segment] | (elapsed == 0.0)
         state = evaluate_segments(self.coefficients[:, segment], elapsed, present)
         return state.reshaped(times.shape)
 
@@ -258,12 +292,30 @@ class SampledFleet(Fleet):
 
     def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
         self._flights = list(trajectories)
+
+    @cached_property
+    def _bases(self) -> list[tuple[FloatArray, list[int]]]:
+        """Sample times, and which flights have them."""
         by_bytes: dict[bytes, list[int]] = {}
         for i, flight in enumerate(self._flights):
             by_bytes.setdefault(flight.sample_times_s.tobytes(), []).append(i)
-        self._bases = [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
-        tables = [np.zeros((25, 0)), *(flight.coefficients for flight in self._flights)]
-        self._table = np.ascontiguousarray(np.concatenate(tables, axis=1))
+        return [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
+
+    @cached_property
+    def _table(self) -> FloatArray:
+        """What is known of each segment, one after the other: in a row of the memory."""
+        return _side_by_side([flight.coefficients for flight in self._flights])
+
+    @cached_property
+    def _away(self) -> BoolArray | None:
+        """In which segments, one after the other, an aircraft is away; None where none ever is."""
+        gaps = [flight.away for flight in self._flights]
+        if all(one is None for one in gaps):
+            return None
+        none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
+        return np.concatenate(
+            [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
+        )
 
     def __len__(self) -> int:
         return len(self._flights)
@@ -291,8 +343,10 @@ class SampledFleet(Fleet):
                 index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
                 elapsed[:, columns] = since[:, np.newaxis]
                 present[:, columns] = there[:, np.newaxis]
+            if self._away is not None:
+                present &= ~self._away[index] | (elapsed == 0.0)
             values = evaluate_segments(
-                self._table[:, index.reshape(-1)], elapsed.reshape(-1), present.reshape(-1)
+                self._segments(index.reshape(-1)), elapsed.reshape(-1), present.reshape(-1)
             ).reshaped(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
@@ -302,6 +356,9 @@ class SampledFleet(Fleet):
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         return in_blocks(self._state, aircraft, time_s)
 
+    def _segments(self, index: IntArray) -> FloatArray:
+        return np.ascontiguousarray(self._table.take(index, axis=0).T)
+
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         samples, first, last = self._find.starts_s, self._find.first, self._find.last
         start, end = samples[first[aircraft]], samples[last[aircraft]]
@@ -309,9 +366,21 @@ class SampledFleet(Fleet):
         inside = np.where(inside < end, inside, end)
         segment = self._find(aircraft, inside)
         present = (time_s >= start) & (time_s <= end)
-        return evaluate_segments(
-            self._table.take(segment, axis=1), inside - samples[segment], present
-        )
+        elapsed = inside - samples[segment]
+        if self._away is not None:
+            present &= ~self._away[segment] | (elapsed == 0.0)
+        return evaluate_segments(self._segments(segment), elapsed, present)
+
+
+def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:
+    """Return coefficients (rows, n) of several flights as one table (segments, rows)."""
+    rows = max(map(len, tables), default=STRAIGHT_ROWS)
+    result = np.zeros((sum(table.shape[1] for table in tables), rows))
+    end = 0
+    for table in tables:
+        start, end = end, end + table.shape[1]
+        result[start:end, : len(table)] = table.T
+    return result
 
 
 def _mean_speed_bound(

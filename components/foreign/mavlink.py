@@ -16,6 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
+from components.messages.detections import without_range
 from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
@@ -173,6 +174,19 @@ class Mavlink(Component):
         self._begun = False
         self._before: tuple[float, TrafficStates] | None = None
         self._free_from, self._next_beat_s = 0, -math.inf
+        #: How many tracks had no range, of how many.
+        self._rangeless = self._heard = 0
+
+    def warnings(self) -> list[str]:
+        """Say that nobody measures the range without which no track is sent."""
+        blind = without_range(one for one in self.context.producers if one.port == "estimates")
+        return [f"{blind} measures no range: no track is sent"] if blind else []
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how many tracks had no range and were not sent."""
+        if not self._heard:
+            return {}
+        return {"a track has no range and is not sent": (self._rangeless, self._heard)}
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Tell the autopilot what is there, and take what it says."""
@@ -192,7 +206,13 @@ class Mavlink(Component):
         own, others = _flying(states, before[1], time_s - before[0])
         held = wake.held("estimates")
         if "estimates" in {producer.port for producer in self.context.producers}:
-            others = [] if held is None or held[1][0] < 0 else _tracks(*held, time_s)
+            others = []
+            if held is not None and held[1][0] >= 0:
+                message, row = held[0], int(held[1][0])
+                of_row = slice(int(message.offsets[row]), int(message.offsets[row + 1]))
+                self._heard += len(message.has_range[of_row])
+                self._rangeless += int(np.count_nonzero(~message.has_range[of_row]))
+                others = _tracks(*held, time_s)
         datagrams = [*self._link.vehicles(others), self._link.own_state(time_s, own)]
         if time_s >= self._next_beat_s:
             self._next_beat_s = time_s + 1.0

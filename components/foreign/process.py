@@ -160,6 +160,8 @@ class Process(Component):
         self._state: bytes | None = None
         self._first_state: bytes | None = None
         self._is_in = _Current()
+        #: How often it was asked, and how often it had something to say.
+        self._calls = self._answers = 0
         rosters = known_targets(self.context)
         self._roster = rosters[0] if rosters else None
 
@@ -181,7 +183,9 @@ class Process(Component):
                 if last > first:
                     sent.append((new.source, new.message.take(slice(int(first), int(last)))))
             answer = self._call(tick, int(wake.scans[row]), sent)
-            for name, message in self._messages(answer, wake.ticks[row : row + 1], sent):
+            said = list(self._messages(answer, wake.ticks[row : row + 1], sent))
+            self._calls, self._answers = self._calls + 1, self._answers + bool(said)
+            for name, message in said:
                 parts.setdefault(name, []).append(message)
         return {n: type(found[0]).concatenate(found) for n, found in parts.items()} or None
 
@@ -267,6 +271,12 @@ class Process(Component):
             if isinstance(found := getattr(message, "roster", None), Roster):
                 self._roster = found
         return self._roster or Roster.of([])
+
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often it was asked, where it never had anything to say."""
+        if self._answers or not self._calls:
+            return {}
+        return {"it was asked and answered with no row": (self._calls, self._calls)}
 
     def close(self) -> None:
         """End the program."""

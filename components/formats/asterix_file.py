@@ -11,12 +11,14 @@ import numpy as np
 
 from components.formats.asterix_records import (
     ADS_B,
+    DAY_S,
     PLOTS,
     SERVICE,
     SYSTEM_TRACKS,
     AsterixRecord,
     read_records,
 )
+from components.formats.recording import Recording
 from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
@@ -81,8 +83,31 @@ def read_asterix(
     geometric height; with `altitude`, those of that kind alone. All that is wrong is one
     `TrafficFileError`, by records.
     """
-    records, warnings = _records(path)
-    problems = Problems(str(path), of="record")
+    problems = Problems(str(path))
+    try:
+        data = read_input_bytes(Path(path))
+    except InputFileError as error:
+        problems.fail(str(error))
+    return record_asterix(problems, data, altitude, ownship, least=2).flights()
+
+
+def record_asterix(
+    problems: Problems,
+    data: bytes,
+    altitude: Altitude | None = None,
+    ownship: str | None = None,
+    of_day_s: float | None = None,
+    least: int = 1,
+) -> Recording:
+    """Return the aircraft of data blocks, see `read_asterix`.
+
+    Times count from the day's midnight, or in UTC where an instant near the first record is known.
+    """
+    records, warnings = _records(Path(problems.path), data)
+    problems.of = "record"
+    day_s = 0.0
+    if of_day_s is not None and records:
+        day_s = DAY_S * round((of_day_s - records[0].time_s) / DAY_S)
     names = _names(records)
     kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
@@ -95,8 +120,9 @@ def read_asterix(
     table = SampleTable(
         problems, ("name", *headers), 0, cells, optional=_MOVES, gaps=True,
         instead={} if altitude else {"alt": "alt instead"}, rows="records",
+        least=least,
     )  # fmt: skip
-    table.warnings += warnings
+    table.notes.warnings += warnings
     rows: dict[tuple[object, ...], dict[float, int]] = {}
     samples: dict[int, list[str]] = {}
     for k, record in enumerate(records):
@@ -117,7 +143,11 @@ def read_asterix(
         problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
     if ownship is None and _OWNSHIP in names.values():
         ownship = _OWNSHIP
-    return table.finish(ownship, lambda columns: {**columns, **enu_velocity(columns)})
+    return table.recording(
+        ownship,
+        lambda columns: {**columns, **enu_velocity(columns), "time": columns["time"] + day_s},
+        kind="ASTERIX", units="the units of its items", height=" or ".join(kinds),
+    )  # fmt: skip
 
 
 _AIRCRAFT = (SYSTEM_TRACKS, ADS_B)
@@ -151,7 +181,11 @@ def read_asterix_plots(
     UsageError
         The extra ``asterix`` is not installed.
     """
-    records, notes = _records(path)
+    try:
+        data = read_input_bytes(Path(path))
+    except InputFileError as error:
+        raise TrafficFileError(str(path), [str(error)]) from None
+    records, notes = _records(Path(path), data)
     radars = sorted({_source(r) for r in records if r.category == PLOTS})
     if not radars:
         raise TrafficFileError(str(path), ["there are no plots of a radar (048) in it"])
@@ -223,13 +257,9 @@ def _elevations(
     return np.arcsin(np.clip(sine, -1.0, 1.0))
 
 
-def _records(path: str | PathLike[str]) -> tuple[list[AsterixRecord], list[str]]:
+def _records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
     """Return the records, each once, and what was left out."""
-    try:
-        data = read_input_bytes(Path(path))
-    except InputFileError as error:
-        raise TrafficFileError(str(path), [str(error)]) from None
-    records, notes = read_records(Path(path), data)
+    records, notes = read_records(path, data)
     # What is sent on two addresses is recorded twice.
     once = {(r.category, r.time_s, tuple(r.values.items())): r for r in records}
     if again := len(records) - len(once):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from components.formats.recording import Recording
 from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
@@ -27,8 +28,10 @@ from components.formats.text_rows import (
     cells,
     clean_token,
     did_you_mean,
-    read_lines,
+    each_line,
+    read_content,
     shown_columns,
+    text_of,
     tokens,
 )
 from components.geometry import Vector, enu_to_geodetic, local_axes
@@ -64,6 +67,8 @@ EXTRA_COLUMNS = {
         for name in (*(f"{kind}_{axes}_std" for axes in ("ew", "ns", "en")), f"{kind}z_std")
     },
 }
+#: What such a file is called.
+DAIDALUS = "a file of DAIDALUS"
 # Extras that are no error where they cannot be read: files in the wild hold gaps there.
 _OPTIONAL = frozenset({"yaw", "airspeed"})
 
@@ -86,15 +91,27 @@ def read_daa(
     DAIDALUS are taken, which the notes say. The first aircraft named is the ownship; all that is
     wrong is one `TrafficFileError`.
     """
-    table, columns = _table(path, ("yaw",))
-    notes = table.notes
+    problems = Problems(str(path))
+    text = text_of(read_content(Path(path), problems), problems)
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
+    return record_daa(problems, text, reference).flights()
+
+
+def record_daa(problems: Problems, text: str, reference: tuple[float, float, float]) -> Recording:
+    """Return the aircraft of a `.daa` or `.xyz` file, see `read_daa`."""
+    table, columns = _table(problems, text, ("yaw",))
+    notes = table.notes.harmless
     if "sx" in columns:
         notes.append(
             f"positions are offsets from a reference point, put at latitude {reference[0]:g}, "
             f"longitude {reference[1]:g}, altitude {reference[2]:g} m"
         )
-    return table.finish(None, lambda samples: _geodetic(samples, reference))
+    assumed = next((note for note in notes if note.startswith("there is no row of units")), "")
+    return table.recording(
+        None, lambda samples: _geodetic(samples, reference), kind=DAIDALUS,
+        units=assumed or "those of its row of units",
+        height=columns["sz" if "sx" in columns else "alt"].header,
+    )  # fmt: skip
 
 
 def read_daa_samples(
@@ -105,18 +122,21 @@ def read_daa_samples(
     They are time (s), lat, lon (deg) and alt or sx, sy, sz (m), ve, vn, vu (m/s) where there are
     velocities, and `extra` of its columns.
     """
-    table, _ = _table(path, extra)
+    problems = Problems(str(path))
+    text = text_of(read_content(Path(path), problems), problems)
+    table, _ = _table(problems, text, extra)
     return {
         name: {**samples, **enu_velocity(samples)} for name, samples in table.samples(None).items()
     }
 
 
 def _table(
-    path: str | PathLike[str], extra: Sequence[str]
+    problems: Problems, text: str, extra: Sequence[str]
 ) -> tuple[SampleTable, dict[str, SampleColumn]]:
     """Read a file's rows into a table of samples, not checked yet against each other."""
-    problems = Problems(str(path))
-    lines = read_lines(Path(path), problems)
+    lines = [one for one in each_line(text) if not one[1].lstrip().startswith("#")]
+    if not lines:
+        problems.fail("the file is empty: a row of column names and rows of samples are needed")
     header_line, header_text = lines[0]
     headers = tokens(header_text)
     indices = _find_columns(problems, headers, header_line, extra)
@@ -133,7 +153,7 @@ def _table(
         factor = unit_factor(problems, spec, token, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
     table = SampleTable(problems, headers, indices["name"], columns, optional=_OPTIONAL)
-    table.notes[:0] = notes
+    table.notes.harmless[:0] = notes
     for number, text in body:
         table.add_row(number, cells(text, len(headers), indices["name"]))
     return table, columns

@@ -12,6 +12,7 @@ import numpy as np
 
 from components.arguments.units import FOOT_M
 from components.flights.point_mass import DYNAMICS
+from components.well_clear.plane_pairs import PairPaths
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 EVENTS, TRACKS = "events", "tracks"
@@ -37,7 +38,7 @@ class EncounterSet:
     `starts` (rows + 1,). `state` holds `STATE` of sets of events, `lists` the `LISTS` of the kind,
     `extra` (n,) geometry and classes as far as the file gives them. The origin is at
     `reference_deg` (latitude, longitude); altitudes are above the ellipsoid. `skipped` damaged
-    encounters were left out.
+    encounters were left out; `notes` say what was done to a file's rows.
     """
 
     source: str
@@ -52,6 +53,7 @@ class EncounterSet:
     reference_deg: tuple[float, float] = (0.0, 0.0)
     extra: dict[str, AnyArray] = field(default_factory=dict)
     skipped: int = 0
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -133,13 +135,18 @@ def flown_events(
     altitude (instants, aircraft) in m.
     """
     whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
-    state = {name: np.array([s.state[name][row] for s, row in aircraft]) for name in STATE}
+    state = {name: np.empty(len(aircraft)) for name in STATE}
     commands = np.empty((3, len(whole), len(aircraft)))
-    for column, (of, row) in enumerate(aircraft):
-        start, end = of.starts[row], of.starts[row + 1]
-        at = start + np.searchsorted(of.lists["time_s"][start:end], whole, side="right") - 1
+    columns_of: dict[int, list[int]] = {}
+    for column, (of, _) in enumerate(aircraft):
+        columns_of.setdefault(id(of), []).append(column)
+    for columns in columns_of.values():
+        of, rows = aircraft[columns[0]][0], np.array([aircraft[column][1] for column in columns])
+        for name, values in state.items():
+            values[columns] = of.state[name][rows]
+        at = of.starts[rows] + _begun(of, rows, len(whole)) - 1
         for k, name in enumerate(LISTS[EVENTS][1:]):
-            commands[k, :, column] = of.lists[name][at]
+            commands[k][:, columns] = of.lists[name][at]
     climb, turn, acceleration = commands
     flown = DYNAMICS[dynamics](
         state["altitude_m"] / FOOT_M,
@@ -156,6 +163,50 @@ def flown_events(
         state["east_m"] + flown.east_ft * FOOT_M,
         flown.up_ft * FOOT_M,
     )
+
+
+#: Pairs whose paths are flown together.
+_PAIRS_AT_ONCE = 256
+
+
+def pair_paths(
+    encounters: Sequence[tuple[EncounterSet, int]], dynamics: str
+) -> Iterator[tuple[IntArray, PairPaths]]:
+    """Give the paths of ownships and intruders in blocks of pairs, and of which encounter each is.
+
+    Encounters are a set and an index there; of an encounter the intruders are in order.
+    """
+    alike: dict[tuple[int, int], list[tuple[int, EncounterSet, int, int]]] = {}
+    for number, (of, index) in enumerate(encounters):
+        if of.kind == TRACKS:
+            for time_s, own, other in of.together(index):
+                paths = PairPaths(time_s, own[:, :, np.newaxis], other[:, :, np.newaxis])
+                yield np.array([number]), paths
+            continue
+        first, end = of.first_rows[index : index + 2].tolist()
+        for row in range(first + 1, end):
+            lasts = of.seconds(first), of.seconds(row)
+            alike.setdefault(lasts, []).append((number, of, first, row))
+    for pairs in alike.values():
+        for start in range(0, len(pairs), _PAIRS_AT_ONCE):
+            some = pairs[start : start + _PAIRS_AT_ONCE]
+            one = flown_events([(of, row) for _, of, row, _ in some], dynamics)
+            two = flown_events([(of, row) for _, of, _, row in some], dynamics)
+            shorter = min(len(one[0]), len(two[0]))
+            own_m, other_m = (np.array(each[1:])[:, :shorter] for each in (one, two))
+            paths = PairPaths(one[0][:shorter], own_m, other_m)
+            yield np.array([pair[0] for pair in some]), paths
+
+
+def _begun(of: EncounterSet, rows: IntArray, seconds: int) -> IntArray:
+    """Return how many events of each row have begun by each whole second, (seconds, rows)."""
+    lengths = np.diff(of.starts)[rows]
+    time_s = of.lists["time_s"][_runs(of.starts[rows], lengths)]
+    first = np.clip(np.ceil(time_s), 0.0, float(seconds)).astype(np.int64)
+    column = np.repeat(np.arange(len(rows)), lengths)
+    marks = np.bincount(first * len(rows) + column, minlength=(seconds + 1) * len(rows))
+    begun: IntArray = marks.reshape(-1, len(rows))[:seconds].cumsum(axis=0)
+    return begun
 
 
 def _runs(firsts: IntArray, lengths: IntArray) -> IntArray:

@@ -10,151 +10,103 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from itertools import chain
+from typing import Any
 
 from components.arguments.units import FOOT_M, KNOT_M_S
-from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
-from components.formats.sample_table import SampleTable
-from components.formats.text_rows import Problems, TrafficFile, lines_of
+from components.formats.reports import Log, Report
+from components.formats.text_rows import Problems, lines_of
 
 _FPM = FOOT_M / 60.0
 #: How old a velocity message of SBS may be beside a position, s.
 _LASTS_S = 3.0
 
 
-class _Sample(NamedTuple):
-    """One report: a number each, or what stands in its place; in SI units, degrees."""
-
-    name: str
-    time: Any
-    lat: Any = None
-    lon: Any = None
-    geometric: Any = None
-    barometric: Any = None
-    trk: Any = None
-    gs: Any = None
-    vs: Any = None
+Reports = Iterator[tuple[int, Report]]
 
 
-def read_log(
-    problems: Problems, data: bytes, ownship: str | None, altitude: Altitude | None
-) -> TrafficFile | None:
-    """Return the aircraft of a log, or None where the content is none that is known here.
-
-    The ownship is the first aircraft unless its address or its callsign is given. Heights are
-    pressure altitudes, of an aircraft that reports none its geometric height; with `altitude`,
-    those of that kind alone. Aircraft of one report are there at that instant only. All that is
-    wrong is one `TrafficFileError`.
-    """
-    found = _recognised(problems, data)
-    if found is None:
-        return None
-    said, samples, callsigns = found
-    kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
-    heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
-    keys = ("time", "lat", "lon", *heights, "trk", "gs", "vs")
-    headers = ("time", "lat", "lon", *(f"{kind} altitude" for kind in kinds), "track", "speed",
-               "climb rate")  # fmt: skip
-    columns = {
-        key: SampleColumn(k + 1, header, 1.0)
-        for k, (key, header) in enumerate(zip(keys, headers, strict=True))
-    }
-    table = SampleTable(
-        problems, ("name", *headers), 0, columns, optional=("trk", "gs", "vs"), gaps=True,
-        instead={} if altitude else {"alt": "alt instead"}, rows="reports", least=1,
-    )  # fmt: skip
-    table.notes.append(f"read as {said}")
-    for number, one in samples:
-        two = {"geometric": one.geometric, "barometric": one.barometric}
-        cells = (
-            one.time,
-            one.lat,
-            one.lon,
-            *(two[kind] for kind in kinds),
-            one.trk,
-            one.gs,
-            one.vs,
-        )
-        table.add_row(number, [one.name, *map(_cell, cells)])
-    named = [name for name, callsign in callsigns.items() if callsign == ownship]
-    if len(named) == 1:
-        ownship = named[0]
-    return table.finish(ownship, lambda c: {**c, **enu_velocity(c)})
-
-
-def _cell(value: Any) -> str:
-    """Return a number as a cell; whatever is none, ``"ground"`` for an altitude say, is missing."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return ""
-    return repr(value)
-
-
-_Samples = Iterator[tuple[int, _Sample]]
-_Found = tuple[str, _Samples, dict[str, str]]
-
-
-def _recognised(problems: Problems, data: bytes) -> _Found | None:
-    """Return what a log is called, its samples with their lines, and the callsigns of aircraft."""
+def log_of(problems: Problems, data: bytes) -> Log | None:
+    """Return the log that some content is, or None where it is none that is known here."""
     head = data[:3].lstrip(b"\xef\xbb\xbf") + data[3:4096]
     head = head.lstrip()
+    callsigns: dict[str, str] = {}
     if head.startswith((b"MSG,", b"SEL,", b"ID,,", b"AIR,", b"STA,", b"CLK,")):
-        callsigns: dict[str, str] = {}
-        return "BaseStation (SBS-1) messages", _of_sbs(problems, data, callsigns), callsigns
+        reports = _of_sbs(problems, data, callsigns)
+        return Log("BaseStation (SBS-1) messages", _FEET, reports, callsigns)
     if not head.startswith((b"{", b"[")):
         return None
-    documents = _documents(problems, data)
-    callsigns = {}
-    for marks, said, reader in _JSON:
-        if all(isinstance(one, dict) and marks <= one.keys() for _, one in documents):
-            return said, _each(problems, documents, reader, callsigns), callsigns
-    problems.fail(
-        "is JSON of no known kind: an aircraft.json or trace_full of readsb, or OpenSky's states "
-        "are needed (the keys now and aircraft, icao and trace, or time and states)"
-    )
+    documents = json_documents(problems, data)
+    first = next(documents)
+    for marks, said, units, reader in _JSON:
+        if isinstance(first[1], dict) and marks <= first[1].keys():
+            reports = _each(problems, chain([first], documents), marks, reader, callsigns)
+            return Log(said, units, reports, callsigns)
+    return None
 
 
-def _documents(problems: Problems, data: bytes) -> list[tuple[int, Any]]:
-    """Return a JSON document, or those of all lines, with the lines in which they begin."""
-    try:
-        return [(1, json.loads(data))]
-    except (ValueError, RecursionError) as error:
-        first = error
-    found = []
-    for number, line in lines_of(data, problems):
+UNKNOWN_JSON = (
+    "is JSON of no known kind: an aircraft.json or trace_full of readsb, OpenSky's states (the "
+    "keys now and aircraft, icao and trace, or time and states), or records with the columns of a "
+    "table are needed"
+)
+
+
+def json_documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]:
+    """Give a JSON document, or those of all lines, with the lines in which they begin."""
+    lines = lines_of(data, problems)
+    for number, line in lines:
         try:
-            found.append((number, json.loads(line)))
-        except (ValueError, RecursionError):
-            problems.fail(f"is no JSON that can be read: {first}", line=number)
-    return found
+            document = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            if number != lines[0][0]:
+                problems.fail(f"is no JSON that can be read: {error}", line=number)
+            break
+        yield number, document
+    else:
+        return
+    try:
+        yield 1, json.loads(data)
+    except (ValueError, RecursionError) as error:
+        problems.fail(f"is no JSON that can be read: {error}", line=lines[0][0])
 
 
-_Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[_Sample]]
+_Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[Report]]
 
 
 def _each(
-    problems: Problems, documents: list[tuple[int, Any]], reader: _Reader, callsigns: dict[str, str]
-) -> _Samples:
-    """Give the samples of documents; a position that is still the last one is given once."""
-    last: dict[str, _Sample] = {}
+    problems: Problems,
+    documents: Iterator[tuple[int, Any]],
+    marks: frozenset[str],
+    reader: _Reader,
+    callsigns: dict[str, str],
+) -> Reports:
+    """Give the reports of documents; a position that is still the last one is given once."""
+    last: dict[str, Report] = {}
     for number, one in documents:
+        if not isinstance(one, dict) or not marks <= one.keys():
+            problems.fail(UNKNOWN_JSON, line=number)
         try:
             for sample in reader(one, callsigns):
                 before = last.get(sample.name)
                 if before is None or not _is_again(sample, before):
-                    if _cell(sample.geometric) or _cell(sample.barometric):
+                    if _is_number(sample.geometric) or _is_number(sample.barometric):
                         last[sample.name] = sample
                     yield number, sample
-        except (TypeError, ValueError, LookupError, AttributeError) as error:
+        except (TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
             problems.fail(
                 f"is not as its keys promise ({type(error).__name__}: {error})", line=number
             )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 #: Ages of positions are rounded, so that one position comes at slightly different times, s.
 _ROUNDED_S = 0.25
 
 
-def _is_again(sample: _Sample, before: _Sample) -> bool:
+def _is_again(sample: Report, before: Report) -> bool:
     """Tell whether two reports are of one position."""
     return (sample.lat, sample.lon) == (before.lat, before.lon) and (
         sample.time == before.time or abs(sample.time - before.time) <= _ROUNDED_S
@@ -169,14 +121,14 @@ def _less(time_s: Any, age_s: Any) -> Any:
     return time_s - age_s if isinstance(age_s, int | float) else time_s
 
 
-def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[_Sample]:
+def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
     """Give the aircraft of an ``aircraft.json``, when their positions were received."""
     for craft in one["aircraft"]:
         name = str(craft["hex"])
         if craft.get("flight"):
             callsigns[name] = str(craft["flight"]).strip()
         climb = craft.get("geom_rate", craft.get("baro_rate", craft.get("vert_rate")))
-        yield _Sample(
+        yield Report(
             name, _less(one["now"], craft.get("seen_pos", craft.get("seen"))),
             craft.get("lat"), craft.get("lon"), _times(craft.get("alt_geom"), FOOT_M),
             _times(craft.get("alt_baro", craft.get("altitude")), FOOT_M), craft.get("track"),
@@ -188,7 +140,7 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
 _GEOMETRIC = 8
 
 
-def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[_Sample]:
+def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
     """Give the points of a trace: seconds after its timestamp, position, altitude, and more."""
     name = str(one["icao"])
     for point in one["trace"]:
@@ -198,31 +150,32 @@ def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[_Sa
             alt, geometric = None, alt
         if isinstance(more, dict) and more.get("flight"):
             callsigns[name] = str(more["flight"]).strip()
-        yield _Sample(
+        yield Report(
             name, one["timestamp"] + after_s, lat, lon, _times(geometric, FOOT_M),
             _times(alt, FOOT_M), trk, _times(gs, KNOT_M_S), _times(climb, _FPM),
         )  # fmt: skip
 
 
-def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[_Sample]:
+def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
     """Give OpenSky's state vectors, at the instants of their positions."""
     for state in one["states"] or ():
         name, callsign, _, time_s, _, lon, lat, barometric, _, gs, trk, climb = state[:12]
         if callsign:
             callsigns[name] = str(callsign).strip()
         geometric = state[13] if len(state) > 13 else None
-        yield _Sample(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
+        yield Report(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
 
 
 #: By the keys that a document has: what it is called, and what reads it.
-_JSON: tuple[tuple[frozenset[str], str, _Reader], ...] = (
-    (frozenset({"now", "aircraft"}), "aircraft.json of readsb, ft and kt", _of_aircraft),
-    (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb, ft and kt", _of_trace),
-    (frozenset({"time", "states"}), "OpenSky's states, m and m/s", _of_states),
+_FEET = "ft and kt"
+_JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
+    (frozenset({"now", "aircraft"}), "aircraft.json of readsb", _FEET, _of_aircraft),
+    (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
+    (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
 )
 
 
-def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> _Samples:
+def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
     """Join the messages of each aircraft: positions with the last velocity, if it is recent."""
     moves: dict[str, tuple[float, tuple[Any, ...]]] = {}
     for number, line in lines_of(data, problems):
@@ -243,7 +196,7 @@ def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> _Samp
             continue
         at, move = moves.get(name, (-math.inf, ()))
         recent = move if abs(time_s - at) <= _LASTS_S else (None,) * 3
-        yield number, _Sample(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
+        yield number, Report(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
 
 
 def _instant(date: str, clock: str) -> float | None:

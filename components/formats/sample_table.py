@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.flights.sampled_flight import SampledTrajectory
+from components.formats.recording import Notes, Recording, told_apart
 from components.formats.sample_columns import SampleColumn, is_missing
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -25,16 +25,13 @@ _LIMITS = {
     "sy": (-4e6, 4e6, "lie within ±4,000 km"),
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
-# A file in which no aircraft is seen for longer than this has a wrong time in it: a run would
-# simulate the years in between.
+# A file in which no aircraft is seen for longer has a wrong time in it: a run would last years.
 _LONGEST_SILENCE_S = 86400.0
 
 #: A pressure altitude differs by less from a height in the weather of most days.
 _FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
-# No aircraft, and no spacecraft, flies so far from one sample to the next, m/s.
-_FASTEST_MPS = 1e6
 
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
@@ -54,7 +51,10 @@ class SampleTable:
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
     `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
-    `parse_time` reads a time cell where a plain number will not do.
+    With `shared` names several aircraft may have one (`told_apart`). Where a position `repeats`
+    until the next one comes, its height need not be the same. That an aircraft has none of a
+    `seldom` column is not worth a word. `parse_time` reads a time cell where a plain number will
+    not do.
     """
 
     def __init__(
@@ -67,20 +67,22 @@ class SampleTable:
         optional: Collection[str] = (),
         *,
         gaps: bool = False,
+        shared: bool = False,
         instead: Mapping[str, str] | None = None,
         rows: str = "rows",
         least: int = 2,
+        seldom: Collection[str] = (),
+        repeats: bool = False,
     ) -> None:
-        self._kind_of_rows, self._least = rows, least
+        self._repeats = repeats
+        self._kind_of_rows, self._least, self._seldom = rows, least, frozenset(seldom)
+        self._shared = shared
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
         self._parse_time, self._gaps = parse_time, gaps
         self._aircraft: dict[str, _Rows] = {}
-        #: Harmless ones; what was left out or taken for something else is in `warnings`.
-        self.notes: list[str] = []
-        self.warnings: list[str] = []
-        self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
+        self.notes = Notes()
         self._apart: dict[str, list[tuple[float, str]]] = {}
         self._second: dict[str, list[str]] = {}
         self._width = len(headers)
@@ -90,7 +92,7 @@ class SampleTable:
         ]
         used = {name_column, *(column.index for column in columns.values())}
         if ignored := [header for i, header in enumerate(headers) if i not in used]:
-            self.notes.append(f"columns ignored: {', '.join(ignored)}")
+            self.notes.harmless.append(f"columns ignored: {', '.join(ignored)}")
 
     def add_row(self, line: int, row: list[str] | int) -> None:
         """Add a sample, or note what is wrong; a row may be the number of its cells alone."""
@@ -123,6 +125,25 @@ class SampleTable:
             for column, value in zip(rows.values.values(), numbers, strict=True):
                 column.append(value)
 
+    def add_numbers(self, line: int, name: str, values: Sequence[float]) -> None:
+        """Add a sample of numbers in the order of the columns, NaN where there is none."""
+        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+        if not name:
+            self._problems.add("the aircraft has no name", line=line)
+            return
+        for k, ((quantity, _, _, low, high), value) in enumerate(
+            zip(self._plan, values, strict=True)
+        ):
+            if low <= value <= high or value != value:
+                continue
+            if quantity not in self._optional:
+                self._number(line, quantity, self._columns[quantity], repr(value))
+                return
+            values = [*values[:k], math.nan, *values[k + 1 :]]
+        rows.lines.append(line)
+        for column, value in zip(rows.values.values(), values, strict=True):
+            column.append(value)
+
     def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
         """Return what a cell means that is no plain number: NaN for none, None for a problem."""
         if quantity in self._optional:
@@ -131,38 +152,25 @@ class SampleTable:
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
 
-    def note_of(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
-        """Note what holds of one aircraft; of those of a kind the first is told, and how many."""
-        cases = self._of_aircraft.setdefault((kind, harmless), [])
-        if f"{name}: {text}" not in cases[-1:]:
-            cases.append(f"{name}: {text}")
+    def of_second(self, key: str) -> int | None:
+        """Return how many aircraft have the second column of two; None for all of them."""
+        whom = len(self._second.get(key, []))
+        return None if whom and whom >= self._kept else whom
+
+    def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
+        """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
+        samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
+        return Recording(self._problems, samples, self.notes, **said)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
         """Check each aircraft's samples and make the trajectories."""
-        samples = self.samples(ownship)
-        own = next(iter(samples))
-        start = min(float(columns["time"][0]) for columns in samples.values())
-        made = {}
-        for name, columns in samples.items():
-            columns["time"] = elapsed_times(columns["time"], start)
-            geodetic = to_geodetic(columns)
-            made[name] = self._trajectory(name, geodetic)
-            if (speed_mps := made[name].max_speed_mps) > _FASTEST_MPS:
-                self._problems.add(
-                    f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
-                    f"most {_FASTEST_MPS:g} m/s can be meant"
-                )
-        self._problems.raise_if_any()
-        intruders = [trajectory for name, trajectory in made.items() if name != own]
-        for (_, harmless), cases in self._of_aircraft.items():
-            more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
-            (self.notes if harmless else self.warnings).append(cases[0] + more)
-        notes = [*self.notes, *self.warnings]
-        return TrafficFile(made[own], intruders, start, notes, self.warnings)
+        return self.recording(ownship, to_geodetic).flights()
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
         """Check each aircraft's samples and return them as columns, in the order of time."""
         kept = self._without_gaps()
+        if self._shared:
+            kept = told_apart(kept, self.notes)
         names = list(kept)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
@@ -188,22 +196,27 @@ class SampleTable:
         kept = {}
         left_out, absent = 0, 0
         for name, rows in self._aircraft.items():
-            lines = np.array(rows.lines)
-            columns = {key: np.array(values) for key, values in rows.values.items()}
+            lines = np.asarray(rows.lines)
+            columns = {key: np.asarray(values) for key, values in rows.values.items()}
+            rows.values.clear()  # those of many rows are not held beside what is kept of them
             for key, other in self._instead.items():
                 columns[key] = self._one_of_two(name, key, columns[key], columns.pop(other))
             there = np.ones(len(lines), dtype=bool)
             for key in columns.keys() - self._optional:
                 there &= ~np.isnan(columns[key])
             left_out += int(np.count_nonzero(~there))
-            lines = lines[there]
-            columns = {key: values[there] for key, values in columns.items()}
+            if not there.all():
+                lines = lines[there]
+                columns = {key: values[there] for key, values in columns.items()}
             if len(lines) == 0 and not there.all():
                 absent += 1
                 continue
             for key in sorted(self._optional & columns.keys()):
                 if missing := int(np.count_nonzero(np.isnan(columns[key]))):
-                    self.note_of(
+                    if missing == len(lines) and key in self._seldom:
+                        del columns[key]
+                        continue
+                    self.notes.of_one(
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "
                         f"{len(columns[key])} samples and is ignored",
@@ -211,11 +224,12 @@ class SampleTable:
                     )  # fmt: skip
                     del columns[key]
             kept[name] = lines, columns
+        self._kept = len(kept)
         self._note_second_columns()
         if left_out:
             of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
             what = f"{left_out} {of} left out that had no time or no position"
-            self.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
+            self.notes.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
         return kept
 
     def _one_of_two(self, name: str, key: str, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -235,18 +249,18 @@ class SampleTable:
             first, second = self._columns[key].header, self._columns[other].header
             if whom := self._second.get(key, []):
                 if len(whom) == len(self._aircraft):
-                    self.notes.append(f"{second} is read: there is no {first}")
+                    self.notes.harmless.append(f"{second} is read: there is no {first}")
                 else:
                     more = f" (and {len(whom) - 1} more aircraft)" if len(whom) > 1 else ""
                     said = f"{second} is read beside {first} of others: it has no {first}"
-                    self.warnings.append(f"{whom[0]}{more}: {said}")
+                    self.notes.warnings.append(f"{whom[0]}{more}: {said}")
             if apart := self._apart.get(key):
                 most, name = max(apart)
                 said = (
                     f"{first} is read, {second} differs by up to {most:,.0f} m "
                     f"({most / FOOT_M:,.0f} ft, {name})"
                 )
-                (self.warnings if most > _FAR_APART_M else self.notes).append(said)
+                (self.notes.warnings if most > _FAR_APART_M else self.notes.harmless).append(said)
 
     def _number(self, line: int, quantity: str, column: SampleColumn, cell: str) -> float | None:
         try:
@@ -291,19 +305,21 @@ class SampleTable:
             return {}
         order = np.argsort(columns["time"], kind="stable")
         if np.any(order[1:] < order[:-1]):
-            self.note_of(
+            self.notes.of_one(
                 name,
                 "order",
                 "rows were not in the order of time and have been sorted",
                 harmless=True,
             )
-        lines = lines[order]
-        columns = {key: values[order] for key, values in columns.items()}
-        where = [values for key, values in columns.items() if key not in self._optional]
+            lines = lines[order]
+            columns = {key: values[order] for key, values in columns.items()}
+        apart = self._optional | ({"alt"} if self._repeats else frozenset())
+        where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
         if again.any():
             count = int(np.count_nonzero(again))
-            self.note_of(name, "again", f"{count} of its samples stand there again and count once")
+            said = f"{count} of its samples stand there again and count once"
+            self.notes.of_one(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
         times, header = columns["time"], self._columns["time"].header
@@ -335,62 +351,6 @@ class SampleTable:
                 column=self._columns["time"].header,
             )
 
-    def _trajectory(self, name: str, columns: dict[str, FloatArray]) -> SampledTrajectory:
-        velocity = None
-        if {"ve", "vn", "vu"} <= columns.keys():
-            velocity = (columns["ve"], columns["vn"], columns["vu"])
-        angles: dict[str, Any] = {
-            f"{key}_rad": np.radians(columns[key])
-            for key in ("yaw", "pitch", "roll")
-            if key in columns
-        }
-        trajectory = SampledTrajectory(
-            name,
-            columns["time"],
-            columns["lat"],
-            columns["lon"],
-            columns["alt"],
-            velocity_enu_mps=velocity,
-            **angles,
-        )
-        if trajectory.velocity_was_ignored:
-            self.note_of(
-                name, "velocity",
-                "its velocities do not fit its positions (another unit, or airspeed?) and were "
-                "ignored", harmless=True,
-            )  # fmt: skip
-        if len(columns["time"]) == 1:
-            self.note_of(
-                name,
-                "single",
-                "has one sample only and is there at that instant only",
-                harmless=True,
-            )
-        else:
-            gaps = np.diff(columns["time"])
-            if gaps.max() > max(30.0, 10.0 * float(np.median(gaps))):
-                at = float(columns["time"][int(np.argmax(gaps))])
-                self.note_of(
-                    name, "silence",
-                    f"no sample for {gaps.max():.0f} s after {at:.1f} s; positions there are "
-                    "interpolated",
-                )  # fmt: skip
-        return trajectory
-
 
 def _limits(quantity: str) -> tuple[float, float, str]:
     return _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
-
-
-def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
-    """Subtract the start, and with it the rounding that a large clock reading carries.
-
-    325374.3 - 325374.2 is 0.0999999999767 in doubles. The difference is rounded to the digits
-    that the readings can hold (at most nanoseconds), so that a tenth of a second is the double
-    0.1 and a scan at 0.1 s meets the sample itself.
-    """
-    elapsed = time_s - start_s
-    resolution = float(np.spacing(max(abs(start_s), float(np.abs(time_s).max()))))
-    decimals = min(9, math.floor(-math.log10(4.0 * resolution)))
-    rounded = np.round(elapsed, decimals)
-    return rounded if np.all(np.diff(rounded) > 0.0) else elapsed

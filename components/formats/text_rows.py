@@ -132,6 +132,12 @@ class TrafficFile:
     start_time_s: float
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    #: When what was chosen of it ends.
+    end_s: float | None = None
+    #: What the file is, in which units it says things, and which height was read.
+    kind: str = ""
+    units: str = ""
+    height: str = ""
 
     @property
     def aircraft(self) -> list[SampledTrajectory]:
@@ -142,18 +148,19 @@ class TrafficFile:
 class Problems:
     """Collects what is wrong with one file, to be reported at once.
 
-    Its rows are lines of text, unless `of` calls them something else. The first `most` are listed.
+    Its rows are lines of text, unless `of` calls them something else, which a reader may set. The
+    first `most` are listed.
     """
 
     def __init__(self, path: str, of: str = "line", most: int = MOST_PROBLEMS) -> None:
-        self.path, self._of, self._most = path, of, most
+        self.path, self.of, self._most = path, of, most
         #: Line (infinite for none) and text.
         self._lines: list[tuple[float, str]] = []
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         """Note a problem, with its line and column where it has them."""
-        where = [f"{self._of} {line}"] if line is not None else []
+        where = [f"{self.of} {line}"] if line is not None else []
         where += [f"column {column}"] if column is not None else []
         if len(self._lines) < self._most:
             text = f"{', '.join(where)}: {problem}" if where else problem
@@ -242,22 +249,36 @@ def lines_of(
 ) -> list[tuple[int, str]]:  # fmt: skip
     """Return the lines that hold something, but `comments` on request, numbered from 1.
 
-    Text may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end
-    in LF, CR LF or CR.
+    Text may be as `text_of` says; lines may end in LF, CR LF or CR.
     """
-    text = _decoded(data)
-    if text is None:
-        problems.fail(f"this is a binary file: {needed} is needed")
-    lines = [
-        # Not tabs: one at either end delimits an empty cell.
-        (number, line.strip(" "))
-        for number, line in enumerate(re.split(r"\r\n|\r|\n", text or ""), start=1)
-    ]
-    kept = [(n, line) for n, line in lines if line.strip()]
+    kept = list(each_line(text_of(data, problems, needed)))
     rows = [(n, line) for n, line in kept if not line.lstrip().startswith("#")]
     if not rows:
         problems.fail(f"the file is empty: {holds} are needed")
     return kept if comments else rows
+
+
+def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
+    """Return text in UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1."""
+    text = _decoded(data)
+    if text is None:
+        problems.fail(f"this is a binary file: {needed} is needed")
+    return text
+
+
+_LINE = re.compile(r"[^\r\n]+|\r\n|\r|\n")
+
+
+def each_line(text: str) -> Iterator[tuple[int, str]]:
+    """Give the lines that hold something, numbered from 1, as they are wanted."""
+    number = 1
+    for match in _LINE.finditer(text):
+        line = match[0]
+        if line[0] in "\r\n":
+            number += 1
+        elif line.strip():
+            # Not tabs: one at either end delimits an empty cell.
+            yield number, line.strip(" ")
 
 
 def _decoded(data: bytes) -> str | None:

@@ -23,6 +23,7 @@ from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.record.undone import Tries, has_two
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
@@ -82,6 +83,7 @@ class Fusion(Component):
         #: How long before a detection another one may have come to be put together with it.
         self.keep_ticks = self.gate_ticks
         self._recent: dict[str, Arrivals] = {}
+        self._tries = Tries()
         self._navigation_errs = navigation_errs(self.context)
         self._with_pose = self._navigation_errs or any(
             consumer.request != WITHOUT_POSE for consumer in self.context.consumers
@@ -105,6 +107,12 @@ class Fusion(Component):
             else one.offer
             for one in self.context.producers
         }
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it never put detections of two sensors together."""
+        return self._tries.undone(
+            "two sensors or more detect, and it never puts two of them together", of_two=True
+        )
 
     def window_s(self) -> Any:
         """Return how old a detection may be and still be put together with a new one, s."""
@@ -162,6 +170,9 @@ class Fusion(Component):
         contributors: Any = np.zeros(len(row), dtype=mask_type(len(self.sensors)))
         for index, (rows, _) in every.found.items():
             contributors[rows] |= 1 << index
+        if len(self.sensors) > 1:
+            of_two = has_two(contributors)
+            self._tries = self._tries.with_more(instants.run[row], contributors, of_two)
         angle_source, of_angles = every.best(self.by_angles)
         range_source, of_range = every.best(self.by_range)
         values = {name: every.taken(attrgetter(name), of_angles) for name in _ANGLES}

@@ -29,6 +29,10 @@ class PassThrough(Fusion):
         """Return 0: nothing waits for anything."""
         return 0
 
+    def undone(self) -> dict[str, Any]:
+        """Return nothing: to put nothing together is its work."""
+        return {}
+
     def run(self, wake: Wake) -> FusedDetections | None:
         """Pass on what came at every instant."""
         arrivals = {new.source: new for new in wake.arrivals("detections")}

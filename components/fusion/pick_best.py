@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
+from itertools import combinations
+from math import gcd
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from components.fusion.fusion_block import FUSION_LADDER, Fusion, each_alone, latest_in_gate
+from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.run_ticks import last_of_run, positions_among
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import NonNegativeRational, Parameters
+from dsa_des.block.component import NonNegativeRational, Parameters, Producer
 from dsa_des.block.wake import Arrivals, Wake
 
 
@@ -50,6 +53,20 @@ class PickBest(Fusion):
     def window_s(self) -> Any:
         """Return ``coincidence_s``."""
         return self.p.coincidence_s
+
+    def warnings(self) -> list[str]:
+        """Say that the sensors' reports never come within ``coincidence_s``."""
+        clocks = [clock for one in self.context.producers if (clock := _reports(one)) is not None]
+        if len(clocks) < 2 or len(clocks) < len(self.context.producers):
+            return super().warnings()
+        apart_s = min(least_apart_s(*pair) for pair in combinations(clocks, 2))
+        if apart_s <= self.p.coincidence_s:
+            return super().warnings()
+        return [
+            *super().warnings(),
+            f"coincidence_s is {float(self.p.coincidence_s):g} and no two sensors report less than "
+            f"{float(apart_s):g} s apart: it never puts two of them together",
+        ]
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""
@@ -95,6 +112,29 @@ class PickBest(Fusion):
             entry = np.flatnonzero(false if now is None else false & now[row])
             result[name] = at[row[entry]], entry
         return result
+
+
+def _reports(sensor: Producer) -> tuple[Fraction, Fraction] | None:
+    """Return when a sensor's reports come, first and how often (s); None where that varies."""
+    offer = sensor.offer
+    if not isinstance(offer, SensorOffer) or offer.clock is None:
+        return None
+    clock = offer.clock()
+    if clock.rate_error_ppm or clock.jitter_s or sensor.jitter_s or sensor.unforeseen:
+        return None
+    return clock.offset_s + sensor.latest_s, clock.period_s
+
+
+def least_apart_s(one: tuple[Fraction, Fraction], other: tuple[Fraction, Fraction]) -> Fraction:
+    """Return how near two clocks come to each other, each its first instant and its period, s."""
+    (first_s, period_s), (second_s, other_s) = one, other
+    # Differences of their instants are all those of the offsets and multiples of this.
+    step_s = Fraction(
+        gcd(period_s.numerator * other_s.denominator, other_s.numerator * period_s.denominator),
+        period_s.denominator * other_s.denominator,
+    )
+    apart_s = (second_s - first_s) % step_s
+    return min(apart_s, step_s - apart_s)
 
 
 def _true_entries(new: Arrivals) -> IntArray | None:

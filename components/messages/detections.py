@@ -223,6 +223,16 @@ def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
+def without_range(producers: Iterable[Any]) -> str:
+    """Return who leads to some blocks, where no sensor among them measures range; else nothing."""
+    offers = sensor_offers(producers)
+    if not offers or any(
+        not isinstance(one, SensorOffer) or one.measures_range for one in offers.values()
+    ):
+        return ""
+    return " and ".join(sorted(offers))
+
+
 def pose_column(name: str) -> Any:
     """Declare one of the columns `POSE`, which belong to every detection of the scan."""
     unit, frame, meaning, _ = POSE[name]

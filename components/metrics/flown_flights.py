@@ -12,7 +12,6 @@ from components.messages.steering import Manoeuvre
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     RelativeFlight,
-    prepare_traffic,
     separations,
     traffic_block,
 )
@@ -81,10 +80,16 @@ class FlownMetric(TargetMetric):
         return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in result.items()}
 
     def of_flights(
-        self, group: Group, read: "Read", *, steered: bool = True, to_the_end: bool = False
+        self,
+        group: Group,
+        read: "Read",
+        *,
+        steered: bool = True,
+        to_the_end: bool = False,
+        some: IntArray | None = None,
     ) -> FloatArray:
-        """Return what `read` makes of every replica's flights, (values, replicas)."""
-        runs, run_of = self._flights(group, steered, to_the_end)
+        """Return what `read` makes of the flights of `some` replicas, or all, (values, those)."""
+        runs, run_of = self._flights(group, steered, to_the_end, some)
         return read(runs)[:, run_of]
 
     def of_each_flight(
@@ -105,11 +110,11 @@ class FlownMetric(TargetMetric):
         return names, result[:, run_of]
 
     def _flights(
-        self, group: Group, steered: bool, to_the_end: bool
+        self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
         steering = self.manoeuvres(group) if steered else None
         target = getattr(self.p, "target", None)
-        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end)
+        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end, some=some)
 
 
 #: What is read of runs, each a list of its flights: (values, runs).
@@ -128,22 +133,27 @@ def flights_of(
     steering: Mapping[int, Steering] | None = None,
     *,
     to_the_end: bool = False,
+    some: IntArray | None = None,
 ) -> tuple[list[list[RelativeFlight]], IntArray]:
-    """Return the flights of runs that differ, and which of these each replica is.
+    """Return the flights of runs that differ, and which of these each of `some` replicas is.
 
-    Flights are computed once for all replicas that share them. Distances are taken every `step_s`;
-    None looks between them for losses. A target of None is all of them. The ownship of a replica
-    flies as `steering` says, if anything. A run that ended early is looked at `to_the_end` of it,
-    or as long as it was meant to last.
+    All are by default. Flights are computed once for all replicas that share them. Distances are
+    taken every `step_s`; None looks between them for losses. A target of None is all of them. The
+    ownship of a replica flies as `steering` says, if anything. A run that ended early is looked at
+    `to_the_end` of it, or as long as it was meant to last.
     """
     steering = steering or {}
-    block = f"blocks.{traffic_block(group.scene).name}."
+    traffic = traffic_block(group.scene)
+    block = f"blocks.{traffic.name}."
     if any(key.startswith(block) for replica in group.replicas for key in replica.changes):
-        prepare_traffic(group.scenes)
+        cls: Any = traffic.cls
+        cls.prepare(group.parameters_of(traffic.name))
     runs: list[list[RelativeFlight]] = []
     known: dict[Any, int] = {}
+    numbers = range(len(group)) if some is None else some.tolist()
     run_of, steered = np.empty(len(group), dtype=np.int64), []
-    for number, replica in enumerate(group.replicas):
+    for number in numbers:
+        replica = group.replicas[number]
         mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
         until_s = math.inf
         if to_the_end and group.ended_early[number]:
@@ -165,4 +175,4 @@ def flights_of(
     )
     for number, own in zip(steered, flown, strict=True):
         runs[run_of[number]] = [flight.flown_by(own) for flight in runs[run_of[number]]]
-    return runs, run_of
+    return runs, run_of if some is None else run_of[some]

@@ -4,7 +4,7 @@ Nothing here depends on what sensors see; it is read off the traffic block of a 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
@@ -60,12 +60,6 @@ def traffic_block(scene: Scene) -> Block:
             f"needs one block of traffic that knows its flights; this scene has {len(result)}"
         )
     return result[0]
-
-
-def prepare_traffic(scenes: Sequence[Scene]) -> None:
-    """Let traffic make at once what will be asked of it for each of many replicas."""
-    cls: Any = traffic_block(scenes[0]).cls
-    cls.prepare([traffic_block(scene).parameters for scene in scenes])
 
 
 def traffic_of(scene: Scene) -> tuple[Any, float]:

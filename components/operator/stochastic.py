@@ -17,10 +17,11 @@ from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -228,6 +229,11 @@ class Stochastic(Component):
     )  # fmt: skip
     rewindable = True
 
+    @classmethod
+    def may_climb(cls, parameters: StochasticParameters) -> bool:
+        """Return whether it ever commands another altitude."""
+        return parameters.turn_share < 1.0
+
     def setup(self) -> None:
         """Read the configuration; start without an alert."""
         self._configuration, self._alerter = self.p.read()
@@ -236,6 +242,12 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
+        #: How often nothing led out, of how often it was to steer, by run.
+        self._stuck = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often it was to steer, and no change led clear, by run."""
+        return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
@@ -344,6 +356,7 @@ class Stochastic(Component):
                 by_turn[index] = self._draw(mind, self._steering, 0) < self.p.turn_share
                 draws[index] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
         result: dict[int, Manoeuvre] = {}
+        needed: set[int] = set()
         # Who finds no way out by one kind tries the other.
         for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
             for turns in (True, False):
@@ -357,6 +370,7 @@ class Stochastic(Component):
                 for row, changes in zip(rows, every, strict=True):
                     change = 0.0
                     if changes is not None:
+                        needed.add(row)
                         change = steering(changes, turns, draws[row], self.p.goes_beyond)
                     if change != 0.0 and turns:
                         result[row] = self._turn(change, alerts, row)
@@ -364,6 +378,9 @@ class Stochastic(Component):
                         result[row] = Manoeuvre(
                             climb_m=change, climb_rate_mps=self.p.vertical_rate_mps
                         )
+        due = np.array(sorted(needed), dtype=np.int64)
+        stuck = np.array([row not in result for row in due.tolist()], dtype=bool)
+        self._stuck = with_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:

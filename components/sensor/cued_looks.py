@@ -16,6 +16,7 @@ from dsa_des.arrays.column_values import picked
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: The input over which they come.
 PORT = "cues"
@@ -37,6 +38,12 @@ class ConesAhead:
     def __init__(self) -> None:
         #: Of the cones at the scans of one wake: their scan, axis, and cosine of the half angle.
         self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None
+        #: Scans at which all cones had run out, of those that had any.
+        self._old = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return at how many scans no cone counted any more, by run."""
+        return {"the cues that it has are older than their lasts_s": self._old}
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
         """Return which targets lie in a cone at each scan, (scans, targets), or None for none."""
@@ -54,6 +61,10 @@ class ConesAhead:
         entry = np.arange(len(scan)) + (cones.offsets[at] - first)[scan]
         time_s = wake.time_s[scan]
         live = time_s <= cones.until_s[entry]
+        cued = counts > 0
+        old = cued & (np.bincount(scan[live], minlength=len(counts)) == 0)
+        run = wake.run
+        self._old = with_cases(self._old, run[old], run[cued])
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None

@@ -21,7 +21,7 @@ from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import unknown_latency
 from components.tracking.scans import Scans, scans_of, when_made
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
@@ -279,7 +279,7 @@ class StoneSoupTracker(Component):
             in_time = False
             for look, pose in due.get(row, ()):
                 if look.tick[0] < self._newest:
-                    self._count = self._count.of(self._sensors, look.sensors[:0], look.sensors)
+                    self._count = self._count.of(self._sensors, look, slice(0), [0])
                     continue
                 in_time = True
                 here |= {one.number: one for one in self._looked(look, pose, wake)}
@@ -300,7 +300,7 @@ class StoneSoupTracker(Component):
             self._sensors = fused.sensors
             came = scans_of(fused)
             came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
-            self._count = self._count.of(fused.sensors, came.sensors, came.sensors[:0])
+            self._count = self._count.of(fused.sensors, came, slice(None), [])
         elif self._ahead is not None:
             came = self._ahead.take(np.zeros(0, dtype=np.int64))
         else:
@@ -397,6 +397,10 @@ class StoneSoupTracker(Component):
             sensors=self._sensors,
             **moments,
         )  # fmt: skip
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return whose looks came too late."""
+        return self._count.undone()
 
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""

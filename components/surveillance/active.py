@@ -180,6 +180,7 @@ class Active(CooperativeSensor):
     """
 
     Parameters = ActiveParameters
+    hears_of = ("mode_s", "mode_c")
     lockstep = True
     ladders = (REPLIES, MEASUREMENT)
 
@@ -206,7 +207,6 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
-            # One that is far is asked again in as many scans.
             promises=promises_of_looks(
                 period_s, [(math.inf, every * period_s)] if every > 1 else ()
             ),

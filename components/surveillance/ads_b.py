@@ -177,6 +177,7 @@ class AdsB(CooperativeSensor):
     """
 
     Parameters = AdsBParameters
+    hears_of = ("ads_b",)
     lockstep = True
     ladders = (RECEPTION, ERRORS)
 
@@ -207,13 +208,14 @@ class AdsB(CooperativeSensor):
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
         told = (*told, LATE) if any(late or [True]) else told
-        reach_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
-        promises = promises_by_range(self.law, reach_m)
+        far_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
-            promises=promises_of_looks(float(1 / self.p.scan_rate_hz), promises),
+            promises=promises_of_looks(
+                float(1 / self.p.scan_rate_hz), promises_by_range(self.law, far_m)
+            ),
             tells=True, told_errors=told,
         )  # fmt: skip
 

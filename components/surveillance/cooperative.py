@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
+from components.aircraft.known_targets import known_targets
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
@@ -64,11 +65,22 @@ class CooperativeSensor(Sensor):
     turned_by_belief = False
     outputs: ClassVar[Any] = {"detections": Output(CooperativeReports, "What was received.")}
     Parameters: ClassVar[Any] = CooperativeParameters
+    #: What of its equipage lets an aircraft be heard, any of these.
+    hears_of: ClassVar[tuple[str, ...]] = ()
 
     def request(self, port: str) -> Any:
         """Ask for the flights too: messages are sent at instants of their own."""
         reach = super().request(port)
         return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
+
+    def warnings(self) -> list[str]:
+        """Say that no target has what it takes to be heard."""
+        rosters = known_targets(self.context)
+        heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
+        if not rosters or any(heard):
+            return super().warnings()
+        needed = " or ".join(self.hears_of)
+        return [*super().warnings(), f"no target's equipage has {needed}: it hears of nobody"]
 
     @cached_property
     def _reach_from_body(self) -> Reach:

@@ -24,13 +24,19 @@ from components.track_fusion.local_tracks import (
     records_of,
     with_newest,
 )
-from components.track_fusion.track_association import MatchRules, matched, without_strays
+from components.track_fusion.track_association import (
+    MatchRules,
+    leaders,
+    matched,
+    without_strays,
+)
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import last_of_run
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.record.undone import Tries, has_two
 
 # Fused tracks by number: as many as are compared.
 _TRACKS = 64
@@ -145,6 +151,13 @@ class CovarianceIntersection(Component):
         self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
         self._reported = no_fused_tracks()
+        self._tries = Tries()
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it never put tracks of two trackers together."""
+        return self._tries.undone(
+            "two trackers or more have tracks, and it never puts two of them together", of_two=True
+        )
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves, by name."""
@@ -276,6 +289,11 @@ class CovarianceIntersection(Component):
     ) -> KeyedTable:
         """Return what is reported of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))
+        if len(self.trackers) > 1:
+            leader, of = leaders(mine)
+            trackers = np.zeros(len(leader), dtype=np.int64)
+            np.bitwise_or.at(trackers, of, np.int64(1) << mine.tracker)
+            self._tries = self._tries.with_more(mine.replica[leader], trackers, has_two(trackers))
         before = reported.of(replica)
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
         fused = fused_states(mine, when, self._rules.motion, self.p.rule)

@@ -18,6 +18,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 
 class CueParameters(Parameters):
@@ -84,6 +85,13 @@ class Cues(Component):
         #: Of each run, when cues were sent last, and whether there were none.
         self._last_tick: IntArray = np.empty(0, dtype=np.int64)
         self._silent: BoolArray = np.empty(0, dtype=bool)
+        #: Tracks whose cone would be too wide, of how many.
+        self._wide = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how many tracks were too uncertain to cue, by run."""
+        what = f"a track's cone is wider than most_half_angle_deg ({self.p.most_half_angle_deg:g})"
+        return {f"{what} and cues none": self._wide}
 
     def run(self, wake: Wake) -> CueCones | None:
         """Send the cones of the tracks at every instant at which they are due."""
@@ -140,6 +148,8 @@ class Cues(Component):
         half = np.maximum(half, math.radians(self.p.least_half_angle_deg))
         kept = half <= math.radians(self.p.most_half_angle_deg)
         row = tracks.row_of_entries[entry]
+        run = tracks.run[row]
+        self._wide = with_cases(self._wide, run[~kept], run)
         return row[kept], entry[kept], half[kept]
 
     def _message(

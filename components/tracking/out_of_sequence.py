@@ -26,6 +26,7 @@ from components.tracking.track_store import TrackStore
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
+from dsa_des.record.undone import NO_COUNTS, with_cases
 from dsa_des.time.clock import ClockSpec
 
 
@@ -229,22 +230,38 @@ def warning(name: str, share: float, why: str) -> str:
 class LookCount:
     """Counts of each sensor's looks, and of those that came too late."""
 
-    # Both by name of the sensor
-    came: Mapping[str, int] = field(default_factory=dict)
-    left_out: Mapping[str, int] = field(default_factory=dict)
+    #: By name of the sensor: of each run those left out, and all (2, runs).
+    counts: Mapping[str, IntArray] = field(default_factory=dict)
 
-    def of(self, sensors: tuple[str, ...], came: IntArray, left_out: IntArray) -> "LookCount":
-        """Return the count with more looks, each a mask of its sensors."""
-        counts = (
-            {n: known.get(n, 0) + int((masks >> i & 1).sum()) for i, n in enumerate(sensors)}
-            for known, masks in ((self.came, came), (self.left_out, left_out))
+    def of(
+        self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
+    ) -> "LookCount":
+        """Return the count with more of some looks: those that came, and those left out."""
+
+        def runs_of(some: slice | IntArray | list[int], sensor: int) -> IntArray:
+            return looks.run[some][(looks.sensors[some] >> sensor & 1).astype(bool)]
+
+        return LookCount(
+            {
+                name: with_cases(
+                    self.counts.get(name, NO_COUNTS), runs_of(left_out, i), runs_of(came, i)
+                )
+                for i, name in enumerate(sensors)
+            }
         )
-        return LookCount(*counts)
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how many looks of each sensor came too late, of how many, by run."""
+        return {
+            f"a look of {name} comes too late and is left out": counts
+            for name, counts in sorted(self.counts.items())
+        }
 
     def late(self) -> dict[str, dict[str, float]]:
         """Return looks, those left out and their share, by sensor; of those that lost any."""
+        both = {name: of.sum(axis=1).tolist() for name, of in sorted(self.counts.items())}
         return {
-            name: {"looks": self.came[name], "left_out": lost, "share": lost / self.came[name]}
-            for name, lost in sorted(self.left_out.items())
+            name: {"looks": looks, "left_out": lost, "share": lost / looks}
+            for name, (lost, looks) in both.items()
             if lost
         }

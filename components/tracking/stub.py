@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.columns import POSE
-from components.messages.detections import sensor_offers
+from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
@@ -20,6 +20,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import Tries
 
 #: How often what has grown too old is looked for, s.
 _ACTS_EVERY_S = Fraction(1, 2)
@@ -70,6 +71,18 @@ class TrackerStub(Component):
         self._nothing: FusedDetections | None = None
         #: What each run holds of each target.
         self._held = KeyedTable.empty(types)
+        self._tries = Tries()
+
+    def offer(self, port: str) -> Any:
+        """Say which sensors measure range, of what they say of themselves."""
+        return {
+            name: SensorOffer(one.measures_range, 0.0) if isinstance(one, SensorOffer) else None
+            for name, one in sensor_offers(self.context.producers).items()
+        }
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return in which runs it heard of nobody but false alarms."""
+        return self._tries.undone("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often what has grown too old is looked for, s."""
@@ -122,6 +135,9 @@ class TrackerStub(Component):
         counts = np.zeros(len(wake), dtype=np.int64)
         if fused is None:
             return None, counts
+        if busy is not None and len(fused.target):
+            run = busy.run[fused.row_of_entries]
+            self._tries = self._tries.with_more(run, np.ones_like(run), fused.target >= 0)
         fused = true_entries(fused)
         if self.p.drop_after_s is not None:
             self._nothing = fused.take(slice(0, 0))

@@ -1,5 +1,6 @@
 """The base class of trackers that estimate states: parameters, memory, and the order of looks."""
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +12,7 @@ from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import DELETED, StateTracks
+from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.ladder import LADDERS
@@ -39,6 +40,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import Tries
 
 _NO_ROWS = np.empty(0, dtype=np.int64)
 #: Bits of a mask of sensors.
@@ -115,6 +117,7 @@ class Tracker(Component):
         # Where nothing can come late there is nothing to remember, whatever `late` says.
         self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
+        self._tries = Tries()
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often tracks are looked through that nothing comes of, s."""
@@ -146,8 +149,20 @@ class Tracker(Component):
         return super().warnings() + result
 
     def offer(self, port: str) -> Any:
-        """Hand on what the sensors say of themselves, by name."""
-        return sensor_offers(self.context.producers)
+        """Hand on what the sensors say of themselves; with ranges where directions give them."""
+        offers = sensor_offers(self.context.producers)
+        if self.p.passive_range_share is None:
+            return offers
+        return {
+            name: replace(one, measures_range=True) if isinstance(one, SensorOffer) else one
+            for name, one in offers.items()
+        }
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return whose looks came too late, and in which runs no track was confirmed."""
+        return self._count.undone() | self._tries.undone(
+            "detections came, and no track was ever confirmed"
+        )
 
     def left_out(self) -> list[str]:
         """Say whose range rates are not used, and why."""
@@ -220,7 +235,7 @@ class Tracker(Component):
             plan, left_out, kept = plan_of_late(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
-        self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
+        self._count = self._count.of(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
@@ -256,8 +271,8 @@ class Tracker(Component):
                     LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
-                late_sensors = scans.sensors[plan.look[late[gone]]]
-                self._count = self._count.of(fused.sensors, late_sensors[:0], late_sensors)
+                too_late = plan.look[late[gone]]
+                self._count = self._count.of(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)
@@ -282,7 +297,20 @@ class Tracker(Component):
         self._store = store
         if self._remembers:
             self._past = Past.of(scans, kept, before, waiting)
+        self._note(came, reported)
         return reported, rows
+
+    def _note(self, came: Scans, reported: list[TrackStore]) -> None:
+        """Note in which runs something was detected, and a track confirmed."""
+        detected = came.run[np.diff(came.offsets) > 0]
+        self._tries = self._tries.with_more(
+            detected, np.ones_like(detected), np.zeros(len(detected), dtype=bool)
+        )
+        for part in reported:
+            sure = part.replica[part.status == CONFIRMED]
+            self._tries = self._tries.with_more(
+                sure, np.ones_like(sure), np.ones(len(sure), dtype=bool)
+            )
 
     def _remember(
         self,

@@ -1,163 +1,183 @@
-"""Recorded traffic: flights read from files of DAIDALUS, CSV tables and ASTERIX."""
+"""Recorded traffic in files of any known kind (``traffic.file``), with an own flight among it.
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from fractions import Fraction
+``traffic.daa_file`` reads those of DAIDALUS alone.
+"""
+
+import math
 from pathlib import Path
-from typing import Any
+from typing import Self
 
-import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from components.aircraft.aircraft import Aircraft, Roster
-from components.aircraft.equipage import EquipageShares, with_shares
-from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
-from components.flights.closest_approach import KnownTimes, SampleTimes
-from components.flights.sampled_flight import SampledFleet, SampledTrajectory
-from components.formats.asterix_file import read_asterix
-from components.formats.csv_file import read_csv
+from components.flights.fleet import Trajectory
 from components.formats.daa_file import read_daa
+from components.formats.recorded.traffic_of_files import Choice, read_traffic
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
-from components.geometry import line_of_sight_ned
-from components.traffic.source import SourceParameters, TrafficSource, roster_of
-from components.traffic.wind_effect import CrabAngles
-from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import ScenePath
-from dsa_des.files.input_files import read_once
-
-#: Beyond any aircraft: m/s along the path and upward, m/s², and metres above the ellipsoid.
-FASTEST_MPS, CLIMB_MPS, ACCELERATION_MPS2, HIGHEST_M = 1000.0, 200.0, 150.0, 25_000.0
-#: No aircraft in flight is slower on the whole, but for balloons and helicopters.
-_SLOWEST_MPS = 3.0
-#: Shares of the run that may be missing without a word.
-_MISSING = 0.02
-_RADIANS = ("latitude", 1.6, "longitude", 3.2)
+from components.traffic.recorded import FileParameters, RecordedParameters, RecordedTraffic
+from components.traffic.scripted import Ownship, flight_of
+from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.files.input_files import is_folder, read_once
 
 
-def suspicions(content: TrafficFile, duration_s: float) -> list[str]:
-    """Return what is suspicious about the flights of a file, one sentence for each kind."""
-    by_hint: dict[str, list[str]] = {}
-    for craft in content.aircraft:
-        for what, hint in _of_one(craft):
-            by_hint.setdefault(hint, []).append(f"{craft.name}: {what}")
-    lines = [f"{_few(cases)}; {hint}" for hint, cases in by_hint.items()]
-    return lines + _coverage(content, duration_s)
+class Box(Parameters):
+    """Between which latitudes and longitudes aircraft are taken."""
 
+    south_deg: float = Field(default=-90.0, ge=-90, le=90, description="Southern edge, deg.")
+    north_deg: float = Field(default=90.0, ge=-90, le=90, description="Northern edge, deg.")
+    west_deg: float = Field(default=-180.0, ge=-360, le=360, description="Western edge, deg.")
+    east_deg: float = Field(
+        default=180.0, ge=-360, le=360,
+        description="Eastern edge, deg; below the western one across the antimeridian.",
+    )  # fmt: skip
 
-def _few(cases: Sequence[str]) -> str:
-    more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
-    return cases[0] + more
-
-
-def _of_one(craft: SampledTrajectory) -> list[tuple[str, str]]:
-    """Return (what an aircraft does, what it looks like)."""
-    oddities: list[tuple[str, str]] = []
-    highest = float(np.max(craft.alt_m))
-    if highest > HIGHEST_M:
-        oddities.append((f"it flies at {highest:,.0f} m", "are altitudes in feet read as metres?"))
-    if craft.velocity_was_ignored:
-        oddities.append(
-            (
-                "its velocities are not those of its path and are not used",
-                "are knots read as m/s, or feet as metres?",
+    @model_validator(mode="after")
+    def _holds_something(self) -> Self:
+        if self.north_deg <= self.south_deg:
+            raise ValueError(
+                f"north_deg is {self.north_deg:g}: it must be above south_deg, {self.south_deg:g}"
             )
-        )
-    time_s = craft.sample_times_s
-    if len(time_s) < 2:
-        return oddities
-    velocity = _velocities(craft)
-    speed = np.linalg.norm(velocity, axis=0)
-    fastest, climb = float(speed.max()), float(np.abs(velocity[2]).max())
-    if climb > CLIMB_MPS and fastest <= FASTEST_MPS:
-        hint = "are altitudes in feet read as metres, or times in minutes as seconds?"
-        oddities.append((f"it climbs or sinks at {climb:,.0f} m/s", hint))
-    if fastest > FASTEST_MPS:
-        what = f"its positions imply {fastest:,.0f} m/s"
-        oddities.append((what, _fast_hint(float(np.median(speed)))))
-    elif len(time_s) > 2:
-        change = np.linalg.norm(np.diff(velocity, axis=1), axis=0)
-        per_s2 = change / (0.5 * (time_s[2:] - time_s[:-2]))
-        sharpest = float(per_s2.max())
-        if sharpest > ACCELERATION_MPS2:
-            hint = "are times rounded, positions of two aircraft mixed, or feet read as metres?"
-            oddities.append((f"its positions imply {sharpest:,.0f} m/s²", hint))
-    _, most_lat, _, most_lon = _RADIANS
-    near_zero = np.abs(craft.lat_deg).max() < most_lat and np.abs(craft.lon_deg).max() < most_lon
-    slow = 0.0 < float(np.median(speed)) < _SLOWEST_MPS
-    if slow and near_zero:
-        what = f"its positions imply {float(np.median(speed)):.2g} m/s near 0° N 0° E"
-        oddities.append((what, "are latitude and longitude in radians read as degrees?"))
-    return oddities
+        return self
+
+    def edges(self) -> tuple[float, float, float, float]:
+        """Return south, north, west and east, which is beyond the west."""
+        east = self.east_deg
+        while east <= self.west_deg:
+            east += 360.0
+        return self.south_deg, self.north_deg, self.west_deg, east
 
 
-def _fast_hint(typical_mps: float) -> str:
-    if typical_mps <= FASTEST_MPS:
-        return "are positions of two aircraft mixed, or single ones wrong?"
-    return (
-        "are positions in degrees read as radians, nautical miles as metres, or times in s as ms?"
+class Moved(Parameters):
+    """How far a flight is moved as it is."""
+
+    north_m: float = Field(default=0.0, description="To the north, m.")
+    east_m: float = Field(default=0.0, description="To the east, m.")
+    up_m: float = Field(default=0.0, description="Up, m.")
+
+
+class FileTrafficParameters(RecordedParameters):
+    """Parameters of recorded traffic of any kind."""
+
+    file: ScenePath | list[ScenePath] = Field(
+        description="The file, or several as one traffic, or a folder of such."
+    )
+    ownship: str | None = Field(
+        default=None,
+        description="Name, address or callsign of the ownship; by default the first aircraft.",
+    )
+    altitude: Altitude | None = Field(
+        default=None,
+        description="Which altitude is read, of a file with both. By default of tables the column "
+        "that the list of names has first, else the barometric one; aircraft that report none of "
+        "that kind fly at the other, as a note says.",
+    )
+    own_file: ScenePath | None = Field(
+        default=None,
+        description="Another file with the ownship's flight; time 0 is its first sample.",
+    )
+    own_flight: Ownship | None = Field(
+        default=None,
+        description="The ownship's flight, as `traffic.scripted` has it, from time 0 on.",
+    )
+    own_starts_s: float | None = Field(
+        default=None,
+        description="When the ownship's recorded flight begins, after the first sample of the "
+        "others, s; by default as it was recorded.",
+    )
+    own_moved: Moved = Field(
+        default=Moved(), description="How far the ownship's recorded flight is moved."
+    )
+    from_s: float | None = Field(
+        default=None, description="Time 0, after the earliest sample of `file`, s."
+    )
+    to_s: float | None = Field(
+        default=None, description="When it ends, after the earliest sample of `file`, s."
+    )
+    box: Box | None = Field(default=None, description="Others are there only inside of it.")
+    lowest_m: float | None = Field(
+        default=None, description="Others are there only from this altitude on, m."
+    )
+    highest_m: float | None = Field(default=None, description="And up to this one, m.")
+    longest_gap_s: float | None = Field(
+        default=None,
+        gt=0,
+        description="An aircraft without a sample for longer is not there in between, s; by "
+        "default 30 s, or ten times its usual step where that is longer.",
+    )
+    without: list[str] = Field(
+        default=[], description="Names or callsigns of aircraft that are left out."
     )
 
+    @model_validator(mode="after")
+    def _one_ownship(self) -> Self:
+        if self.own_flight is not None:
+            for key in ("own_file", "ownship", "own_starts_s"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"own_flight and {key} are given: only one says the ownship")
+        if self.to_s is not None and self.to_s <= (self.from_s or 0.0):
+            raise ValueError(f"to_s is {self.to_s:g}: it must be above from_s")
+        return self
 
-def _velocities(craft: SampledTrajectory) -> FloatArray:
-    """Return north, east and down velocities (3, n - 1) between samples, m/s."""
-    lat, lon, alt = craft.lat_deg, craft.lon_deg, craft.alt_m
-    steps = line_of_sight_ned(lat[:-1], lon[:-1], alt[:-1], lat[1:], lon[1:], alt[1:])
-    return np.asarray(np.stack(steps) / np.diff(craft.sample_times_s))
+    def paths(self) -> tuple[Path, ...]:
+        """Return the files; those of folders sorted by their names."""
+        found: list[Path] = []
+        for path in self.file if isinstance(self.file, list) else [self.file]:
+            if is_folder(path):
+                inside = sorted(p for p in path.iterdir() if p.is_file() and p.name[0] != ".")
+                if not inside:
+                    raise ValueError(f"file: {path}: the folder holds no file")
+                found += inside
+            else:
+                found.append(path)
+        if not found:
+            raise ValueError("file: must name at least one file")
+        return tuple(found)
+
+    def choice(self) -> Choice:
+        """Return what is taken of the files."""
+        lowest, highest = self.lowest_m, self.highest_m
+        offset = self.own_moved
+        return Choice(
+            ownship=self.ownship,
+            altitude=self.altitude,
+            own_file=self.own_file,
+            own_starts_s=self.own_starts_s,
+            own_moved=(offset.north_m, offset.east_m, offset.up_m),
+            scripted=self.own_flight is not None,
+            from_s=self.from_s,
+            to_s=self.to_s,
+            box=None if self.box is None else self.box.edges(),
+            heights=(
+                -math.inf if lowest is None else lowest, math.inf if highest is None else highest
+            ),
+            longest_gap_s=self.longest_gap_s,
+            without=tuple(self.without),
+        )  # fmt: skip
 
 
-def _coverage(content: TrafficFile, duration_s: float) -> list[str]:
-    """Say which aircraft are there for only a part of the run."""
-    lines = []
-    first, last = content.ownship.interval_present()
-    shared = max(0.0, min(last, duration_s) - max(first, 0.0))
-    hint = "is time in ms, min or h read as s, or duration_s not that of the file?"
-    if shared < (1.0 - _MISSING) * duration_s:
-        lines.append(
-            f"the ownship {content.ownship.name} is there for {shared:g} s of the run's "
-            f"{duration_s:g} s; {hint}"
-        )
-        return lines
-    parts = []
-    for craft in content.intruders:
-        first, last = craft.interval_present()
-        there = max(0.0, min(last, duration_s) - max(first, 0.0))
-        if there < (1.0 - _MISSING) * duration_s:
-            parts.append(f"{craft.name} for {there:g} s")
-    if parts:
-        shown = ", ".join(parts[:3]) + (", ..." if len(parts) > 3 else "")
-        lines.append(
-            f"{len(parts)} of {len(content.intruders)} intruders are there for only a part of the "
-            f"run's {duration_s:g} s ({shown}); where that is not so, {hint}"
-        )
-    return lines
+class FileTraffic(RecordedTraffic):
+    """Recorded aircraft from files of any known kind, and an own flight among them.
 
+    Receivers' logs and services' downloads, tables, GPX, KML, IGC, logs of PX4 and MAVLink, ASTERIX
+    (062, 021; also captured), DAIDALUS: which it is shows in the content.
+    """
 
-def derived_attitude(content: TrafficFile) -> dict[str, Any]:
-    """Return whose attitude was derived from the path, and how wrong that is known to be."""
-    names: dict[str, Any] = {}
-    for angle in ("yaw", "pitch", "roll"):
-        of = [craft.name for craft in content.aircraft if angle in craft.derived_attitude]
-        if of:
-            names[angle] = of
-    if "yaw" in names:
-        names["median_azimuth_error_deg"] = MEDIAN_AZIMUTH_ERROR_DEG
-    return names
+    Parameters = FileTrafficParameters
+    lockstep = True
 
+    def read(self) -> TrafficFile:
+        """Return what is taken of the files."""
+        return traffic_of(self.p)
 
-class FileParameters(SourceParameters):
-    """Parameters of recorded traffic."""
+    def own_flight(self) -> Trajectory:
+        """Return the ownship's flight, recorded or scripted."""
+        own = self.p.own_flight
+        return self.content.ownship if own is None else flight_of(own, own.start, self.wind)
 
-    file: ScenePath = Field(description="The traffic file.")
-    intruder: Aircraft = Field(
-        default=Aircraft(), description="What every intruder is, unless `aircraft` names it."
-    )
-    aircraft: dict[str, Aircraft] = Field(
-        default={}, description="What single intruders are, by their names in the file."
-    )
-    equipage_shares: EquipageShares = Field(
-        default=EquipageShares(), description="Shares of intruders that carry their equipage."
-    )
+    def file_names(self) -> str:
+        """Return the names of the files, for messages."""
+        first, *others = self.p.paths()
+        return f"{first} and {len(others)} more" if others else str(first)
 
 
 class DaaFileParameters(FileParameters):
@@ -170,94 +190,6 @@ class DaaFileParameters(FileParameters):
     reference_alt_m: float = Field(default=0.0, description="Its altitude, m.")
 
 
-class CsvParameters(FileParameters):
-    """Parameters of a file in which the ownship may be named."""
-
-    ownship: str | None = Field(
-        default=None, description="Name of the ownship; by default the first aircraft named."
-    )
-    altitude: Altitude | None = Field(
-        default=None,
-        description="Which altitude is read, of a file with both. By default of CSV the column "
-        "that the list of names has first, of ASTERIX and receivers' logs the barometric one; "
-        "aircraft that report none of that kind fly at the other, as a note says.",
-    )
-
-
-class RecordedTraffic(TrafficSource):
-    """Traffic from a file: positions between samples are interpolated, none are extrapolated.
-
-    Time 0 is the file's earliest sample.
-    """
-
-    Parameters = FileParameters
-    effects = (CrabAngles(),)
-
-    def __init__(self, name: str, parameters: Any, context: Any) -> None:
-        super().__init__(name, parameters, context)
-        self.content = self._in_wind(self.read())
-        self.own = self.content.ownship
-        self.targets = SampledFleet(self.content.intruders)
-        self.roster = roster_of(
-            [target.name for target in self.content.intruders],
-            parameters.intruder,
-            parameters.aircraft,
-            str(parameters.file),
-        )
-        if parameters.equipage_shares != EquipageShares():
-            names, stream = self.roster.names, self.stream("equipage")
-            shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
-            self.roster = Roster.of(list(zip(names, shared, strict=True)))
-
-    def _in_wind(self, content: TrafficFile) -> TrafficFile:
-        """Return the flights with noses turned into the scene's wind, where there is one."""
-        wind = scene_wind(self.context.sections.get("weather"))
-        if wind is None:
-            return content
-        own, *intruders = (
-            craft.in_wind(wind.east_mps, wind.north_mps) for craft in content.aircraft
-        )
-        return replace(content, ownship=own, intruders=intruders)
-
-    def read(self) -> TrafficFile:
-        """Return the content of the file."""
-        raise TypeError(f"{type(self).__name__} reads no file")
-
-    def natural_duration_s(self) -> Fraction:
-        """Return the time from the file's first sample to its last."""
-        last = max(craft.interval_present()[1] for craft in self.content.aircraft)
-        # Zero-length recordings still have their one instant.
-        return max(Fraction(repr(float(last))), Fraction(1, 10**9))
-
-    def sample_times(self) -> list[SampleTimes]:
-        """Return the sample times of the ownship, and those of each target."""
-        own = KnownTimes(self.content.ownship.sample_times_s)
-        if not self.targets:
-            return [own]
-        return [own, KnownTimes(*(target.sample_times_s for target in self.content.intruders))]
-
-    def warnings(self) -> list[str]:
-        """Say what was left out, what no aircraft does, and which error of units it looks like."""
-        lines = self.content.warnings + suspicions(self.content, float(self.context.duration_s))
-        return [f"file {self.p.file}: {line}" for line in lines]
-
-    def report(self) -> dict[str, Any]:
-        """Return closest approaches, and what the file's own clock said at time 0."""
-        source: dict[str, Any] = {
-            "start_time_s": self.content.start_time_s,
-            "notes": self.content.notes,
-        }
-        if derived := derived_attitude(self.content):
-            source["derived_attitude"] = derived
-        return {**super().report(), "traffic": source}
-
-
-@read_once(4)
-def _read(path: Path, reader: Callable[..., TrafficFile], *options: Any) -> TrafficFile:
-    """Read a file; the replicas of a study read the same one over and over."""
-    return reader(path, *options)
-
-
 class DaaFile(RecordedTraffic):
     """Traffic from a DAIDALUS .daa or .xyz file; the first aircraft named is the ownship."""
 
@@ -267,29 +199,17 @@ class DaaFile(RecordedTraffic):
     def read(self) -> TrafficFile:
         """Return the content of the file."""
         p = self.p
-        return _read(p.file, read_daa, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
+        return _read_daa(p.file, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
 
 
-class CsvFile(RecordedTraffic):
-    """Traffic from a CSV file with time, id, latitude, longitude and altitude, or a receiver's log.
-
-    Logs are `aircraft.json` and traces of readsb, SBS-1 lines and OpenSky's states in JSON.
-    """
-
-    Parameters = CsvParameters
-    lockstep = True
-
-    def read(self) -> TrafficFile:
-        """Return the content of the file."""
-        return _read(self.p.file, read_csv, self.p.ownship, self.p.altitude)
+def traffic_of(parameters: FileTrafficParameters) -> TrafficFile:
+    """Return what is taken of files."""
+    content: TrafficFile = _read(parameters.paths(), parameters.choice())
+    return content
 
 
-class AsterixFile(RecordedTraffic):
-    """Traffic from an ASTERIX file: system tracks (062) and ADS-B reports (021)."""
+#: Earlier names of what reads files of any kind.
+CsvFile = AsterixFile = FileTraffic
 
-    Parameters = CsvParameters
-    lockstep = True
-
-    def read(self) -> TrafficFile:
-        """Return the content of the file."""
-        return _read(self.p.file, read_asterix, self.p.ownship, self.p.altitude)
+_read = read_once(4)(read_traffic)
+_read_daa = read_once(4)(read_daa)

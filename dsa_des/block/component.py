@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Built, Effect, Hook
 from dsa_des.block.ladder import Ladder, Verified
 from dsa_des.block.mark import Mark
@@ -316,10 +317,11 @@ class Component:
         """
         return []
 
-    def undone(self) -> Mapping[str, tuple[int, int]]:
+    def undone(self) -> Mapping[str, tuple[int, int] | IntArray]:
         """Return how often this block could not do its work: by what lacked, times, of how many.
 
-        Asked after it has run; counts are over every row of every run that it has seen.
+        Asked after it has run; counts are over every row that it has seen. A block that serves all
+        runs gives both of each run, (2, runs) (`dsa_des.record.undone.with_cases`).
         """
         return {}
 

@@ -23,7 +23,7 @@ from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]
-_QUIET_S = 10.0
+_QUIET_S, _REPEATS = 10.0, 10
 
 
 def cost_of_accuracy(
@@ -34,17 +34,23 @@ def cost_of_accuracy(
     duration: str | None,
     block: str | None,
     against: str | None,
-    repeats: int,
+    repeats: int | None,
     budgets: tuple[str, ...],
     whole_chain: bool,
     map_name: str | None,
     out: str | None,
     as_json: bool,
+    listed: tuple[str, ...] = (),
+    workers: int | None = None,
 ) -> None:
     """Climb the ladders of a scene's blocks, write tables and figures, and print the rows.
 
     After ctrl-C the ladders that are finished are kept; exit code 130.
     """
+    if listed or workers is not None:
+        option = f"--vary {listed[0]}" if listed else f"--workers {workers}"
+        raise UsageError(f"{option}: goes with --answer RESULT of a study")
+    repeats = repeats or _REPEATS
     if map_name is not None:
         if whole_chain or block is not None:
             raise UsageError("--map draws no scene's blocks: leave out --block and --all")

@@ -297,12 +297,14 @@ def report_command(folder: str, out: str | None, no_figures: bool, measure: bool
     say(f"wrote {target}")
 
 
-def result_names(results: Sequence[Result], only: Sequence[str]) -> list[str]:
-    """Return the names of results."""
+def result_names(
+    results: Sequence[Result], only: Sequence[str], option: str = "--metric"
+) -> list[str]:
+    """Return the names of results; UsageError where an option names none."""
     every = [result.name for result in results if result.summed_up]
     for name in only:
         if name not in every:
-            raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")
+            raise UsageError(f"{option} {name}: there is no such result{did_you_mean(name, every)}")
     return every
 
 

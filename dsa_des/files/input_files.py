@@ -93,20 +93,22 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
 def read_once(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Make a reader of a file keep what it returned for the files that were read last.
 
-    A file is read again when its size or the time of its last change is another; one without
-    status is read, so that the reader says what is wrong with it.
+    A file, or several in a tuple, is read again when its size or the time of its last change is
+    another; one without status is read, so that the reader says what is wrong with it.
     """
 
     def keeping(read: Callable[..., Any]) -> Callable[..., Any]:
         kept = lru_cache(most)(lambda state, path, *more, **named: read(path, *more, **named))
 
         @wraps(read)
-        def again(path: Path, *more: Any, **named: Any) -> Any:
+        def again(path: Path | tuple[Path, ...], *more: Any, **named: Any) -> Any:
+            paths = path if isinstance(path, tuple) else (path,)
             try:
-                status = path.stat()
+                states = tuple(one.stat() for one in paths)
             except (OSError, ValueError):
                 return read(path, *more, **named)
-            return kept((status.st_mtime_ns, status.st_size), path, *more, **named)
+            state = tuple((one.st_mtime_ns, one.st_size) for one in states)
+            return kept(state, path, *more, **named)
 
         return again
 

@@ -1,9 +1,20 @@
 """What blocks could not do: counted by what their work lacked, so that counts of runs add up."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
 Undone = Mapping[str, Mapping[str, tuple[int, int]]]
+#: The same for each run: both counts, (2, runs).
+UndoneByRun = Mapping[str, Mapping[str, IntArray]]
+#: No case of any run, and no counts of any.
+NO_RUNS: IntArray = np.empty(0, dtype=np.int64)
+NO_COUNTS: IntArray = np.zeros((2, 0), dtype=np.int64)
 #: Smaller shares are not worth a sentence: a flight is not known at its first position.
 _LEAST_SHARE = 0.1
 
@@ -24,6 +35,41 @@ def added(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]:
     }
 
 
+def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
+    """Return counts (2, runs) with more cases: the run of each that lacked something, and of all.
+
+    The counts may end before the last run.
+    """
+    cases = lacking, every
+    runs = max(known.shape[1], *(1 + int(run.max(initial=-1)) for run in cases))
+    result = np.zeros((2, runs), dtype=np.int64)
+    result[:, : known.shape[1]] = known
+    result += [np.bincount(run, minlength=runs) for run in cases]
+    return result
+
+
+def by_run(undone: Mapping[str, IntArray | tuple[int, int]], runs: int) -> dict[str, IntArray]:
+    """Return what a block says (`Component.undone`) as counts of all runs."""
+    result: dict[str, IntArray] = {}
+    for what, counts in undone.items():
+        said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
+        result[what] = np.zeros((2, runs), dtype=np.int64)
+        result[what][:, : said.shape[1]] = said
+    return result
+
+
+def of_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
+    """Return the counts of some runs together."""
+    some = runs if isinstance(runs, slice) else list(runs)
+    result: dict[str, dict[str, tuple[int, int]]] = {}
+    for block, counts in undone.items():
+        for what, of_each in counts.items():
+            times, of = of_each[:, some].sum(axis=1).tolist()
+            if of:
+                result.setdefault(block, {})[what] = times, of
+    return added([result])
+
+
 def undone_sentences(undone: Undone) -> list[str]:
     """Say what blocks could not do, with its share, where that is more than now and then."""
     return [
@@ -32,6 +78,35 @@ def undone_sentences(undone: Undone) -> list[str]:
         for what, (times, of) in counts.items()
         if times > 0 and times >= _LEAST_SHARE * of
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class Tries:
+    """What each run gave a block to work on, as a mask of sources, and whether it ever did it."""
+
+    had: Any = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    did: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def with_more(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
+        """Return them with masks of what some runs had, and whether it was done with them."""
+        if not len(run):
+            return self
+        count = max(int(run.max()) + 1, len(self.did))
+        every, done = np.zeros(count, dtype=had.dtype), np.zeros(count, dtype=bool)
+        every[: len(self.had)], done[: len(self.did)] = self.had, self.did
+        np.bitwise_or.at(every, run, had)
+        done[run[did]] = True
+        return Tries(every, done)
+
+    def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
+        """Return in which runs it was never done, of those that had a source, or two."""
+        enough = has_two(self.had) if of_two else self.had != 0
+        return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
+
+
+def has_two(mask: Any) -> BoolArray:
+    """Return which masks have more than one bit."""
+    return np.asarray((mask & (mask - 1)) != 0, dtype=bool)
 
 
 def _percent(share: float) -> str:

@@ -104,10 +104,15 @@ def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
         for index, mine in parts.items():
             items[index] = mine[()] if () in mine else _with(items[index], mine)
         return type(old)(items)
-    fields = {name: old.__dict__[name] for name in type(old).model_fields}
+    fields = {name: old.__dict__[name] for name in _fields_of(type(old))}
     for name, mine in parts.items():
         fields[name] = mine[()] if () in mine else _with(fields[name], mine)
     return _model_of(type(old), fields, set(old.model_fields_set))
+
+
+@lru_cache(maxsize=256)
+def _fields_of(model: type[BaseModel]) -> tuple[str, ...]:
+    return tuple(model.model_fields)
 
 
 def _model_of(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -> BaseModel:

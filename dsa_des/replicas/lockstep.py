@@ -10,10 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.record.recording import Recorder
-from dsa_des.record.undone import Undone, added
+from dsa_des.record.undone import UndoneByRun, by_run
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
@@ -71,7 +74,7 @@ class Replicas(Timeline):
         #: What runs blocks for all replicas that differ in more than their clocks.
         self.together: dict[str, Component] = {}
         #: What instances of split blocks could not do.
-        self._undone: Undone = {}
+        self._undone: dict[str, dict[str, IntArray]] = {}
         _check_alike(self._scenes)
         self.seeds = _seeds_of(self._scenes)
         self.streams = Streams(self.seeds)
@@ -188,13 +191,16 @@ class Replicas(Timeline):
             for number in range(len(self._scenes)):
                 block.make(number)
 
-    def undone(self, components: Mapping[str, Component]) -> Undone:
-        """Return what blocks could not do over all runs: of those that are split, by instance."""
-        shared = {n: c.undone() for n, c in components.items() if n not in self.split}
-        return added([shared, self._undone])
+    def undone(self, components: Mapping[str, Component]) -> UndoneByRun:
+        """Return what blocks could not do in each run: of those that are split, by instance."""
+        shared = {n: c for n, c in components.items() if n not in self.split}
+        return {**super().undone(shared), **self._undone}
 
     def _finished(self, number: int, component: Component) -> None:
-        self._undone = added([self._undone, {component.name: component.undone()}])
+        of_all = self._undone.setdefault(component.name, {})
+        for what, counts in by_run(component.undone(), 1).items():
+            of_all.setdefault(what, np.zeros((2, self.count), dtype=np.int64))
+            of_all[what][:, [number]] += counts
         if self._report is not None:
             if number in self.runs.ended_by:
                 ended = Fraction(int(self.runs.ends[number]), self.scene.ticks_per_s)

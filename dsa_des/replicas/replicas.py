@@ -11,7 +11,7 @@ from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.record.undone import Undone, added
+from dsa_des.record.undone import Undone, UndoneByRun, added, of_runs
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
@@ -19,7 +19,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 # Replicas that run together, and scans that they have together.
-_MOST_TOGETHER, _MOST_ROWS = 1024, 4e6
+_MOST_TOGETHER, _MOST_ROWS = 4096, 4e6
 _A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None
@@ -31,7 +31,7 @@ class Shared:
 
     tables: dict[str, Columns]
     replicas: int
-    undone: Undone
+    undone: UndoneByRun
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Record
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
-    shared = Shared(sink.tables(), len(scenes), outcome.undone)
+    shared = Shared(sink.tables(), len(scenes), outcome.undone_by_run)
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _by_replica(shared.tables, len(scenes))
     ended = simulation.runs.ended_by
@@ -193,7 +193,12 @@ def _run(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
 
 
 def undone_in(outcomes: Iterable[Recorded | Failed]) -> Undone:
-    """Return what blocks could not do in runs; what ran in lock step counts once."""
-    runs = [one for one in outcomes if isinstance(one, Recorded)]
-    together = {id(one.shared): one.shared.undone for one in runs if one.shared is not None}
-    return added([*together.values(), *(one.undone for one in runs)])
+    """Return what blocks could not do in runs, alone or in lock step, together."""
+    parts: list[Undone] = []
+    together: dict[int, tuple[Shared, list[int]]] = {}
+    for one in outcomes:
+        if isinstance(one, Recorded):
+            parts.append(one.undone)
+            if (shared := one.shared) is not None:
+                together.setdefault(id(shared), (shared, []))[1].append(one.number)
+    return added([*parts, *(of_runs(shared.undone, runs) for shared, runs in together.values())])

@@ -15,7 +15,13 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
+from dsa_des.results.ratio import (
+    PairedRatio,
+    influences,
+    paired_ratio,
+    taken_over,
+    unseen_variance,
+)
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -67,6 +73,8 @@ class StoredRows:
         #: The first rows without result, and the first row of all, as column → value.
         self.failed: list[dict[str, Any]] = []
         self.first: dict[str, Any] = {}
+        #: Of a sample: by cell, for how many those without result were to stand; NaN: unknown.
+        self.unheard: dict[int, list[float]] = {}
         self._order: IntArray | None = None
         self._held: OrderedDict[str, AnyArray] = OrderedDict()
         rows = max(1, folder.record.cells * folder.record.replicas)
@@ -117,6 +125,10 @@ class StoredRows:
             key=_cell_and_replica,
         )
         if not good.all():
+            if STANDS_FOR in table.column_names:
+                others = table.filter(~good).select(["cell", STANDS_FOR]).to_pydict()
+                for cell, many in zip(others["cell"], others[STANDS_FOR], strict=True):
+                    self.unheard.setdefault(cell, []).append(np.nan if many is None else many)
             bad = table.filter(~good).slice(0, MOST_FAILED).to_pylist()
             self.failed = sorted([*self.failed, *bad], key=_cell_and_replica)[:MOST_FAILED]
 
@@ -176,7 +188,12 @@ class Rows:
     @cached_property
     def stands_for(self) -> FloatArray | None:
         """For how many runs each one stands, 0 for one not flown; None where all are flown."""
-        return self.column(STANDS_FOR) if STANDS_FOR in self.stored.names else None
+        if STANDS_FOR not in self.stored.names:
+            return None
+        result = self.column(STANDS_FOR)
+        for cell, lost in self.stored.unheard.items():
+            result = taken_over(result, lost, self.column("cell") == cell)
+        return result
 
     def is_sampled(self, name: str) -> bool:
         """Return whether only runs that were flown have a result."""

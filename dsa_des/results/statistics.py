@@ -308,6 +308,38 @@ def difference(
     )
 
 
+def quantile_difference(
+    first: FloatArray, second: FloatArray, share: float, confidence: float
+) -> EstimatedDifference:
+    """Return how a quantile over the same units differs between two conditions.
+
+    The interval is the normal distribution's with the spread of 1000 resamples of the units, always
+    the same ones, each with its values under both conditions (Efron and Tibshirani, chapter 8.6).
+    NaN is a unit without a value. Where a quantile has no interval of its own, this has none.
+    """
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = first[here & there], second[here & there]
+    alone = int((here & ~there).sum()), int((there & ~here).sum())
+    ends = [quantile(values, share, confidence) for values in (one, two)]
+    value = ends[1].value - ends[0].value
+    if any(end.few for end in ends):
+        none = Estimate(value, math.nan, math.nan, len(one), True)
+        return EstimatedDifference(none, none, *alone)
+    index = max(0, math.ceil(share * len(one) - 1e-9) - 1)
+    generator = np.random.Generator(np.random.Philox(len(one)))
+    drawn = np.empty(_RESAMPLES // 2)
+    for k in range(len(drawn)):
+        units = generator.integers(0, len(one), len(one))
+        low, high = (np.partition(values[units], index)[index] for values in (one, two))
+        drawn[k] = high - low
+    apart = math.hypot(*(normal_error(end, confidence) for end in ends))
+    return EstimatedDifference(
+        symmetric(value, float(drawn.std(ddof=1)), len(one), False, confidence),
+        symmetric(value, apart, len(one), False, confidence),
+        *alone,
+    )
+
+
 def _of_shares(result: Estimate) -> Estimate:
     """Return a difference of shares whose interval holds nothing that none can be."""
     return within(result, -1.0, 1.0)

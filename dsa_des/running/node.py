@@ -98,8 +98,9 @@ class Node:
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
-        #: In which runs it has run.
-        self._ran: set[int] = set()
+        #: In which runs it has run, and whether in all.
+        self._ran: BoolArray = np.zeros(0, dtype=bool)
+        self._all_ran = False
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
 
@@ -144,15 +145,18 @@ class Node:
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
 
-    def undone(self) -> Mapping[str, tuple[int, int]]:
-        """Return in how many runs it never ran, where there are any."""
-        runs = self.simulation.runs.count
-        idle = 0 if self.component.process is not None else runs - len(self._ran)
-        if not idle:
+    def undone(self) -> Mapping[str, IntArray]:
+        """Return in which runs it never ran, as counts (2, runs), where there are any."""
+        idle = self._idle_runs()
+        if self.component.process is not None or not idle.any():
             return {}
         ports = [name for name in self.channels if self.component.inputs[name].held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
-        return {f"it never ran{why}": (idle, runs)}
+        return {f"it never ran{why}": np.array([idle, np.ones(len(idle))], dtype=np.int64)}
+
+    def _idle_runs(self) -> BoolArray:
+        ran, runs = self._ran, self.simulation.runs.count
+        return np.concatenate([~ran, np.ones(runs - len(ran), dtype=bool)])
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -293,8 +297,10 @@ class Node:
         if wake is None:
             return
         ticks = wake.ticks
-        if len(self._ran) < self.simulation.runs.count:
-            self._ran.update(wake.run[wake.instants.last_of_each].tolist())
+        if not self._all_ran:
+            self._ran = ~self._idle_runs()
+            self._ran[wake.run] = True
+            self._all_ran = bool(self._ran.all())
         try:
             self.send(self.runner.run(wake), wake.instants)
         except (Abort, RunRefused):

@@ -21,7 +21,7 @@ from dsa_des.block.foreign_calls import error_at, must_pass
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import NotRecordedError, Recorder
-from dsa_des.record.undone import Undone, added
+from dsa_des.record.undone import Undone, UndoneByRun, of_runs
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
@@ -49,15 +49,20 @@ class Outcome:
     """What a run came to.
 
     Of runs that share a timeline, `duration_s` is the longest it may be. `windowed` are the blocks
-    that ran in look-ahead windows; `components` speak for the whole run. `undone` is what blocks
-    could not do, over all runs.
+    that ran in look-ahead windows; `components` speak for the whole run. `undone_by_run` is what
+    blocks could not do.
     """
 
     duration_s: float
     cpu_s: float
     windowed: list[str]
     components: Mapping[str, Component]
-    undone: Undone
+    undone_by_run: UndoneByRun
+
+    @cached_property
+    def undone(self) -> Undone:
+        """What blocks could not do, over all runs."""
+        return of_runs(self.undone_by_run, slice(None))
 
     @cached_property
     def report(self) -> dict[str, Any]:
@@ -203,12 +208,13 @@ class Simulation:
         speaking = self.timeline.finish(self.components)
         stopped = pacer is not None and pacer.stopped
         idle = {} if stopped else {name: node.undone() for name, node in self.nodes.items()}
+        said = self.timeline.undone(self.components)
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,
             sorted(name for name, node in self.nodes.items() if node.windowed),
             speaking,
-            added([self.timeline.undone(self.components), idle]),
+            {name: {**said.get(name, {}), **idle.get(name, {})} for name in self.nodes},
         )
 
     def _start(self, runs: range) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.record.undone import Undone
+from dsa_des.record.undone import UndoneByRun, by_run
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
@@ -119,6 +119,6 @@ class Timeline:
         """Take note that all has run, and return the blocks that speak for the whole run."""
         return components
 
-    def undone(self, components: Mapping[str, Component]) -> Undone:
-        """Return what blocks could not do over all runs, once they are finished."""
-        return {name: component.undone() for name, component in components.items()}
+    def undone(self, components: Mapping[str, Component]) -> UndoneByRun:
+        """Return what blocks could not do in each run, once they are finished."""
+        return {n: by_run(of.undone(), self.runs.count) for n, of in components.items()}

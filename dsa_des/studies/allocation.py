@@ -1,7 +1,7 @@
 """Which runs are flown where all are known without flying: drawn by what they can contribute.
 
-A study of a ratio knows of every run what happens without a remedy, and its geometry, for an
-eighth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
+A study of a ratio knows of every run what happens without a remedy, and its geometry, for a
+twentieth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
 them the chance p(x) of each event is learnt, by a logistic model of the geometry x, and then a run
 is flown with a probability π(x) of its own and stands for 1/π runs (`dsa_des.results.ratio`). A
 wrong p(x) costs width, never truth. With weights w and nominal flags n the variance of a ratio R is
@@ -30,14 +30,14 @@ from dsa_des.results.ratio import FORESEEN_COST
 #: Runs of a cell that are all flown, and how many times as many are known after each round.
 PILOT, GROWTH = 300, 4
 #: The least probability to be flown.
-LEAST = 0.03
+LEAST = 0.02
 #: All are flown unless a sample is expected to cost less than this for the same width.
 _WORTH_IT = 0.9
 #: The chance that is expected of an event of which nothing is told.
 UNTOLD = 0.05
 # Standard deviations of the model's coefficients before anything is flown: of the level, and for
 # one standard deviation of geometry, or its square.
-_LEVEL_SD, _SLOPE_SD = 3.0, 0.5
+_LEVEL_SD, _SLOPE_SD = 3.0, 0.25
 _ITERATIONS = 50
 # Sizes of π that are tried.
 _SIZES = np.geomspace(1e-3, 1e6, 200)

@@ -1,14 +1,24 @@
-"""Which chunk is run next, and again when its process died.
+"""Which chunks are run next, and again when their process died.
 
-A chunk whose process dies is run once more; then it is cut in halves until the guilty run is alone.
-A single run is tried again when nothing else is under way, so that neither the memory of others nor
-a kill of all workers is its fault. Only then it has crashed.
+Consecutive chunks of a cell whose runs share lock steps are run together, as many as a lock step
+holds. Those whose process dies are run one by one; a chunk that is alone is run once more, and then
+cut in halves until the guilty run is alone. A single run is tried again when nothing else is under
+way, so that neither the memory of others nor a kill of all workers is its fault. Only then it has
+crashed.
 """
 
+import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from operator import itemgetter
 
+import numpy as np
+
+from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.replicas.replicas import most_together, why_apart
+from dsa_des.running.loops import opened_loops
 from dsa_des.studies.chunk import Done, crashed_run, joined
 from dsa_des.studies.study import Chunk, Study
 
@@ -20,18 +30,18 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Piece:
-    """A chunk or some of its runs, and how often their process died."""
+    """Chunks that are run together, or some runs of one, and how often their process died."""
 
-    chunk: Chunk
+    chunks: tuple[Chunk, ...]
     losses: int = 0
 
 
 class Attempts:
-    """What is still to be run."""
+    """What is still to be run: chunks that are run together (`run_together`)."""
 
-    def __init__(self, study: Study, chunks: Iterable[Chunk]) -> None:
+    def __init__(self, study: Study, together: Iterable[tuple[Chunk, ...]]) -> None:
         self._study = study
-        self._todo = iter(chunks)
+        self._todo = iter(together)
         self._again: list[Piece] = []
         self._alone: deque[Piece] = deque()
         self._running = 0
@@ -47,8 +57,8 @@ class Attempts:
             return None
         if self._again:
             piece = self._again.pop()
-        elif (chunk := next(self._todo, None)) is not None:
-            piece = Piece(chunk)
+        elif (chunks := next(self._todo, None)) is not None:
+            piece = Piece(chunks)
         elif self._alone and not self._running:
             piece, self._only = self._alone.popleft(), True
         self._running += piece is not None
@@ -59,35 +69,37 @@ class Attempts:
         self._ended()
         self._again.append(piece)
 
-    def done(self, piece: Piece, result: Done) -> Done | None:
-        """Take the result of a piece; return that of its chunk when all of it is there."""
+    def done(self, piece: Piece, results: Iterable[Done]) -> list[Done]:
+        """Take the results of a piece; return those of chunks of which all is there."""
         self._ended()
-        return self._collect(piece, result)
+        return [whole for one in results if (whole := self._collect(one)) is not None]
 
-    def lost(self, piece: Piece) -> Done | None:
+    def lost(self, piece: Piece) -> list[Done]:
         """Take back a piece whose process died; return its chunk's result if that was the last."""
         self._ended()
-        chunk, losses = piece.chunk, piece.losses + 1
-        if len(chunk) == 1:
-            if losses < TRIES:
-                self._alone.append(Piece(chunk, losses))
-                return None
-            return self._collect(piece, crashed_run(self._study, chunk, TRIES))
-        if losses < _PATIENCE:
-            self._again.append(Piece(chunk, losses))
-            return None
-        self._missing.setdefault(chunk.name, len(chunk))
-        # A single run begins to count anew; halves were warned.
-        for half in halves(chunk):
-            self._again.append(Piece(half, 0 if len(half) == 1 else losses - 1))
-        return None
+        chunk, losses = piece.chunks[0], piece.losses + 1
+        if len(piece.chunks) > 1:
+            self._again += [Piece((one,)) for one in reversed(piece.chunks)]
+        elif len(chunk) == 1 and losses >= TRIES:
+            crashed = self._collect(crashed_run(self._study, chunk, TRIES))
+            return [] if crashed is None else [crashed]
+        elif len(chunk) == 1:
+            self._alone.append(Piece((chunk,), losses))
+        elif losses < _PATIENCE:
+            self._again.append(Piece((chunk,), losses))
+        else:
+            self._missing.setdefault(chunk.name, len(chunk))
+            # A single run begins to count anew; halves were warned.
+            for half in halves(chunk):
+                self._again.append(Piece((half,), 0 if len(half) == 1 else losses - 1))
+        return []
 
     def _ended(self) -> None:
         self._running -= 1
         self._only = False
 
-    def _collect(self, piece: Piece, result: Done) -> Done | None:
-        name = piece.chunk.name
+    def _collect(self, result: Done) -> Done | None:
+        name = result.name
         if name not in self._missing:
             return result
         self._there.setdefault(name, []).append(result)
@@ -96,6 +108,49 @@ class Attempts:
             return None
         del self._missing[name]
         return joined(name, self._there.pop(name))
+
+
+def run_together(
+    study: Study, chunks: Sequence[Chunk], workers: int
+) -> Iterator[tuple[Chunk, ...]]:
+    """Put consecutive chunks of a cell together that share lock steps, about alike for workers."""
+    if len(chunks) < 2:
+        yield from ((chunk,) for chunk in chunks)
+        return
+    most = _most_shared(study, chunks[0].runs[0][0])
+    total = sum(chunk.flown for chunk in chunks)
+    per = total / (workers * math.ceil(total / (workers * most))) if most else 0.0
+    for cell_goes_on in _chains(chunks):
+        flown = np.array([chunk.flown for chunk in cell_goes_on])
+        count = math.ceil(flown.sum() / per - 1e-9) if most else len(flown)
+        of = ((np.cumsum(flown) - 0.5 * flown) * (count / flown.sum())).astype(int).tolist()
+        for _, mine in groupby(zip(of, cell_goes_on, strict=True), key=itemgetter(0)):
+            yield tuple(chunk for _, chunk in mine)
+
+
+def _chains(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
+    """Give consecutive chunks each of which begins in the cell that the one before ends in."""
+    chain: list[Chunk] = []
+    for chunk in chunks:
+        if chain and chain[-1].runs[-1][0] != chunk.runs[0][0]:
+            yield chain
+            chain = []
+        chain.append(chunk)
+    yield chain
+
+
+def _most_shared(study: Study, cell: int) -> int:
+    """Return how many runs of a cell a lock step holds, 0 where it spares nothing.
+
+    A feedback loop goes through as many windows, whatever these hold.
+    """
+    try:
+        scene = study.scene(cell)
+        if not opened_loops(scene) or why_apart(scene, [study.replica(n, cell) for n in (0, 1)]):
+            return 0
+    except (SceneError, BlockFailure):  # its rows say why
+        return 0
+    return most_together(scene)
 
 
 def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:

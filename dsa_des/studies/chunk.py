@@ -1,14 +1,19 @@
-"""Running one chunk of a study: from cells and replicas to the bytes of one Parquet file.
+"""Running chunks of a study: from cells and replicas to the bytes of a Parquet file of each.
 
-It is a pure function of the study and the chunk; whichever worker runs it, and when, the bytes are
-the same.
+They are a pure function of the study and the chunk; whichever worker runs it, when, and with which
+others, the bytes are the same. Runs of one cell share lock steps whichever chunk they are of: a
+chunk is what is written at once, and a lock step what memory holds.
 """
 
 import gc
 import json
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -16,7 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dsa_des.arrays.column_values import Text
-from dsa_des.arrays.types import AnyArray
+from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
@@ -55,6 +60,8 @@ class Done:
     runs: int
     failed: int
     crashed: int = 0
+    #: What they took of the processor; in no file, for it is another each time.
+    cpu_s: float = 0.0
 
 
 def schema_of(study: Study) -> pa.Schema:
@@ -71,16 +78,38 @@ def schema_of(study: Study) -> pa.Schema:
 
 def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
-    schema = schema_of(study)
-    undone: list[Undone] = []
-    tables = [
-        _run_cell(study, schema, *part, chunk.plans.get(part[0]), undone) for part in chunk.runs
-    ]
-    done = done_of(chunk.name, pa.concat_tables(tables), added(undone))
-    del tables
-    if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
-        gc.collect()
+    (done,) = run_chunks(study, [chunk])
     return done
+
+
+def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
+    """Run chunks of one round together, each as it would be by itself."""
+    began_s = time.process_time()
+    schema = schema_of(study)
+    tables: list[list[pa.Table]] = [[] for _ in chunks]
+    undone: list[list[Undone]] = [[] for _ in chunks]
+    pieces = [
+        (cell, k, start, end) for k, one in enumerate(chunks) for cell, start, end in one.runs
+    ]
+    for cell, of_cell in groupby(pieces, key=itemgetter(0)):
+        mine = list(of_cell)
+        numbers = [number for _, _, start, end in mine for number in range(start, end)]
+        of = np.repeat([k for _, k, _, _ in mine], [end - start for *_, start, end in mine])
+        plan = chunks[mine[0][1]].plans.get(cell)
+        rows = _run_cell(study, schema, cell, numbers, plan, of, undone)
+        begin = 0
+        for _, k, start, end in mine:
+            tables[k].append(rows.slice(begin, end - start))
+            begin += end - start
+    done = [
+        done_of(chunk.name, pa.concat_tables(parts), added(said))
+        for chunk, parts, said in zip(chunks, tables, undone, strict=True)
+    ]
+    runs = sum(map(len, chunks))
+    if runs >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
+        gc.collect()
+    each_s = (time.process_time() - began_s) / runs
+    return [replace(one, cpu_s=each_s * one.runs) for one in done]
 
 
 def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
@@ -109,7 +138,8 @@ def joined(name: str, parts: Sequence[Done]) -> Done:
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
     undone = added(map(undone_of, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
-    return done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
+    done = done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
+    return replace(done, cpu_s=sum(part.cpu_s for part in parts))
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
@@ -162,16 +192,15 @@ def _run_cell(
     study: Study,
     schema: pa.Schema,
     cell: int,
-    start: int,
-    end: int,
+    numbers: Sequence[int],
     plan: Allocation | None,
-    undone: list[Undone],
+    of: IntArray,
+    undone: Sequence[list[Undone]],
 ) -> pa.Table:
     """Return the rows of some replicas of a cell, of which those that a plan chooses are flown.
 
-    What blocks could not do in them is put to `undone`.
+    What blocks could not do in them is put to `undone` of the chunk that each replica is `of`.
     """
-    numbers = range(start, end)
     rows = _leading(study, cell, numbers)
     try:
         scene = study.scene(cell)
@@ -182,7 +211,7 @@ def _run_cell(
     replicas = [study.replica(number, cell) for number in numbers]
     key = str(study.path), cell
     if not study.allocate:
-        values = _flown(scene, metrics, replicas, rows["error"], key, undone)
+        values = _flown(scene, metrics, replicas, rows["error"], key, of, undone)
         return _table(study, schema, cell, rows, values)
     known, errors = _foreseen(scene, metrics, replicas)
     for k, text in errors.items():
@@ -191,7 +220,8 @@ def _run_cell(
     shares = stands_for(study, cell, numbers, plan, results, known)
     chosen = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(chosen)
-    flown = _flown(scene, metrics, [replicas[k] for k in chosen], wrong, key, undone)
+    some = [replicas[k] for k in chosen]
+    flown = _flown(scene, metrics, some, wrong, key, of[chosen], undone)
     for k, said in zip(chosen, wrong, strict=True):
         rows["error"][k] = said
     values = {}
@@ -221,11 +251,12 @@ def _flown(
     replicas: Sequence[Replica],
     errors: list[str | None],
     key: tuple[str, int],
-    undone: list[Undone],
+    of: IntArray,
+    undone: Sequence[list[Undone]],
 ) -> dict[str, AnyArray]:
     """Run replicas and return result → values.
 
-    What went wrong is put among `errors`, and to `undone` what blocks could not do.
+    What went wrong is put among `errors`, and to `undone` of its chunk what blocks could not do.
     """
     values: dict[str, AnyArray] = {}
     done = 0
@@ -237,10 +268,14 @@ def _flown(
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
         one_run = _bytes_of_a_run.get(key, _MOST_BYTES / _FIRST_RUNS)
-        many = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
+        most = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
+        left = len(replicas) - done
+        many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
         outcomes = _outcomes(scene, part, wanted_by(metrics))
-        undone.append(undone_in(outcomes))
+        for chunk in np.unique(of[done : done + many]).tolist():
+            mine = np.flatnonzero(of[done : done + many] == chunk)
+            undone[chunk].append(undone_in(outcomes[k] for k in mine))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded:
             _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)

@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -21,8 +21,8 @@ from typing import Any, Protocol
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import is_ours
 from dsa_des.errors import UsageError
-from dsa_des.studies.attempts import Attempts, Piece
-from dsa_des.studies.chunk import Done, run_chunk
+from dsa_des.studies.attempts import Attempts, Piece, run_together
+from dsa_des.studies.chunk import Done, run_chunks
 from dsa_des.studies.study import Chunk, Study
 
 #: How many pieces a worker has at a time: the next one is there when it ends the first.
@@ -48,8 +48,8 @@ class Serial:
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks in their order."""
-        for chunk in chunks:
-            yield run_chunk(study, chunk)
+        for some in run_together(study, list(chunks), 1):
+            yield from run_chunks(study, some)
 
     def close(self) -> None:
         """Nothing to do."""
@@ -67,8 +67,8 @@ class Local:
         self._workers: list[_Worker] = []
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
-        """Run all chunks; two per worker are under way at a time."""
-        attempts = Attempts(study, chunks)
+        """Run all chunks; two pieces per worker are under way at a time."""
+        attempts = Attempts(study, run_together(study, list(chunks), self._count))
         if not self._workers or any(w.study is not study or len(w) for w in self._workers):
             self.close()
             self._workers = [_Worker(study) for _ in range(self._count)]
@@ -97,12 +97,12 @@ class _Worker:
     def __init__(self, study: Study) -> None:
         self.study = study
         self._pool: ProcessPoolExecutor | None = None
-        self._given: deque[tuple[Future[Done], Piece]] = deque()
+        self._given: deque[tuple[Future[list[Done]], Piece]] = deque()
 
     def __len__(self) -> int:
         return len(self._given)
 
-    def futures(self) -> list["Future[Done]"]:
+    def futures(self) -> list["Future[list[Done]]"]:
         """What is under way."""
         return [future for future, _ in self._given]
 
@@ -112,13 +112,13 @@ class _Worker:
             with safe_import_path():
                 if self._pool is None:
                     self._pool = _new_pool(self.study)
-                future = self._pool.submit(_work, piece.chunk)
+                future = self._pool.submit(_work, piece.chunks)
         except BrokenProcessPool as error:  # it died since we looked
             future = Future()
             future.set_exception(error)
         self._given.append((future, piece))
 
-    def pop(self) -> "tuple[Future[Done], Piece] | None":
+    def pop(self) -> "tuple[Future[list[Done]], Piece] | None":
         """Return the first piece if it is finished or lost."""
         return self._given.popleft() if self._given and self._given[0][0].done() else None
 
@@ -148,8 +148,7 @@ def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
             for other in worker.renew():
                 attempts.give_back(other)
             done = attempts.lost(piece)
-        if done is not None:
-            yield done
+        yield from done
 
 
 @contextmanager
@@ -223,9 +222,9 @@ def _start_worker(study: Study) -> None:
         threading.Thread(target=follow, daemon=True).start()
 
 
-def _work(chunk: Chunk) -> Done:
+def _work(chunks: Sequence[Chunk]) -> list[Done]:
     try:
-        return run_chunk(_studied[0], chunk)
+        return run_chunks(_studied[0], chunks)
     except KeyboardInterrupt:  # raised by a block: ctrl-C does not come here
         os._exit(1)
 
@@ -270,14 +269,15 @@ class Dask:
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
 
-        attempts = Attempts(study, chunks)
+        workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        attempts = Attempts(study, run_together(study, list(chunks), max(1, workers)))
         given: dict[Any, Piece] = {}
         running = as_completed(loop=self._client.loop)
-        most = max(8, 4 * len(self._client.scheduler_info(n_workers=-1)["workers"]))
+        most = max(8, 4 * workers)
 
         def submit() -> None:
             while len(given) < most and (piece := attempts.next()) is not None:
-                future = self._client.submit(run_chunk, study, piece.chunk, pure=False)
+                future = self._client.submit(run_chunks, study, piece.chunks, pure=False)
                 given[future.key] = piece
                 running.add(future)
 
@@ -291,8 +291,7 @@ class Dask:
             except KilledWorker:
                 done = attempts.lost(piece)
             submit()
-            if done is not None:
-                yield done
+            yield from done
             if not given:
                 return
 

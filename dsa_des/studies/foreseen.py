@@ -4,6 +4,7 @@ Between the columns of a study's parts and the arrays of `dsa_des.studies.alloca
 foresee nominal events, weights and geometry; ratios say which columns are events.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,7 +21,7 @@ from dsa_des.studies.draws import uniform
 from dsa_des.studies.metric import Group, Metric, expected_column
 from dsa_des.studies.study import AUTO, Study
 
-#: Runs that are foreseen at a time: what is made of their encounters is kept until they are flown.
+#: Runs that are foreseen at a time, at most: few enough for the memory, many for the work.
 _AT_ONCE = 4096
 
 
@@ -63,8 +64,10 @@ def foresee(
 ) -> dict[str, AnyArray]:
     """Return what is known of runs without flying them: results, and columns of geometry."""
     parts: dict[str, list[AnyArray]] = {}
-    for start in range(0, len(replicas), _AT_ONCE):
-        group = Group(scene, replicas[start : start + _AT_ONCE], (), {})
+    batches = max(1, math.ceil(len(replicas) / _AT_ONCE))
+    for k in range(batches):
+        start, end = (len(replicas) * n // batches for n in (k, k + 1))
+        group = Group(scene, replicas[start:end], (), {})
         mine: dict[str, AnyArray] = {}
         for metric in metrics:
             for name, values in metric.foresee(group).items():

@@ -20,7 +20,7 @@ from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.drawn_columns import scenes_of
+from dsa_des.replicas.drawn_columns import ReplicaScenes, scenes_of
 from dsa_des.replicas.replicas import Recorded
 from dsa_des.results.record import (
     CLASS,
@@ -95,6 +95,16 @@ class Group:
     def scenes(self) -> Sequence[Scene]:
         """The scene of every replica with its changes."""
         return scenes_of(self.scene, self.replicas)
+
+    def parameters_of(self, block: str) -> Sequence[Any]:
+        """Return a block's parameters in every replica."""
+
+        def parameters() -> Sequence[Any]:
+            if isinstance(self.scenes, ReplicaScenes):
+                return self.scenes.parameters_of(block)
+            return [scene.blocks[block].parameters for scene in self.scenes]
+
+        return self.once(("parameters", block), parameters)
 
 
 def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:

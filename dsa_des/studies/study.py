@@ -67,6 +67,14 @@ class Chunk:
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)
 
+    @property
+    def flown(self) -> float:
+        """How many of the runs are flown, about."""
+        return sum(
+            (end - start) * (self.plans[cell].share if cell in self.plans else 1.0)
+            for cell, start, end in self.runs
+        )
+
 
 @dataclass
 class Study:

@@ -136,7 +136,7 @@ def hear(socket, *kinds, timeout=WAIT_S):
             say(socket, type="drawn", frame=message["frame"])
         if message["type"] in kinds:
             return message
-    raise AssertionError(f"no {kinds}")
+    raise TimeoutError(f"no {kinds}")
 
 
 def say(socket, **content):

@@ -36,7 +36,8 @@ def chromium(folder):
     )  # fmt: skip
     said = folder / "DevToolsActivePort"
     try:
-        port, _ = wait_for(lambda: said.exists() and said.read_text().split())
+        # It writes the port before its own path, in two lines.
+        port, _ = wait_for(lambda: said.exists() and len(f := said.read_text().split()) == 2 and f)
         yield process, f"http://127.0.0.1:{port}"
     finally:
         kill(process)

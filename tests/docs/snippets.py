@@ -55,7 +55,8 @@ SHORTER = (
     ),
     (re.compile(r"^dsa-des study .*--replicas"), "--replicas 2 --workers 1"),
     (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1 --set duration_s=10"),
-    (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),
+    (re.compile(r"^dsa-des cost (?!--|.*--answer)"), "--duration 2 --repeats 1"),
+    (re.compile(r"^dsa-des cost .*--answer"), "--set replicas=2 --repeats 1 --workers 1"),
     (re.compile(r"^dsa-des cost first_light --out"), "--block radar"),
     # As it stands is run what the README begins with.
     (re.compile(r"^dsa-des run (?!first_light$)"), "--duration 10 --no-figures"),

@@ -61,6 +61,7 @@ while True:
             child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
             (FOLDER / "child").write_text(str(child.pid))
             if WAY == "hang":
+                print(file=sys.stderr, flush=True)  # whoever waits for an answer looks up
                 time.sleep(600)
         if WAY == "garbage":
             say(b"Hello, world! This is no message.")

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -69,16 +70,18 @@ def gone(folder, name="pid"):
     [
         ("die", "ended with exit code 7; its last words: line one | the engine is on fire"),
         ("signal", "died of signal 11 (SIGSEGV); its last words"),
-        ("hang", "has not answered within deadline_s = 2 s; its last words"),
+        ("hang", "has not answered within deadline_s = 100 s; its last words"),
         ("garbage", "sent what is no message: b'Hello, w'"),
         ("no_arrow", "sent what is no Arrow stream"),
         ("half", "ended with exit code 0 in the middle of a message"),
         ("more", "sent 8 bytes that nobody asked for"),
     ],
 )
-def test_a_program_that_fails_ends_the_run_with_its_last_words(folder, way, said):
+def test_a_program_that_fails_ends_the_run_with_its_last_words(folder, way, said, monkeypatch):
+    clock, hangs = time.monotonic, folder / "child"
+    monkeypatch.setattr(time, "monotonic", lambda: clock() + (100.0 if hangs.exists() else 0.0))
     with pytest.raises(BlockFailure) as error:
-        dsa_des.run(scene(canned(way, 3, folder), deadline_s=2.0 if way == "hang" else 60.0))
+        dsa_des.run(scene(canned(way, 3, folder), deadline_s=100.0))
     assert said in str(error.value) and "t = 0.4" in str(error.value)
     assert error.value.exit_code == 3
     assert gone(folder)
@@ -359,3 +362,12 @@ def test_what_is_wrong_with_tracks_is_said(folder, changes, said):
     with pytest.raises(BlockFailure, match=said):
         dsa_des.run(scene(canned("table", 1, folder)))
     assert gone(folder)
+
+
+@pytest.mark.parametrize("way", ["quiet", "table"])
+def test_a_program_that_says_nothing_is_counted(folder, way):
+    """It is asked at five looks; nothing comes back, or at the fourth a detection."""
+    write_table(folder, "detections", {"azimuth_rad": [0.5], "elevation_rad": [0.1]})
+    found = Simulation(dsa_des.load_scene(scene(canned(way, 4, folder)))).run().undone
+    silent = {"it was asked and answered with no row": (5, 5)}
+    assert found.get("part", {}) == (silent if way == "quiet" else {})

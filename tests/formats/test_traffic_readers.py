@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa, read_daa_samples
-from components.formats.sample_table import elapsed_times
+from components.formats.recording import elapsed_times
 from components.formats.text_rows import TrafficFileError
 from components.geometry.ellipsoid import line_of_sight
 

@@ -4,7 +4,6 @@ Each case once ended in a traceback, a hang or a wrong exit code.
 """
 
 import os
-import time
 
 import pytest
 from click.testing import CliRunner
@@ -147,14 +146,12 @@ def test_refused(name, tmp_path, monkeypatch, configs):
     before = {path.name for path in tmp_path.iterdir()}
     monkeypatch.chdir(tmp_path)
     named = {SCENE: configs / "first_light.toml", "REPLAY": configs / "replay_daa.toml"}
-    started = time.process_time()
     result = CliRunner().invoke(main, [str(named.get(word, word)) for word in argv])
     assert result.exit_code == 2, result.output[-300:]
     assert isinstance(result.exception, SystemExit)
     assert "error: " in result.output.lower() and text.lower() in result.output.lower()
     assert len(result.output) < 30_000
     assert {path.name for path in tmp_path.iterdir()} == before
-    assert time.process_time() - started < 20.0
 
 
 def test_thousands_of_problems_are_twenty_and_a_count(tmp_path):

@@ -3,28 +3,28 @@
 import ast
 import re
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
-from parsed import parsed
+from parsed import nodes
 
 ROOT = Path(__file__).parents[2]
 #: With what makes the pages, which calls the product as a user does.
 ROOMS = ("dsa_des", "components", "docs/make")
 
 
-def trees() -> dict[Path, ast.Module]:
-    paths = [p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))]
-    return {path: parsed(path) for path in paths}
+def files() -> list[Sequence[ast.AST]]:
+    return [nodes(p) for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))]
 
 
-def words(tree: ast.Module) -> Counter[str]:
+def words(of: Sequence[ast.AST]) -> Counter[str]:
     """Names, attributes and words of texts that are neither docstrings nor lists of exports."""
-    left_out = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
-    for node in ast.walk(tree):
+    left_out = {id(n.value) for n in of if isinstance(n, ast.Expr)}
+    for node in of:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
             left_out |= {id(part) for part in ast.walk(node)}
     found: Counter[str] = Counter()
-    for node in ast.walk(tree):
+    for node in of:
         if isinstance(node, ast.Name):
             found[node.id] += 1
         elif isinstance(node, ast.Attribute):
@@ -34,23 +34,22 @@ def words(tree: ast.Module) -> Counter[str]:
     return found
 
 
-def uncalled(of: dict[Path, ast.Module], registered: str) -> set[str]:
+def uncalled(of: Sequence[Sequence[ast.AST]], registered: str) -> set[str]:
     used = Counter(re.findall(r"\w+", registered))
-    for tree in of.values():
-        used.update(words(tree))
+    for file in of:
+        used.update(words(file))
+    top = [node for file in of for node in file[0].body]
     public = (ast.FunctionDef, ast.ClassDef)
     # A command of a group is called by its name on the command line.
     commands = {
         node.name
-        for tree in of.values()
-        for node in tree.body
+        for node in top
         if isinstance(node, ast.FunctionDef)
         and any(".command(" in ast.unparse(part) for part in node.decorator_list)
     }
     return {
         node.name
-        for tree in of.values()
-        for node in tree.body
+        for node in top
         if isinstance(node, public) and not node.name.startswith("_") and not used[node.name]
     } - commands
 
@@ -58,10 +57,10 @@ def uncalled(of: dict[Path, ast.Module], registered: str) -> set[str]:
 def test_what_only_tests_call_is_said_to_be_for_users():
     page = (ROOT / "docs" / "reference" / "physics.md").read_text(encoding="utf-8")
     said = set(re.findall(r"\.(\w+)`", page))
-    found = uncalled(trees(), (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    found = uncalled(files(), (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert found <= said
 
 
 def test_a_function_that_nothing_calls_is_found():
     tree = ast.parse("__all__ = ['lonely']\ndef lonely(): ...\ndef used(): ...\nused()\n")
-    assert uncalled({Path("one.py"): tree}, "") == {"lonely"}
+    assert uncalled([list(ast.walk(tree))], "") == {"lonely"}

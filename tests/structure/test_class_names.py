@@ -4,7 +4,7 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
-from parsed import parsed
+from parsed import nodes
 
 ROOT = Path(__file__).parents[2]
 
@@ -14,7 +14,7 @@ def classes(*folders: Path) -> dict[str, list[str]]:
     found = defaultdict(list)
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
-            for node in ast.walk(parsed(path)):
+            for node in nodes(path):
                 if isinstance(node, ast.ClassDef):
                     found[node.name].append(f"{path.relative_to(folder.parent)}:{node.lineno}")
     return found

@@ -9,12 +9,13 @@ import dataclasses
 import importlib
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import networkx as nx
 import pytest
-from parsed import parsed
+from parsed import nodes, parsed
 
 from dsa_des.block.message import Message
 
@@ -50,15 +51,15 @@ def folder_of(module: str) -> str:
     return module if modules()[module].name == "__init__.py" else module.rpartition(".")[0]
 
 
-def tree_of(module: str) -> ast.Module:
-    return parsed(modules()[module])
+def nodes_of(module: str) -> tuple[ast.AST, ...]:
+    return nodes(modules()[module])
 
 
-def docstrings(tree: ast.Module) -> set[int]:
+def docstrings(of: Sequence[ast.AST]) -> set[int]:
     """The nodes of docstrings and of other bare strings, which are for people."""
     return {
         id(node.value)
-        for node in ast.walk(tree)
+        for node in of
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     }
 
@@ -70,11 +71,11 @@ def entry_point_groups() -> set[str]:
         return set(tomllib.load(file)["project"]["entry-points"])
 
 
-def named(tree: ast.Module) -> set[str]:
+def named(of: Sequence[ast.AST]) -> set[str]:
     """Modules of ours that a file imports, at any place and in any way."""
     found = set()
-    prose = docstrings(tree)
-    for node in ast.walk(tree):
+    prose = docstrings(of)
+    for node in of:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -93,7 +94,7 @@ def imports() -> nx.DiGraph:
     graph = nx.DiGraph()
     graph.add_nodes_from(modules())
     graph.add_edges_from(
-        (module, other) for module in modules() for other in named(tree_of(module))
+        (module, other) for module in modules() for other in named(nodes_of(module))
     )
     graph.remove_edges_from(list(nx.selfloop_edges(graph)))
     return graph
@@ -174,7 +175,7 @@ def test_no_folder_holds_more_files_than_one_sees_at_a_glance():
 
 def test_every_package_says_what_it_is_in_a_sentence_of_its_own():
     said = {
-        module: ast.get_docstring(tree_of(module)) or ""
+        module: ast.get_docstring(parsed(path)) or ""
         for module, path in modules().items()
         if path.name == "__init__.py"
     }
@@ -207,11 +208,11 @@ def words_of(messages: list[type[Message]]) -> set[str]:
     return words
 
 
-def mentioned(tree: ast.Module) -> set[str]:
+def mentioned(of: Sequence[ast.AST]) -> set[str]:
     """Identifiers in the texts of a file, without what is prose, and the attributes it reads."""
-    prose = docstrings(tree)
+    prose = docstrings(of)
     found = set()
-    for node in ast.walk(tree):
+    for node in of:
         if isinstance(node, ast.Attribute):
             found.add(node.attr)
         elif (
@@ -229,8 +230,8 @@ def test_the_engine_names_no_column_of_a_message_of_components():
     )
     assert {"azimuth_rad", "detections", "snr_db", "true_range_m"} <= sensors
     found = {
-        module: sorted(mentioned(tree_of(module)) & sensors)
+        module: sorted(mentioned(nodes_of(module)) & sensors)
         for module in modules()
-        if module.split(".")[0] == ENGINE and mentioned(tree_of(module)) & sensors
+        if module.split(".")[0] == ENGINE and mentioned(nodes_of(module)) & sensors
     }
     assert found == {}

@@ -39,9 +39,10 @@ def test_a_list_is_sorted_and_has_no_doubles(tier: str) -> None:
 
 @pytest.mark.parametrize("tier", TIERS)
 def test_what_is_listed_is_marked(tier: str, request: pytest.FixtureRequest) -> None:
+    listed = set(LISTED[tier])
     for item in request.session.items:
         file, _, rest = item.nodeid.partition("::")
-        if {file, f"{file}::{rest.partition('[')[0]}"} & set(LISTED[tier]):
+        if {file, f"{file}::{rest.partition('[')[0]}"} & listed:
             assert item.get_closest_marker(tier) and item.get_closest_marker("slow")
 
 

@@ -141,16 +141,17 @@ class _Process:
     def sum(name: str, parts: list[Done]) -> Done:
         return Done(name, b"", sum(p.runs for p in parts), 0, sum(p.crashed for p in parts))
 
-    def all(self, chunks: list[Chunk], guilty: set[int]) -> list[Done]:
-        attempts, found = Attempts(None, chunks), []  # type: ignore[arg-type]
+    def all(self, *together: tuple[Chunk, ...], guilty: set[int]) -> list[Done]:
+        attempts, found = Attempts(None, together), list[Done]()  # type: ignore[arg-type]
         while (piece := attempts.next()) is not None:
-            replicas = {k for _, start, end in piece.chunk.runs for k in range(start, end)}
-            if replicas & guilty:
-                self.deaths.append(piece.chunk)
-                done = attempts.lost(piece)
+            runs = [run for chunk in piece.chunks for run in chunk.runs]
+            if {k for _, start, end in runs for k in range(start, end)} & guilty:
+                self.deaths += piece.chunks
+                found += attempts.lost(piece)
             else:
-                done = attempts.done(piece, Done(piece.chunk.name, b"", len(piece.chunk), 0))
-            found += [done] if done is not None else []
+                found += attempts.done(
+                    piece, [Done(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
+                )
         return found
 
 
@@ -158,21 +159,32 @@ def test_the_guilty_run_of_a_large_chunk_is_found_by_halving(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     process = _Process(monkeypatch)
-    (done,) = process.all([Chunk("one", ((0, 0, 100), (1, 100, 128)))], {77})
+    (done,) = process.all((Chunk("one", ((0, 0, 100), (1, 100, 128))),), guilty={77})
     assert (done.runs, done.crashed) == (128, 1)
     assert len(process.deaths) <= 2 + 7 + TRIES
     assert [chunk.runs for chunk in process.deaths[-TRIES:]] == [((0, 77, 78),)] * TRIES
 
 
+def test_chunks_that_were_run_together_are_run_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    process = _Process(monkeypatch)
+    chunks = tuple(Chunk(name, ((0, 4 * k, 4 * k + 4),)) for k, name in enumerate("abc"))
+    found = process.all(chunks, guilty={6})
+    assert sorted((done.name, done.runs, done.crashed) for done in found) == [
+        ("a", 4, 0), ("b", 4, 1), ("c", 4, 0),
+    ]  # fmt: skip
+    assert [chunk.name for chunk in process.deaths[:3]] == ["a", "b", "c"]
+    assert {chunk.name for chunk in process.deaths[3:]} == {"b"}
+
+
 def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    attempts = Attempts(None, [Chunk("a", ((0, 0, 1),)), Chunk("b", ((0, 1, 2),))])  # type: ignore[arg-type]
+    attempts = Attempts(None, [(Chunk("a", ((0, 0, 1),)),), (Chunk("b", ((0, 1, 2),)),)])  # type: ignore[arg-type]
     first, second = attempts.next(), attempts.next()
     assert first is not None and second is not None
     attempts.lost(first)
     assert attempts.next() is None  # the other one is still under way
-    attempts.done(second, Done("b", b"", 1, 0))
+    attempts.done(second, [Done("b", b"", 1, 0)])
     again = attempts.next()
-    assert again is not None and again.chunk.name == "a" and attempts.next() is None
+    assert again is not None and again.chunks[0].name == "a" and attempts.next() is None
 
 
 def test_halves_hold_each_run_once() -> None:

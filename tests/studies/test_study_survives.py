@@ -38,8 +38,9 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def undisturbed(name: str = "alone") -> dict[str, bytes]:
+def undisturbed(name: str = "alone", repeat: str = "") -> dict[str, bytes]:
     study = read_study("study.toml")
+    study.repeat = repeat
     finish(study, run_into(study, Path(name), 1, False), quiet=True)
     return contents(Path(name))
 
@@ -68,7 +69,7 @@ def released(small: Path) -> Path:
 
 def test_a_killed_study_continues_to_the_same_bytes(released: Path) -> None:
     released.touch()
-    whole = undisturbed()
+    whole = undisturbed(repeat=f"dsa-des study {Path('study.toml').resolve()}")
     released.unlink()
     process = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--quiet")
     parts = Path("killed/parts")

@@ -130,6 +130,9 @@ class ForeignFmu(Component):
         self._saved = _Saved(0, self._freed.slots)
         self._last: FloatArray = np.array(wiring.defaults)
         self._set: FloatArray = np.full(len(wiring.defaults), np.nan)
+        # Which sources have given a value, and at how many communication points they had not.
+        self._fed = np.zeros(len(wiring.sources), dtype=bool)
+        self._unfed, self._points = np.zeros(len(wiring.sources), dtype=np.int64), 0
         self._told: FloatArray = np.zeros(len(self.p.manoeuvre))
         self._traffic: Any = None
         self._scales: dict[int, tuple[float, float]] = {}
@@ -161,6 +164,16 @@ class ForeignFmu(Component):
         said = self.p.step_that_does_not_fit()
         return [] if said is None else [said]
 
+    def undone(self) -> dict[str, tuple[int, int]]:
+        """Return how often its inputs had nothing from where they are read."""
+        found: dict[str, tuple[int, int]] = {}
+        lacks = zip(self.p.wiring.sources, self._unfed.tolist(), strict=True)
+        for (_, block, _, _, _, key), times in lacks if self._points else ():
+            what = f"{key} has had nothing from {block} and keeps its start value"
+            before = found.get(what, (0, 0))  # of an array, each element counts
+            found[what] = before[0] + times, before[1] + self._points
+        return found
+
     def close(self) -> None:
         """End the FMU's process: the simulation is over."""
         self._process.close()
@@ -176,7 +189,7 @@ class ForeignFmu(Component):
             own = np.array([row for row in own if due[row] or self._waiting], dtype=np.int64)
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
-        values, traffic = self._values(wake)
+        values, traffic = self._values(wake, own)
         seen_from = truth = None
         if self.p.detections and self._sees_own:
             moves = wiring.detections.asks_for_velocity()
@@ -240,8 +253,12 @@ class ForeignFmu(Component):
                 due[row].append(number)
         return due
 
-    def _values(self, wake: Wake) -> tuple[FloatArray, Any]:
-        """Return the inputs at each row, and the traffic with the row that holds there."""
+    def _values(self, wake: Wake, own: IntArray) -> tuple[FloatArray, Any]:
+        """Return the inputs at each row, and the traffic with the row that holds there.
+
+        `own` are the rows that are communication points.
+        """
+        fed = np.tile(self._fed, (len(wake), 1))
         values = np.tile(self._last, (len(wake), 1))
         traffic: list[tuple[Any, IntArray]] = []
         for arrivals in wake.arrivals("messages"):
@@ -249,7 +266,7 @@ class ForeignFmu(Component):
             place = np.searchsorted(arrivals.tick, wake.ticks, side="right") - 1
             if self.p.ownship and isinstance(message, TrafficStates):
                 traffic.append((message, place))
-            for at, block, column, which, variable, key in self.p.wiring.sources:
+            for n, (at, block, column, which, variable, key) in enumerate(self.p.wiring.sources):
                 if block != arrivals.source or not len(message):
                     continue
                 if at not in self._scales:
@@ -263,7 +280,11 @@ class ForeignFmu(Component):
                 held = np.maximum.accumulate(np.where(known, np.arange(len(came)), -1))[place]
                 there = (place >= 0) & (held >= 0)
                 values[there, at] = came[held[there]]
+                fed[there, n] = True
+        self._unfed = self._unfed + np.count_nonzero(~fed[own], axis=0)
+        self._points += len(own)
         if len(values):
+            self._fed = fed[-1].copy()
             self._last = values[-1].copy()
         return values, self._held_traffic(wake, traffic)
 

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from docs.make.accuracy_and_cost import DOCS, PIXEL_DEG, cut_off, radar_sees_from
+from docs.make.accuracy_and_cost.__main__ import DOCS, PIXEL_DEG, cut_off, radar_sees_from
 from dsa_des.scene.scene import load_scene
 
 PAGE = (DOCS / "accuracy-and-cost.md").read_text(encoding="utf-8")

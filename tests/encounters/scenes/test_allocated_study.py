@@ -45,6 +45,27 @@ blocks.traffic.encounter = {{ sequence = [0, 1] }}
 """
 
 
+CONF = (Path(__file__).parents[3] / "configs/alerting/do365b.conf").as_posix()
+BREAKING = """\
+from components.encounters.risk_metric import EncounterWeight
+from dsa_des.studies.metric import NUMBER, Result
+
+
+class Breaking(EncounterWeight):
+    def results(self):
+        return [Result("number", NUMBER, "of the encounter")]
+
+    def measure(self, group):
+        number = super().measure(group)["encounter"]
+        if len(group.duration_s) and (number % 4 == 3).any():
+            raise ValueError("broken")
+        return {"number": number}
+
+    def foresee(self, group):
+        return self.measure(group)
+"""
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Scene and set; the first 20 runs are the pilot."""
@@ -101,7 +122,7 @@ def test_flown_runs_are_those_of_the_whole_study_and_the_ratio_is_that_of_their_
     assert summary["nmac_nominal"]["value"] == pytest.approx(n.mean())
 
 
-def test_the_same_bytes_with_two_workers_other_chunks_and_after_a_stop(folder: Path) -> None:
+def test_the_same_bytes_with_other_chunks_and_after_a_stop(folder: Path) -> None:
     allocate = 'allocate = ["nmac_risk_ratio", "well_clear_lost_risk_ratio"]'
     one = rows(study(folder, "one", allocate))
     path = folder / "one.toml"
@@ -125,6 +146,68 @@ def test_axes_share_the_draws_and_each_cell_learns_by_itself(folder: Path) -> No
     assert both[1] < both[0]
     printed = CliRunner().invoke(main, ["study", "show", str(found), "--no-figures"])
     assert printed.exit_code == 0 and "of 60 runs were flown" in printed.stdout
+
+
+def test_runs_that_fail_are_stood_for_by_those_flown_like_them(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A metric that breaks for every fourth encounter that is flown, and what they stood for."""
+    half = lambda self, runs: np.full(len(runs.weight), 0.5)  # noqa: E731
+    monkeypatch.setattr(allocation.Allocation, "probabilities", half)
+    (folder / "own.py").write_text(BREAKING, encoding="utf-8")
+    more = '[[metrics]]\nmetric = "./own.py:Breaking"'
+    text = STUDY.replace("[draws]", f"{more}\n[draws]")
+    (folder / "failing.toml").write_text(
+        text.format(allocate='allocate = "nmac_risk_ratio"', more=""), encoding="utf-8"
+    )
+    dsa_des.study(folder / "failing.toml", out=folder / "failing", workers=1)
+    found = rows(folder / "failing")
+    s, failed = np.array(found["stands_for"]), np.array([e is not None for e in found["error"]])
+    flown = s > 0.0
+    assert failed.sum() == (flown & (np.arange(60) % 4 == 3)).sum() > 5
+    kept = ~failed
+    others = np.where(kept & flown, s - 1.0, 0.0)
+    lost = (s[failed & flown] - 1.0).sum()
+    s = s + others * lost / others.sum()
+    w, n = np.array(found["encounter_weight"])[kept], np.array(found["nmac_nominal"])[kept]
+    m = np.array([0.0 if x is None else x for x in found["nmac_mitigated"]])[kept]
+    (mine,) = [r for r in pq.read_table(folder / "failing" / "ratios.parquet").to_pylist()
+               if r["result"] == "nmac_risk_ratio"]  # fmt: skip
+    assert lost > 0.0 and mine["ratio"] == pytest.approx((w * m * s[kept]).sum() / (w * n).sum())
+
+
+def test_an_early_end_is_that_of_the_rounds_before_and_of_any_number_of_workers(
+    folder: Path,
+) -> None:
+    allocate = (
+        'allocate = "well_clear_lost_risk_ratio"\n'
+        'stop_when = { metric = "well_clear_lost_risk_ratio", half_width = 0.9, batch = 20 }'
+    )
+    one = rows(study(folder, "one", allocate))
+    assert len(one["replica"]) == 40 and 0.0 in one["stands_for"][20:]
+    two = rows(study(folder, "two", allocate, workers=2))
+    assert two == one
+    sorted((folder / "two" / "parts").glob("part-001-*"))[-1].unlink()
+    dsa_des.study(folder / "two.toml", out=folder / "two", resume=True, workers=1)
+    assert rows(folder / "two") == one
+
+
+def test_a_chain_without_a_tracker_is_sampled_too(folder: Path) -> None:
+    """The alerting is fed by the truth; it turns or climbs."""
+    scene = SCENE.replace(
+        '"traffic -> transform -> gate -> radar -> fusion -> tracker -> avoidance"',
+        '"traffic -> alerting -> avoidance"',
+    )
+    head = scene[: scene.index("transform =")]
+    scene = (
+        f'{head}alerting = {{ type = "alerting.daidalus", scan_rate_hz = 1, conf = "{CONF}" }}\n'
+        f'avoidance = {{ type = "avoidance.daidalus", conf = "{CONF}", manoeuvre = "climb" }}\n'
+    )
+    (folder / "scene.toml").write_text(scene, encoding="utf-8")
+    found = rows(study(folder, "true", 'allocate = "well_clear_lost_risk_ratio"'))
+    assert found["error"] == [None] * 60 and 0.0 in found["stands_for"]
+    assert {1.0} == {m for m, s in zip(found["manoeuvred"], found["stands_for"], strict=True)
+                     if s > 0.0 and m == 1.0}  # fmt: skip
 
 
 @pytest.mark.parametrize(

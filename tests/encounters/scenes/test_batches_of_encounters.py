@@ -9,6 +9,7 @@ from wired import chain, sensor
 import dsa_des
 from components.encounters import encounter_traffic
 from components.encounters.encounter_traffic import MadeTogether
+from dsa_des.replicas import replicas
 from dsa_des.replicas.replicas import most_together
 from tests.encounters.test_pairing import GAS
 
@@ -31,9 +32,10 @@ def made(monkeypatch: pytest.MonkeyPatch) -> dict[str, Counter[Any]]:
 
 
 def test_a_chunk_beyond_any_cache_makes_each_encounter_once(
-    made: dict[str, Counter[Any]], tmp_path: Any
+    made: dict[str, Counter[Any]], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of 1,300 runs in one chunk, 1,024 of which run together; then the metrics ask again."""
+    """Of 1,300 runs in one chunk, 650 of which run together; then the metrics ask again."""
+    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 1024)
     scene = chain({"radar": sensor("radar.range_boundary", scan_rate_hz=1)}, duration_s=1)
     (tmp_path / "model.txt").write_text(GAS, encoding="utf-8")
     scene["blocks"]["traffic"] = {

@@ -299,3 +299,18 @@ def test_what_it_detects_has_a_direction(eye):
     found["blocks"]["eye"]["detections"] |= {"elevation_rad": 2.0}
     with pytest.raises(BlockFailure, match=r"detections\.elevation_rad is 2 for what it detected"):
         dsa_des.run(found)
+
+
+@pytest.mark.parametrize(("range_km", "times"), [(0.001, 10), (20.0, 0)])
+def test_an_input_that_nothing_comes_to_is_counted(eye, range_km, times):
+    """A radar that is to say how far two targets are has never seen anybody."""
+    found = scene(eye(), targets=_NAMES, duration_s=1)
+    found["blocks"]["radar"] = {
+        "type": "radar.range_boundary", "range_km": range_km, "scan_rate_hz": 5,
+    }  # fmt: skip
+    found["blocks"]["eye"]["inputs"]["range_in"] = "radar.range_m[*]"
+    found["wires"] += ["gate -> radar", "radar -> eye"]
+    counted = Simulation(dsa_des.load_scene(found)).run().undone["eye"]
+    what = "inputs.range_in has had nothing from radar and keeps its start value"
+    assert counted.pop(what) == (times, 10)
+    assert list(counted.values()) == [(0, 10), (0, 10)]

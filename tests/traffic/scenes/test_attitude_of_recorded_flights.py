@@ -11,7 +11,7 @@ from components.display.terminal import attitude_lines
 from components.flights.attitude import attitude_from_path, fit_path
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
-from components.traffic.files import derived_attitude
+from components.traffic.recorded import derived_attitude
 
 KNOT, FOOT = 1852 / 3600, 0.3048
 

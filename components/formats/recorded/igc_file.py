@@ -1,0 +1,90 @@
+"""Read IGC files, the flight recorders' of gliders (FAI, technical specification of 2023)."""
+
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+
+from components.formats.reports import Log, Report
+from components.formats.text_rows import Problems, lines_of
+
+_DATE = re.compile(r"HFDTE(?:DATE)?:?\s*(\d\d)(\d\d)(\d\d)", re.IGNORECASE)
+_FIX = re.compile(
+    r"B(\d\d)(\d\d)(\d\d)(\d\d)(\d{5})([NS])(\d{3})(\d{5})([EW])([AV])(-\d{4}|\d{5})(-\d{4}|\d{5})"
+)
+#: Whose header says what the aircraft is called: competition number, else registration.
+_NAMES = (re.compile(r"HFCID[^:]*:\s*(\S.*)", re.I), re.compile(r"HFGID[^:]*:\s*(\S.*)", re.I))
+_EXTENSION = re.compile(r"(\d\d)(\d\d)([A-Z0-9]{3})")
+_DAY = timedelta(days=1)
+
+
+def is_igc(head: bytes) -> bool:
+    """Tell whether some content begins as an IGC file does."""
+    lines = head.lstrip(b"\xef\xbb\xbf\r\n ").splitlines()[:60]
+    first = lines[0][:1] if lines else b""
+    return first == b"A" and any(re.match(rb"HFDTE|B\d{13}[NS]", line) for line in lines[1:])
+
+
+def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
+    """Return the flight of an IGC file: pressure altitude, GNSS altitude above the ellipsoid."""
+    lines = lines_of(data, problems)
+    return Log("an IGC file", "m", _fixes(problems, lines, _name(lines) or stem), {}, "fixes")
+
+
+def _name(lines: list[tuple[int, str]]) -> str:
+    for pattern in _NAMES:
+        for _, line in lines[:200]:
+            if match := pattern.match(line):
+                return match[1].strip()
+    return ""
+
+
+def _fixes(
+    problems: Problems, lines: list[tuple[int, str]], name: str
+) -> Iterator[tuple[int, Report]]:
+    day: datetime | None = None
+    last_s = -1
+    more: dict[str, slice] = {}
+    pressed = any(one[1][25:30].strip("0") for one in lines if _FIX.match(one[1]))
+    for number, line in lines:
+        if match := _DATE.match(line):
+            try:
+                day = datetime(2000 + int(match[3]), int(match[2]), int(match[1]), tzinfo=UTC)
+            except ValueError:
+                problems.add(f"{line[:24]!r} is no date", line=number)
+            if day is not None and day.year > 2079:
+                day = day.replace(year=day.year - 100)
+            last_s = -1
+        elif line.startswith("I") and line[1:3].isdigit():
+            parts = _EXTENSION.findall(line[3:])
+            more = {code: slice(int(first) - 1, int(end)) for first, end, code in parts}
+        elif line.startswith("B"):
+            fix = _FIX.match(line)
+            if fix is None:
+                problems.add("the fix is damaged: B record expected", line=number)
+                continue
+            if day is None:
+                problems.fail("there is no date (HFDTE) before its first fix", line=number)
+            of_day = 3600 * int(fix[1]) + 60 * int(fix[2]) + int(fix[3])
+            if of_day < last_s - 43_200:  # past midnight
+                day += _DAY
+            last_s = of_day
+            lat = _angle(fix[4], fix[5], _digits(line, more.get("LAD")), fix[6] == "S")
+            lon = _angle(fix[7], fix[8], _digits(line, more.get("LOD")), fix[9] == "W")
+            tenths = _digits(line, more.get("TDS"))
+            time_s = day.timestamp() + of_day + (float(f"0.{tenths}") if tenths else 0.0)
+            geometric = float(fix[12]) if fix[10] == "A" else None
+            yield (
+                number,
+                Report(name, time_s, lat, lon, geometric, float(fix[11]) if pressed else None),
+            )
+
+
+def _digits(line: str, where: slice | None) -> str:
+    """Return further digits that an extension of the fix holds."""
+    digits = "" if where is None else line[where]
+    return digits if digits.isdigit() else ""
+
+
+def _angle(degrees: str, thousandths: str, more: str, is_negative: bool) -> float:
+    minutes = int(thousandths + more) / 10.0 ** (3 + len(more))
+    return (-1.0 if is_negative else 1.0) * (int(degrees) + minutes / 60.0)

@@ -1,0 +1,170 @@
+"""The traffic of recorded files: which aircraft of which files, when and where, and who is own."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from components.formats.recorded.known_kinds import record
+from components.formats.recorded.selection import (
+    led_by,
+    moved,
+    named,
+    together,
+    within_space,
+    within_time,
+    without,
+)
+from components.formats.recording import Recording, Samples
+from components.formats.sample_columns import Altitude
+from components.formats.text_rows import TrafficFile
+
+_EVERYWHERE = (-90.0, 90.0, -180.0, 180.0)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is taken of recorded files; see the parameters of ``traffic.file``.
+
+    Parameters
+    ----------
+    ownship : str, optional
+        Name or callsign; by default the first aircraft.
+    altitude : optional
+    reference : (latitude, longitude, altitude)
+        Of an ``.xyz`` file's origin.
+    own_file : Path, optional
+        Whose `ownship` is flown among the aircraft of the other files.
+    own_starts_s : float, optional
+        When the ownship's first sample is flown, after the first one of the other files.
+    own_moved : (north, east, up)
+        How far the ownship's flight is moved, m.
+    scripted : bool
+        The ownship is in no file: all aircraft are others.
+    from_s, to_s : float, optional
+        After the earliest sample; time 0 is at `from_s`, else at the first sample of `own_file` or
+        of all.
+    box : (south, north, west, east)
+        Degrees; the others are there inside of it only.
+    heights : (lowest, highest)
+    longest_gap_s : float, optional
+    without : tuple of str
+        Names or callsigns of aircraft that are left out.
+    """
+
+    ownship: str | None = None
+    altitude: Altitude | None = None
+    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    own_file: Path | None = None
+    own_starts_s: float | None = None
+    own_moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scripted: bool = False
+    from_s: float | None = None
+    to_s: float | None = None
+    box: tuple[float, float, float, float] | None = None
+    heights: tuple[float, float] = (-math.inf, math.inf)
+    longest_gap_s: float | None = None
+    without: tuple[str, ...] = ()
+
+
+def read_traffic(paths: Sequence[Path], choice: Choice) -> TrafficFile:
+    """Return the flights of recorded files, the ownship's first.
+
+    TrafficFileError says all that is wrong.
+    """
+    names = [path.stem for path in paths]
+    each = (record(path, choice.altitude, choice.reference) for path in paths)
+    whole = without(together(zip(names, each, strict=True)), choice.without)
+    start_s = _earliest(whole)
+    own = {} if choice.scripted else _own(whole, choice, start_s)
+    others = {name: columns for name, columns in whole.samples.items() if name not in own}
+    begin_s, end_s = _window(choice, start_s, own)
+    kept = {}
+    for name, columns in others.items():
+        inside: Samples | None = within_time(columns, begin_s, end_s)
+        if inside is not None and (choice.box or choice.heights != Choice.heights):
+            inside = within_space(inside, choice.box or _EVERYWHERE, choice.heights)
+        if inside is not None:
+            kept[name] = inside
+    if others and not kept:
+        _none_is_there(whole, others, begin_s, end_s)
+    if len(kept) < len(others):
+        gone = len(others) - len(kept)
+        said = f"{gone} of {len(others)} aircraft are not there in the time and place chosen"
+        whole.notes.harmless.append(said)
+    for name, columns in own.items():
+        own[name] = within_time(columns, begin_s, end_s) or columns
+    file = replace(whole, samples=own | kept).flights(choice.longest_gap_s, begin_s)
+    return file if math.isinf(end_s) else replace(file, end_s=end_s - begin_s)
+
+
+def _earliest(recording: Recording) -> float:
+    return min((float(c["time"][0]) for c in recording.samples.values()), default=0.0)
+
+
+def _own(whole: Recording, choice: Choice, start_s: float) -> dict[str, Samples]:
+    """Return the ownship's samples by its name, which no other aircraft has."""
+    if choice.own_file is None:
+        own = next(iter(whole.samples)) if choice.ownship is None else named(
+            whole.problems, whole, choice.ownship
+        )  # fmt: skip
+        whole.samples = led_by(whole, own).samples
+        called, columns = own, whole.samples[own]
+    else:
+        flight = record(choice.own_file, choice.altitude, choice.reference)
+        own = next(iter(flight.samples)) if choice.ownship is None else named(
+            flight.problems, flight, choice.ownship
+        )  # fmt: skip
+        columns, called = flight.samples[own], own
+        while called in whole.samples:
+            called += " (own)" if called == own else "'"
+        whole.notes.add(flight.notes, choice.own_file.name)
+        if flight.height != whole.height:
+            said = f"heights of the ownship: {flight.height}; of the others: {whole.height}"
+            whole.notes.harmless.append(said)
+    later_s = 0.0
+    if choice.own_starts_s is not None:
+        others = replace(whole, samples={n: c for n, c in whole.samples.items() if n != called})
+        first_s = _earliest(others) if others.samples else start_s
+        later_s = first_s + choice.own_starts_s - float(columns["time"][0])
+    return {called: moved(columns, later_s, *choice.own_moved)}
+
+
+def _window(choice: Choice, start_s: float, own: dict[str, Samples]) -> tuple[float, float]:
+    """Return from when to when aircraft are flown; for ever where nothing says an end."""
+    begin_s, end_s = start_s, math.inf
+    for columns in own.values():
+        if choice.own_file is not None:
+            begin_s, end_s = float(columns["time"][0]), float(columns["time"][-1])
+        elif choice.own_starts_s is not None:
+            begin_s = min(start_s, float(columns["time"][0]))
+    if choice.from_s is not None:
+        begin_s = start_s + choice.from_s
+    if choice.to_s is not None:
+        end_s = start_s + choice.to_s
+    return begin_s, end_s
+
+
+def _none_is_there(
+    whole: Recording, others: dict[str, Samples], begin_s: float, end_s: float
+) -> None:
+    first_s = min(float(c["time"][0]) for c in others.values())
+    last_s = max(float(c["time"][-1]) for c in others.values())
+    ends = f" to {clock(end_s)}" if math.isfinite(end_s) else " on"
+    whole.problems.fail(
+        f"no other aircraft is there from {clock(begin_s)}{ends}, in the box and between the "
+        f"heights that are chosen: the files hold {clock(first_s)} to {clock(last_s)}; from_s and "
+        "to_s, or own_starts_s, choose another time"
+    )
+
+
+#: Clocks that read more count from 1970.
+_EPOCH_S = 1e8
+
+
+def clock(time_s: float) -> str:
+    """Return an instant as it is said to people: in UTC where the clock counts from 1970."""
+    if not _EPOCH_S < time_s < 4e9:
+        return f"{time_s:.1f} s"
+    return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

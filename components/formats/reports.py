@@ -1,0 +1,100 @@
+"""Reports of aircraft one by one, as receivers, trackers and autopilots log them."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from components.formats.recording import Recording
+from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
+from components.formats.sample_table import SampleTable
+from components.formats.text_rows import Problems
+
+
+class Report(NamedTuple):
+    """One report: a number each, or what stands in its place; in SI units, degrees."""
+
+    name: str
+    time: Any
+    lat: Any = None
+    lon: Any = None
+    geometric: Any = None
+    barometric: Any = None
+    trk: Any = None
+    gs: Any = None
+    vs: Any = None
+    yaw: Any = None
+    pitch: Any = None
+    roll: Any = None
+
+
+class Log(NamedTuple):
+    """What a file of reports is: what it is called, its units, and its reports with their places.
+
+    `callsigns` are known, by the names of aircraft, when the reports are read; `rows` is what its
+    places count.
+    """
+
+    kind: str
+    units: str
+    reports: Iterator[tuple[int, Report]]
+    callsigns: Mapping[str, str]
+    rows: str = "reports"
+    #: What its reader has to say of it, when the reports are read.
+    warnings: Sequence[str] = ()
+
+
+_MOVES = {"trk": "track", "gs": "speed", "vs": "climb rate"}
+_ANGLES = ("yaw", "pitch", "roll")
+#: Where values stand in a report.
+_PLACE = {name: place for place, name in enumerate(Report._fields)}
+
+
+def recording_of(
+    problems: Problems, log: Log, ownship: str | None = None, altitude: Altitude | None = None
+) -> Recording:
+    """Return the aircraft of a log; the ownship is the first, or called by its name or callsign.
+
+    Heights are pressure altitudes, of an aircraft that reports none its geometric height; with
+    `altitude`, those of that kind alone. Aircraft of one report are there at that instant only. All
+    that is wrong is one `TrafficFileError`.
+    """
+    kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
+    heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
+    headers = {
+        "time": "time", "lat": "lat", "lon": "lon",
+        **{key: f"{kind} altitude" for key, kind in heights.items()},
+        **_MOVES, **{angle: angle for angle in _ANGLES},
+    }  # fmt: skip
+    columns = {
+        key: SampleColumn(k + 1, header, 1.0) for k, (key, header) in enumerate(headers.items())
+    }
+    table = SampleTable(
+        problems, ("name", *headers.values()), 0, columns, optional=(*_MOVES, *_ANGLES), gaps=True,
+        instead={} if altitude else {"alt": "alt instead"}, rows=log.rows, least=1,
+        seldom=(*_MOVES, *_ANGLES),
+    )  # fmt: skip
+    table.notes.harmless.append(f"read as {log.kind}, {log.units}")
+    places = [_PLACE[str(heights.get(key, key))] for key in headers]
+    for number, one in log.reports:
+        table.add_numbers(number, one.name, [_number(one[place]) for place in places])
+    table.notes.warnings += log.warnings
+    named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
+    own = named[0] if len(named) == 1 else ownship
+    recording = table.recording(
+        own, lambda c: {**c, **enu_velocity(c)},
+        kind=log.kind, units=log.units, callsigns=log.callsigns,
+    )  # fmt: skip
+    others = table.of_second("alt")
+    recording.height = f"{kinds[0 if others is not None else 1]} altitude"
+    if others:
+        recording.height += f", of {others} aircraft {kinds[1]}"
+    return recording
+
+
+def _number(value: Any) -> float:
+    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
+    if type(value) is float:
+        return value if math.isfinite(value) else math.nan
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
+        return math.nan
+    return float(value)

@@ -1,0 +1,98 @@
+"""What each model does to the answers of three shipped studies: the first part of the page.
+
+Tables and sentences are those of ``dsa-des cost STUDY --answer RESULT``, word by word.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsa_des.answers.report import HEADS, AnswerReport
+from dsa_des.commands.cost import CostProgress
+from dsa_des.commands.cost_answer import AnswerOfStudy
+from dsa_des.scene.examples import chosen_file
+from dsa_des.studies.study_file import read_study
+from dsa_des.text.safe_text import shell_line
+
+
+@dataclass(frozen=True)
+class AskedStudy:
+    """A study of the page, and what is asked of it."""
+
+    heading: str
+    study: str
+    answers: tuple[str, ...]
+    sets: tuple[str, ...] = ()
+    listed: tuple[str, ...] = ()
+    budgets: tuple[str, ...] = ()
+
+    def command(self) -> str:
+        """Return the command that gives its tables."""
+        words = ["dsa-des", "cost", self.study]
+        for option, values in (("answer", self.answers), ("set", self.sets), ("vary", self.listed),
+                               ("budget", self.budgets)):  # fmt: skip
+            words += [word for value in values for word in (f"--{option}", value)]
+        return shell_line(words)
+
+
+STUDIES = (
+    AskedStudy(
+        "Risk",
+        "radar_and_camera_risk",
+        ("nmac_risk_ratio", "well_clear_lost_risk_ratio"),
+        ("replicas=4000",),
+        ("blocks.camera.scan_rate_hz=0.5", "blocks.camera.enabled=false"),
+    ),
+    AskedStudy("Scan rate", "radar_scan_rate", ("declaration_range_m.radar",), budgets=("500m",)),
+    AskedStudy(
+        "Tracking",
+        "consistency",
+        ("track_position_error_m", "track_nees_mean", "track_completeness", "track_broken"),
+        listed=("blocks.radar.scan_rate_hz=2",),
+    ),
+)
+
+
+def reports(workers: int, studies: Sequence[AskedStudy] = STUDIES) -> list[AnswerReport]:
+    """Run all studies with all their models."""
+    made = []
+    for asked in studies:
+        study = read_study(chosen_file(asked.study, "study"), sets=asked.sets)
+        answer = AnswerOfStudy(study, asked.answers, None, asked.listed, asked.budgets)
+        with tempfile.TemporaryDirectory() as folder:
+            if answer.run(Path(folder) / "study", workers, CostProgress(silent=False)):
+                raise KeyboardInterrupt
+            made.append(answer.report())
+    return made
+
+
+def head(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIES) -> str:
+    """Return the decision of every study, as the page begins."""
+    lines = []
+    for asked, report in zip(studies, made, strict=True):
+        for name in report.verdicts:
+            said = report.sentences(name)
+            lines.append(f"- **{asked.heading}**, `{name}`. {' '.join(said[1:3])}")
+    return "\n".join(lines)
+
+
+def section(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIES) -> str:
+    """Return the tables and sentences of all studies."""
+    lines: list[str] = []
+    for asked, report in zip(studies, made, strict=True):
+        lines += [f"### {asked.heading}", "", f"`{asked.command()}`", "", *_tables(report)]
+    return "\n".join(lines).rstrip()
+
+
+def _tables(report: AnswerReport) -> list[str]:
+    lines: list[str] = []
+    for result in report.results:
+        rows = list(report.cells(result.name))
+        used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
+        lines += [f"**{report.title_of(result.name)}**", ""]
+        lines.append(f"| {' | '.join(HEADS[k] for k in used)} |")
+        lines.append("|---" * len(used) + "|")
+        lines += [f"| {' | '.join(row[k] for k in used)} |" for row in rows]
+        lines += ["", *(f"{line}\n" for line in report.sentences(result.name))]
+    return [*lines, *(f"{line}  " for line in report.about()), ""]

@@ -1,0 +1,125 @@
+"""Running a study's models in turns: a batch of runs with each of them, then the next batch.
+
+What the machine does meanwhile meets all of them alike, so the processor time of a model is taken
+by that of the scene as it is *in the same turn*. The turns follow from the study alone, and the
+rows of a chunk from the chunk: any number of workers gives the same.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from dsa_des.costs.replay import median_and_spread
+from dsa_des.results.folder import StudyFolder
+from dsa_des.studies.executors import Executor
+from dsa_des.studies.study import Chunk, Study
+
+#: Some cells, counted without the axis of models, and the first and last replica of each.
+Batch = list[tuple[int, int, int]]
+#: Fewer turns tell nothing of how much a time varies; more make batches small.
+_FEWEST, _MOST = 5, 16
+
+
+def turns_of(study: Study, many: int | None = None) -> list[Batch]:
+    """Return the batches of a study: of its members where it runs over a sample, or of replicas.
+
+    By default each is as large as the study's chunks.
+    """
+    cells = range(math.prod(len(axis.labels) for axis in study.axes[:-1]))
+    members: dict[Any, list[int]] = {}
+    sizes = [len(axis.labels) for axis in study.axes[:-1]]
+    sampled = [k for k, axis in enumerate(study.axes) if axis.column in study.over]
+    for cell in cells:
+        indices = np.unravel_index(cell, sizes) if sizes else ()
+        members.setdefault(tuple(int(indices[k]) for k in sampled), []).append(cell)
+    groups = list(members.values())
+    by_member = len(groups) >= study.replicas
+    units = len(groups) if by_member else study.replicas
+    per_unit = study.replicas if by_member else 1
+    if many is None:
+        many = min(_MOST, max(_FEWEST, -(-units * per_unit // study.runs_per_chunk)))
+    edges = np.linspace(0, units, min(many, units) + 1).round().astype(int).tolist()
+    batches = []
+    for start, end in pairwise(edges):
+        if by_member:
+            some = sorted(cell for group in groups[start:end] for cell in group)
+            batches.append([(cell, 0, study.replicas) for cell in some])
+        else:
+            batches.append([(cell, start, end) for cell in cells])
+    return batches
+
+
+@dataclass
+class TurnTimes:
+    """What the runs of each model took of the processor, turn by turn."""
+
+    #: By turn and model.
+    cpu_s: dict[tuple[int, int], float] = field(default_factory=dict)
+    runs: dict[tuple[int, int], int] = field(default_factory=dict)
+
+    def per_run_ms(self, model: int) -> tuple[float, float]:
+        """Return the median over turns, and half the distance between the quartiles."""
+        each = [1e3 * self.cpu_s[key] / self.runs[key] for key in sorted(self.cpu_s)
+                if key[1] == model]  # fmt: skip
+        return median_and_spread(each)
+
+    def of_own(self, model: int) -> tuple[float, float]:
+        """Return a model's time by that of the scene as it is, in the turns that both have."""
+        turns = sorted(turn for turn, of in self.cpu_s if of == model and (turn, 0) in self.cpu_s)
+        each = [
+            (self.cpu_s[turn, model] / self.runs[turn, model])
+            / (self.cpu_s[turn, 0] / self.runs[turn, 0])
+            for turn in turns
+        ]
+        return median_and_spread(each)
+
+
+def run_in_turns(
+    study: Study,
+    folder: StudyFolder,
+    executor: Executor,
+    workers: int,
+    batches: Sequence[Batch],
+    turn_times: TurnTimes,
+    begun: Callable[[float], None],
+    after: Callable[[int], Sequence[int]],
+) -> None:
+    """Run all models of a study, whose last axis they are, into its open folder.
+
+    `begun` is told how long the scene as it is took in the first turn; `after` is told after each
+    turn how many are done, and returns the models to go on with. `turn_times` is filled on the way.
+    """
+    models = len(study.axes[-1].labels)
+
+    def chunks(turn: int, some: Sequence[int]) -> Iterator[Chunk]:
+        for model in some:
+            runs = tuple((cell * models + model, start, end) for cell, start, end in batches[turn])
+            yield Chunk(f"part-{turn:03d}-{model:06d}", runs)
+
+    def run(turn: int, some: Sequence[int]) -> None:
+        for done in executor.run(study, list(chunks(turn, some))):
+            folder.write_part(done.name, done.content)
+            key = turn, int(done.name.rpartition("-")[2])
+            turn_times.cpu_s[key], turn_times.runs[key] = done.cpu_s, done.runs
+
+    # What a process does once, imports and compiled code, is nobody's time: all run one run first.
+    cell, start, _ = batches[0][0]
+    warm = [
+        Chunk(f"part-000-{k:06d}", ((cell * models, start, start + 1),)) for k in range(workers)
+    ]
+    for _ in executor.run(study, warm):
+        pass
+    left: Sequence[int] = range(models)
+    for turn in range(len(batches)):
+        if turn == 0:
+            run(0, [0])
+            begun(turn_times.cpu_s[0, 0])
+            run(0, left[1:])
+        else:  # nobody is always the first, who makes what all of a turn share
+            first = turn % len(left)
+            run(turn, [*left[first:], *left[:first]])
+        left = after(turn + 1)

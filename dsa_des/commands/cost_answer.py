@@ -1,0 +1,270 @@
+"""``dsa-des cost STUDY --answer RESULT``: what each model costs, and does to a study's result."""
+
+import csv
+import io
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dsa_des.answers.alternatives import Alternatives, comparable, find_alternatives, with_models
+from dsa_des.answers.changes import changes_by_model
+from dsa_des.answers.report import AnswerReport, print_report
+from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
+from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
+from dsa_des.commands.cost import CostProgress
+from dsa_des.commands.study import as_sets, check_workers, result_names
+from dsa_des.costs.output import write_table
+from dsa_des.errors import UsageError
+from dsa_des.files.output_file import write_file
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.record.run_folder import write_run_json
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.record import Result
+from dsa_des.results.rows import Rows, StoredRows
+from dsa_des.scene.examples import chosen_file
+from dsa_des.studies.executors import default_workers, make_executor
+from dsa_des.studies.identity import description_text, results_of
+from dsa_des.studies.study import Study, command_of
+from dsa_des.studies.study_file import read_study
+from dsa_des.terminal.terminal import say, say_json
+
+#: Where a study's folder of all runs stands in that of the command.
+_RUNS = "study"
+
+
+def cost_at_the_answer(
+    scene: str | None,
+    answers: tuple[str, ...],
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    block: str | None,
+    listed: tuple[str, ...],
+    repeats: int | None,
+    budgets: tuple[str, ...],
+    workers: int | None,
+    out: str | None,
+    as_json: bool,
+    against: str | None,
+    whole_chain: bool,
+    map_name: str | None,
+) -> None:
+    """Run a study with each model in turn, write tables and print what they come to.
+
+    After ctrl-C the turns that are finished are kept; exit code 130.
+    """
+    for option, given in (("--against", against), ("--all", whole_chain), ("--map", map_name)):
+        if given:
+            raise UsageError(f"{option}: does not go with --answer, where each model stands alone "
+                             "for the scene's own")  # fmt: skip
+    if scene is None:
+        raise UsageError(f"--answer {answers[0]}: give a STUDY (dsa-des examples lists those that "
+                         "are shipped)")  # fmt: skip
+    check_workers(workers)
+    path = chosen_file(scene, "study")
+    sets = (*sets, *as_sets(swaps, seed, None))
+    sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
+    described = read_study(path, sets=sets)
+    words = ["cost", *(word for name in answers for word in ("--answer", name))]
+    words += [word for text in listed for word in ("--vary", text)]
+    described.repeat = command_of(words, sets, described.path)
+    answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
+    target = OutputFolder.chosen(out, Path("runs"), f"{path.stem}-cost")
+    progress = CostProgress(silent=as_json)
+    workers = workers or default_workers()
+    with target.writing() as folder:
+        stopped = answer.run(folder / _RUNS, workers, progress)
+        report = answer.report()
+        if stopped and not report.changes:
+            raise KeyboardInterrupt
+        rows = report.rows()
+        write_table(folder / "answer.parquet", rows)
+        write_file(folder / "answer.csv", _csv(rows))
+        said = {name: report.sentences(name) for name in report.verdicts}
+        content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.about()}
+        write_run_json(folder, {"title": described.title, "cost": content})
+    if as_json:
+        say_json(rows)
+    else:
+        print_report(report)
+        say()
+        say(f"{target.path}: {', '.join(sorted(one.name for one in target.path.iterdir()))}")
+    if stopped:
+        say(f"stopped: interrupted; {answer.done_text()} are kept", err=True)
+        sys.exit(130)
+
+
+class AnswerOfStudy:
+    """A study whose answers are asked for with each of many models."""
+
+    def __init__(
+        self,
+        study: Study,
+        answers: Sequence[str],
+        block: str | None = None,
+        listed: Sequence[str] = (),
+        budgets: Sequence[str] = (),
+        repeats: int | None = None,
+    ) -> None:
+        results = results_of(study)
+        result_names(results, answers, "--answer")
+        self._results: list[Result] = [
+            next(result for result in results if result.name == name)
+            for name in dict.fromkeys(answers)
+        ]
+        self._limits: dict[str, Limit] = parse_limits(budgets, self._results)
+        plain, self._notes = comparable(study)
+        axes = [axis.column for axis in plain.axes if axis.column not in plain.over]
+        places = 1
+        for axis in plain.axes:
+            places *= 1 if axis.column in plain.over else len(axis.labels)
+        self._axes, self._places = axes, places
+        self._refuse_one_run(plain)
+        found: Alternatives = find_alternatives(plain, block, listed, answers)
+        self._found = found
+        if not found.these:
+            whys = [*(f"  {name}: {why}" for name, why in found.unavailable)]
+            raise UsageError(
+                f"{study.path}: no ladder of its scene has a model that can stand for its own and "
+                "changes something; --vary KEY=VALUES lists others",
+                *whys,
+                *(f"  {note}" for note in found.notes),
+            )
+        self.study = with_models(plain, found.these)
+        self._batches: list[Batch] = turns_of(self.study, repeats)
+        self.turn_times = TurnTimes()
+        self._failed: dict[str, str] = {}
+        self._folder: StudyFolder | None = None
+
+    def _refuse_one_run(self, study: Study) -> None:
+        members = len(study.cells) // self._places
+        if members * study.replicas < 2 or (study.over and members < 2):
+            unit = "encounter" if study.over else "run"
+            more = "" if study.over else ": --set replicas=2 or more"
+            raise UsageError(f"{study.path}: one {unit} cannot tell by how much others would "
+                             f"differ{more}")  # fmt: skip
+
+    @property
+    def comparisons(self) -> int:
+        """How many intervals hold together: models by results by places."""
+        return len(self._found.these) * len(self._results) * self._places
+
+    def run(self, path: Path, workers: int, progress: CostProgress) -> bool:
+        """Run all turns into a study's folder; return whether ctrl-C ended it."""
+        executor = make_executor("local", workers, None)
+        folder = self._folder = StudyFolder(path)
+        models, turns = len(self._found.these), len(self._batches)
+        runs = sum(end - start for batch in self._batches for _, start, end in batch)
+        progress.say(
+            f"{models} models and the scene as it is, {runs:,} runs each, in {turns} turns; "
+            "the scene as it is goes first",
+            always=True,
+        )
+
+        def begun(cpu_s: float) -> None:
+            share = sum(end - start for _, start, end in self._batches[0]) / runs
+            rest_s = cpu_s / share * (1 + models) - cpu_s
+            with_so_many = "1 process" if workers == 1 else f"{workers} processes"
+            progress.say(
+                f"about {rest_s / workers:.0f} s with {with_so_many}, if each model costs as much "
+                "as the scene's own; dearer ones take longer. Ctrl-C keeps what is finished; "
+                "--block BLOCK or --set replicas=N asks for less",
+                always=True,
+            )
+
+        def after(done: int) -> list[int]:
+            left = self._left() if done == 1 else list(range(1 + models))
+            if done > 1:
+                left = [k for k in left if self._name(k) not in self._failed]
+            report = self.report()
+            progress.say(f"{self.done_text()}: {_how_many(report)}", always=done < turns)
+            return left
+
+        try:
+            folder.open(description_text(self.study), resume=False)
+            run_in_turns(self.study, folder, executor, workers, self._batches, self.turn_times,
+                         begun, after)  # fmt: skip
+        except KeyboardInterrupt:
+            if not self.turn_times.runs:
+                raise
+            return True
+        finally:
+            executor.close()
+            folder.close()
+        return False
+
+    def _name(self, model: int) -> str:
+        return str(self.study.axes[-1].labels[model])
+
+    def _left(self) -> list[int]:
+        """Return the models that gave something in the first turn, and keep why others did not."""
+        assert self._folder is not None
+        for table in self._folder.each_part():
+            errors = table["error"].to_pylist()
+            if all(error is not None for error in errors):
+                self._failed[table["model"].to_pylist()[0]] = str(errors[0])
+        if self._name(0) in self._failed:
+            raise UsageError(
+                f"{self.study.path}: no run of the scene as it is has a result: "
+                f"{self._failed[self._name(0)]}"
+            )
+        return [k for k in range(len(self.study.axes[-1].labels))
+                if self._name(k) not in self._failed]  # fmt: skip
+
+    def done_text(self) -> str:
+        """Return ``2 of 10 turns``."""
+        models = len(self._found.these) + 1 - len(self._failed)
+        each = [
+            sum(turn == k for turn, _ in self.turn_times.runs) for k in range(len(self._batches))
+        ]
+        return f"{sum(many >= models for many in each)} of {len(self._batches)} turns"
+
+    def report(self) -> AnswerReport:
+        """Return what the runs so far come to."""
+        study, folder = self.study, self._folder
+        assert folder is not None
+        rows = Rows(StoredRows(folder), [axis.column for axis in study.axes], study.over)
+        notes = [*self._notes, *self._found.notes]
+        if rows.failed:
+            died = f", {rows.crashed:,} as their process died" if rows.crashed else ""
+            notes.append(f"{rows.failed:,} runs failed{died}; {_RUNS}/parts says why")
+        return AnswerReport(
+            title=study.title,
+            unit="encounters" if study.over else "replicas",
+            axes=self._axes,
+            models=[one.name for one in self._found.these],
+            results=self._results,
+            limits=self._limits,
+            confidence=study.confidence,
+            comparisons=self.comparisons,
+            changes=changes_by_model(
+                rows, self._results, study.confidence, study.interval, self.comparisons
+            ),
+            turn_times=self.turn_times,
+            failed=self._failed,
+            own=self._found.own,
+            unavailable=self._found.unavailable,
+            notes=notes,
+        )
+
+
+def _how_many(report: AnswerReport) -> str:
+    every = [verdict for some in report.verdicts.values() for verdict in some]
+    taken = sum(verdict.may_be_taken for verdict in every)
+    kinds = [(BEYOND, "beyond the limit"), (OPEN, "open"), (NOTHING, "not compared")]
+    parts = [f"{taken} of {len(every)} may be taken"]
+    parts += [
+        f"{many} {words}" for kind, words in kinds if (many := sum(v.kind == kind for v in every))
+    ]
+    return ", ".join(parts)
+
+
+def _csv(rows: Sequence[dict[str, Any]]) -> bytes:
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue().encode()

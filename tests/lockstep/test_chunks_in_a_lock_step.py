@@ -1,0 +1,113 @@
+"""Chunks are what is written at once; the lock steps that their runs share are another size."""
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from lab import CONFIGS
+
+from dsa_des.errors import SceneError
+from dsa_des.replicas import replicas
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.results.folder import undone_of
+from dsa_des.scene.scene_file import read_scene_file
+from dsa_des.studies import attempts
+from dsa_des.studies.attempts import run_together
+from dsa_des.studies.chunk import run_chunk, run_chunks
+from dsa_des.studies.executors import Serial
+from dsa_des.studies.study import Chunk, Study
+from dsa_des.studies.study_file import study_of_tables
+
+RUNS = 10
+
+
+def study(per_chunk: int, runs: int = RUNS, **more: Any) -> Study:
+    """Encounters in a closed loop that is over before most of them see anybody."""
+    tables = {
+        "replicas": runs, "runs_per_chunk": per_chunk, "metrics": ["risk_ratio"],
+        "draws": {"blocks": {"traffic": {"encounter": {"sequence": [0, 1]}}}}, **more,
+    }  # fmt: skip
+    scene = read_scene_file(CONFIGS / "benchmark" / "closed_loop_risk.toml")
+    return study_of_tables(tables, scene, (), [("duration_s", 4), ("blocks.radar.range_km", 16)])
+
+
+@pytest.fixture
+def shared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many runs each lock step held."""
+    sizes: list[int] = []
+
+    def noted(scenes: Sequence[Any], **how: Any) -> Any:
+        sizes.append(len(scenes))
+        return lock_step(scenes, **how)
+
+    monkeypatch.setattr(replicas, "lock_step", noted)
+    return sizes
+
+
+def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
+    shared: list[int],
+) -> None:
+    rows = []
+    for per_chunk in (4, RUNS):
+        of_size = study(per_chunk)
+        chunks = list(of_size.chunks(0, [0]))
+        del shared[:]
+        parts = list(Serial().run(of_size, chunks))
+        assert shared == [RUNS]
+        assert [part.content for part in parts] == [run_chunk(of_size, c).content for c in chunks]
+        assert [part.runs for part in parts] == [len(chunk) for chunk in chunks]
+        tables = [pq.read_table(io.BytesIO(part.content)) for part in parts]
+        rows.append([row for table in tables for row in table.to_pylist()])
+        said = [undone_of(table) for table in tables]
+        if per_chunk == 4:  # what each lacked is its own
+            assert len({str(one) for one in said}) == 3
+    assert rows[0] == rows[1]
+
+
+def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
+    shared: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 4)
+    whole = list(Serial().run(one := study(RUNS), one.chunks(0, [0])))
+    assert shared == [4, 3, 3]
+    del shared[:]
+    parts = list(Serial().run(one := study(2), one.chunks(0, [0])))
+    assert shared == [4, 2, 4]
+    tables = [pq.read_table(io.BytesIO(part.content)).to_pylist() for part in [*whole, *parts]]
+    assert tables[0] == [row for table in tables[1:] for row in table]
+
+
+def test_every_worker_has_about_as_much() -> None:
+    one = study(1, 24)
+    chunks = list(one.chunks(0, [0]))
+    for workers in (1, 2, 3):
+        sizes = [len(some) for some in run_together(one, chunks, workers)]
+        assert sizes == [24 // workers] * workers
+
+
+def test_cells_without_a_loop_and_single_chunks_are_run_as_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    two = study(4, 8, axes={"blocks.radar.scan_rate_hz": [1, 2]})
+    chunks = list(two.chunks(0, [0, 1]))
+    assert [len(some) for some in run_together(two, chunks, 1)] == [2, 2]  # a cell each
+    for broken in (lambda scene: set(), _refused):
+        monkeypatch.setattr(attempts, "opened_loops", broken)
+        assert [len(some) for some in run_together(two, chunks, 1)] == [1] * 4
+    assert list(run_together(two, chunks[:1], 8)) == [(chunks[0],)]
+    assert list(run_together(two, [], 8)) == []
+
+
+def _refused(scene: Any) -> Any:
+    raise SceneError(["a reason"])
+
+
+def test_runs_that_are_not_next_to_each_other_share_a_lock_step_too(shared: list[int]) -> None:
+    """As those do that crashed, and are run again."""
+    one = study(RUNS)
+    some = [Chunk("a", ((0, 0, 2), (0, 5, 6))), Chunk("b", ((0, 9, 11),))]
+    parts = run_chunks(one, some)
+    assert shared == [5]
+    assert [part.content for part in parts] == [run_chunk(one, chunk).content for chunk in some]
