@@ -20,7 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, symmetric, times
+from components.estimation.batched import (
+    product,
+    product_transposed,
+    squared_length,
+    symmetric,
+    times,
+)
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, linearised
@@ -33,6 +39,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE, LATENCY = range(9)
 # Position and velocity.
 _MOVING = 6
+# Up to this share of it a late position is as late as before.
+_SAME_WAY = 0.1
 # Steeper than this (as a share of the range) a bearing is none.
 _LEVEL = 1e-3
 
@@ -103,13 +111,36 @@ class ReportedErrors:
     age_s: FloatArray  # (n,), for how long positions were carried on by the reported velocity
     # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
+    # (3, n) or None: How far ahead of a late position a target is, by what its track has of that
+    # already, m; NaN where nothing is known but its speed
+    ahead_m: FloatArray | None = None
 
     def repeated(self, times: int) -> "ReportedErrors":
         """Return them so many times, one after the other."""
         return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
+            None if self.ahead_m is None else np.tile(self.ahead_m, times),
         )  # fmt: skip
+
+    def reported_by(self, covariance: FloatArray, velocity: FloatArray) -> "ReportedErrors":
+        """Return them for tracks with some covariances, as far as they were reported by these.
+
+        Later reports are late by the same: they tell nothing of it. The speed is known ever better
+        and the way by which they are late with it, which would seem to tell; so they are as late
+        as the track says, unless it has turned since, or others saw it.
+        """
+        if LATENCY not in self.ways:
+            return self
+        i = self.ways.index(LATENCY)
+        ahead, way = covariance[:3, _MOVING + i], self.deviation[i] * velocity
+        off = np.sqrt(squared_length(ahead - way)) > _SAME_WAY * np.sqrt(squared_length(way))
+        return replace(self, ahead_m=np.where(off, np.nan, ahead))
+
+    def _late_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
+        """Return how far ahead of late positions targets are that are late by one deviation."""
+        way = deviation * state[3:_MOVING]
+        return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
 
     @property
     def considered(self) -> BoolArray | None:
@@ -166,7 +197,8 @@ class ReportedErrors:
         reported[4] += self._sum(state, SPEED_EAST)
         reported[5] -= self._sum(state, CLIMB)
         if LATENCY in self.ways:
-            reported[:3] -= self._sum(state, LATENCY) * state[3:_MOVING]
+            i = self.ways.index(LATENCY)
+            reported[:3] -= state[_MOVING + i] * self._late_m(state, self.deviation[i])
         height = self._sum(state, HEIGHT)
         reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
         reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
@@ -215,7 +247,7 @@ class ReportedErrors:
             elif way == CLIMB:
                 result[5, i], result[2, i] = -deviation, -deviation * self.age_s
             elif way == LATENCY:
-                result[:3, i] = -deviation * state[3:_MOVING]
+                result[:3, i] = -self._late_m(state, deviation)
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin

@@ -96,7 +96,9 @@ def gated_pairs(
             own_m_s = None if rules.carried is None else np.full((3, len(cells)), np.nan)
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
-                reported = rules.carried.reported(scans, cells)
+                reported = rules.carried.reported(scans, cells).reported_by(
+                    part.covariance0.take(track, -1), part.state0[3:6].take(track, -1)
+                )
                 white = rules.carried.white(scans, cells, rows)
                 measured[:2], level_pose = levelled(measured[:2], pose.take(track))
                 mine_then = part.take(track)
