@@ -183,7 +183,6 @@ class Active(CooperativeSensor):
 
     Parameters = ActiveParameters
     hears_of = ("mode_s", "mode_c")
-    lockstep = True
     ladders = (REPLIES, MEASUREMENT)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:

@@ -200,7 +200,6 @@ class AdsB(CooperativeSensor):
 
     Parameters = AdsBParameters
     hears_of = ("ads_b",)
-    lockstep = True
     ladders = (RECEPTION, ERRORS)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:

@@ -69,6 +69,7 @@ class Tracker(Component):
     outputs = {"tracks": Output(StateTracks, "Estimated tracks.")}
     Parameters = TrackerParameters
     windowed = True
+    lockstep = True
     rewindable = True
     ladders = LADDERS
     verified = (
