@@ -178,6 +178,13 @@ class RiskRatios(Mitigated):
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
+    def unit_weights(self, group: Group) -> FloatArray:
+        """Return the weights of the encounters."""
+        if self._weight is None:
+            return super().unit_weights(group)
+        weights: FloatArray = self._weight.measure(group)["encounter_weight"]
+        return weights
+
     def nominal(self, group: Group) -> dict[str, AnyArray]:
         """Return both events without manoeuvres; flights tell where the plane is not sure."""
         meeting = met_in_plane(group, self.p)

@@ -73,6 +73,11 @@ class Mitigated(FlownMetric):
                 mitigated[name][told] = flags
         return {**nominal, **{f"{name}_mitigated": of for name, of in mitigated.items()}}
 
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return the sizes of the events as steered."""
+        cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m("_mitigated")
+        return cylinders
+
     def nominal(self, group: Group) -> dict[str, AnyArray]:
         """Return both events of every replica's flights without manoeuvres."""
         return {f"{name}_nominal": of for name, of in self.losses(group, steered=False).items()}

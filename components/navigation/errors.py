@@ -183,7 +183,6 @@ class NavigationErrors(_Navigation[Believing]):
     """What the ownship believes of its position and attitude: biases, and noise that lasts."""
 
     acts_on = OWNSHIP
-    lockstep = True
 
     def build(self, block: Any) -> Believing:
         """Return what gives the belief at each instant.
@@ -211,7 +210,7 @@ class NavigationErrors(_Navigation[Believing]):
             instant = nanosecond_of(states.tick, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
-            drawn = stream.of_runs(states.run)
+            drawn = stream.of_runs(states.run, instant)
             normals: list[FloatArray] = []
             for number in range(6):
                 process = lasting[number // 3]
@@ -244,7 +243,6 @@ class NavigationReport(_Navigation[Reporting]):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
     acts_on = REPORT
-    lockstep = True
 
     def build(self, block: Any) -> Reporting:
         """Return what adds the columns to a report, and to its variances what navigation knows."""

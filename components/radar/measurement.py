@@ -161,7 +161,7 @@ class Strength:
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
             keys = cells.roster.keys_of(cells.target[detected])
-            draws = self._draws.of_runs(cells.run[detected])
+            draws = self._draws.of_runs(cells.run[detected], cells.instant_ns[detected])
             tail = 1.0 - draws.uniform(keys, cells.scan[detected])
         else:
             tail = look.tail[detected]
@@ -206,7 +206,6 @@ class MeasuredStrength(Effect[Strengthening]):
     decided. Where the draw of a look decides, the same draw says how strong it came out.
     """
 
-    lockstep = True
     name = "measured strength"
     acts_on = STRENGTH
     builds = Strength
@@ -244,7 +243,6 @@ class OwnVelocity(Effect[Reporting]):
     A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
 
-    lockstep = True
     name = "own velocity"
     acts_on = REPORT
     flag = "measures_range_rate"

@@ -181,7 +181,6 @@ class Active(CooperativeSensor):
 
     Parameters = ActiveParameters
     hears_of = ("mode_s", "mode_c")
-    lockstep = True
     ladders = (REPLIES, MEASUREMENT)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -303,7 +302,9 @@ class Active(CooperativeSensor):
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
         run = np.repeat(cells.run[which], ROUNDS)
         keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
-        drawn = self._answers.of_runs(run).uniform(keys, rounds.reshape(-1))
+        numbers = rounds.reshape(-1)
+        over_ns = (numbers - ROUNDS) * round(ROUND_S * NANOSECONDS)
+        drawn = self._answers.of_runs(run, over_ns).uniform(keys, numbers)
         p = answered_in_round(in_1_s)[:, np.newaxis]
         return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
 
@@ -350,7 +351,8 @@ class Active(CooperativeSensor):
         distance = self.measured_range_m(cells, detected)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
         keys, bearings = cells.roster.keys_of(cells.target[detected]), self._bearings
-        drawn = bearings.of_runs(cells.run[detected]).normal(keys, cells.scan[detected])
+        bearings = bearings.of_runs(cells.run[detected], cells.instant_ns[detected])
+        drawn = bearings.normal(keys, cells.scan[detected])
         # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
         turned = own.yaw_rad - cells.own_attitude[0][detected]
         bearing = cells.azimuth_rad[detected] + turned + deviation * np.clip(drawn, -CUT, CUT)

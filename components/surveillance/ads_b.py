@@ -178,7 +178,6 @@ class AdsB(CooperativeSensor):
 
     Parameters = AdsBParameters
     hears_of = ("ads_b",)
-    lockstep = True
     ladders = (RECEPTION, ERRORS)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -271,7 +270,7 @@ class AdsB(CooperativeSensor):
             return none, none, none
         ahead_s = (sent_ns[row, column] - now_ns[row]) / NANOSECONDS
         then = cells.seen_at(asked[row], ahead_s)
-        stream = self._received[kind].of_runs(senders.run[row])
+        stream = self._received[kind].of_runs(senders.run[row], sent_ns[row, column])
         drawn = stream.uniform(senders.keys[row], number[row, column])
         came = then["present"] & (drawn < self.law(then["range_m"]))
         if "hidden" in then:

@@ -124,7 +124,7 @@ class Broadcasts:
         if self._errors == "none":
             return np.zeros(len(deviation)), np.zeros(len(deviation))
         if self._errors == "white":
-            stream = self._streams[name].of_runs(run)
+            stream = self._streams[name].of_runs(run, instant_ns)
             draws = [stream.normal(keys, message, axis + 60_000) for axis in range(3)]
         else:
             # What is sent before the run begins is of instants before 0.

@@ -67,6 +67,7 @@ class Tracker(Component):
     outputs = {"tracks": Output(StateTracks, "Estimated tracks.")}
     Parameters = TrackerParameters
     windowed = True
+    lockstep = True
     rewindable = True
     ladders = LADDERS
     verified = (
